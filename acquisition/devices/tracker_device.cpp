@@ -1,0 +1,1 @@
+#include "acquisition/devices/tracker_device.h"

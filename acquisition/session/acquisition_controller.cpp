@@ -1,0 +1,1 @@
+#include "acquisition/session/acquisition_controller.h"

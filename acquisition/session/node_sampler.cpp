@@ -1,0 +1,1 @@
+#include "acquisition/session/node_sampler.h"

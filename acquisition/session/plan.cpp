@@ -1,0 +1,1 @@
+#include "acquisition/session/plan.h"

@@ -1,0 +1,1 @@
+#include "acquisition/session/session_store.h"

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <QString>
+#include <QtSql/QSqlDatabase>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "acquisition/session/plan.h"
+#include "calib/core/calibration_table.h"
+#include "calib/core/error.h"
+#include "calib/core/statistics.h"
+
+namespace fieldtrue {
+
+/// What is known of one planned place at this moment.
+enum class PlaceState { kPlanned, kDone, kSkipped, kSuspicious };
+
+/// One `*.fieldtrue` file: plan, raw samples, nodes, events and fits in SQLite. WAL with synchronous=FULL while open; one file
+/// again when closed. Use from one thread. Every write is on disk when the call returns.
+class SessionStore {
+ public:
+  /// Creates a new session file. @error kIo (exists already, no such folder, disk full)
+  static Result<SessionStore> create(const QString& path, const Plan& plan, const TableMetadata& metadata);
+  /// Opens an existing one. @error kIo; kBadInput when it is not a session; kNewerVersion
+  static Result<SessionStore> open(const QString& path);
+  SessionStore(SessionStore&&) noexcept;
+  SessionStore& operator=(SessionStore&&) noexcept;
+  ~SessionStore();  ///< Checkpoints and closes.
+
+  const QString& path() const;
+  const Plan& plan() const;
+  const std::vector<PlannedPlace>& places() const;
+  const TableMetadata& metadata() const;
+  Result<void> setMetadata(const TableMetadata& metadata);
+
+  /// State of every planned place, same order as places(). A place without a live take is planned or skipped.
+  std::vector<PlaceState> states() const;
+  /// Index of the first planned place that is neither done nor skipped, none when all are.
+  std::optional<std::size_t> nextPlace() const;
+
+  /// Stores a finished take with its raw samples in one transaction; an earlier take of the place is kept but superseded.
+  /// @param suspicious reason, empty when the take is fine
+  /// @error kIo with the reason (disk full): nothing of the take is stored
+  Result<void> storeTake(std::size_t place, const std::vector<Sample>& samples, const NodeStatistics& statistics,
+                         const std::string& suspicious);
+  Result<void> skip(std::size_t place, const std::string& reason);
+  /// Takes back the last take or skip (any number of times). @return the place it concerned, none when nothing is left
+  Result<std::optional<std::size_t>> undo();
+  /// Brings back what the last undo took back, until something new is stored.
+  Result<std::optional<std::size_t>> redo();
+  Result<void> addEvent(const std::string& kind, const std::string& text);
+  /// Keeps a fitted calibration's text with the session. 
+  Result<void> storeFit(const std::string& name, const std::string& ftcal_text);
+  std::vector<std::pair<std::string, std::string>> fits() const;  ///< name, ftcal text; newest first.
+
+  /// A small state of the program ("page": "compare") kept in the file, so that a session opens where it was.
+  Result<void> setState(const std::string& key, const std::string& value);
+  std::string state(const std::string& key) const;
+
+  /// Live takes as a node table, with skipped places as rows of role skipped only when they have a take.
+  CalibrationTable nodeTable() const;
+  /// Raw samples of the live takes.
+  SampleTable sampleTable() const;
+  /// Statistics of the live take of a place. 
+  std::optional<Node> node(std::size_t place) const;
+  std::vector<Sample> samples(std::size_t place) const;
+
+ private:
+  struct Impl;
+  explicit SessionStore(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fieldtrue

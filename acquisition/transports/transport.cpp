@@ -1,0 +1,1 @@
+#include "acquisition/transports/transport.h"

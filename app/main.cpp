@@ -1,0 +1,2 @@
+#include <QCoreApplication>
+int main() { return 0; }

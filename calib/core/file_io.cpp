@@ -1,0 +1,1 @@
+#include "calib/core/file_io.h"

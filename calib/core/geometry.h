@@ -1,0 +1,48 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "calib/core/error.h"
+#include "calib/core/pose.h"
+
+namespace fieldtrue {
+
+/// Least-squares rigid transform to_from_from: minimises sum |to_i - (R from_i + t)|^2, det R = +1.
+/// @source Horn 1987 / Umeyama 1991 (without scale)
+/// @error kTooFewNodes below 3 points; kDegenerate when the points lie on one line
+Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m);
+
+/// How points spread in space: their centre, principal axes (columns, longest first) and SD along each.
+struct PointSpread {
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d sd_m = Eigen::Vector3d::Zero();
+  int dimension = 0;  ///< 3 volume, 2 one plane, 1 one line, 0 one point; an axis counts when its SD exceeds `flat_ratio` of the longest.
+};
+PointSpread pointSpread(std::span<const Eigen::Vector3d> points_m, double flat_ratio = 0.01);
+
+/// The region that measured points span: their convex hull (in a volume), or the hull in their plane with a slab of
+/// stated half-thickness around it. Nothing is claimed outside.
+class Region {
+ public:
+  Region() = default;
+  /// @param margin_m points this far outside still count as inside (also the slab's half-thickness for planar points)
+  /// @param dimension 3 or 2: spread of the points as decided by the caller; below 2 the region is empty
+  static Region around(std::span<const Eigen::Vector3d> points_m, int dimension, double margin_m);
+  bool contains(const Eigen::Vector3d& point_m) const;
+  /// Largest signed distance to the bounding half-spaces [m]: negative inside, positive outside.
+  double outside_m(const Eigen::Vector3d& point_m) const;
+  bool empty() const { return half_spaces_.empty(); }
+  double margin_m() const { return margin_m_; }
+  nlohmann::json toJson() const;
+  static Result<Region> fromJson(const nlohmann::json& json);
+
+ private:
+  std::vector<Eigen::Vector4d> half_spaces_;  ///< Outward unit normal n and offset d: n.x + d <= margin inside.
+  double margin_m_ = 0.0;
+};
+
+}  // namespace fieldtrue

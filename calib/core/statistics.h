@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/core/calibration_table.h"
+#include "calib/core/error.h"
+
+namespace fieldtrue {
+
+/// How a node's samples are averaged.
+struct AveragingOptions {
+  bool reject_outliers = true;
+  double rejection_threshold = 4.0;  ///< In robust SDs (1.4826 MAD) of the 3-D distance from the median, and of the rotation angle.
+  double quantum_m = 0.0;            ///< Position lattice of the tracker; 0 = found from the samples.
+};
+
+enum class RejectionReason { kStatus, kNotFinite, kPositionOutlier, kRotationOutlier };
+
+struct Rejection {
+  std::size_t sample = 0;  ///< Index into the span given.
+  RejectionReason reason = RejectionReason::kStatus;
+  std::string text;  ///< One phrase for the operator: "12.3 mm from the median (limit 2.1 mm)".
+};
+
+/// Mean pose of a still sensor and how well it is known.
+struct NodeStatistics {
+  Pose mean;
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Of a single accepted sample, floored by quantum^2/12.
+  double sd_rot_rad = 0.0;       ///< RMS rotation angle of a single accepted sample about the mean.
+  double autocorrelation = 0.0;  ///< Lag 1, pooled over the axes, in sample order.
+  double n_effective = 1.0;      ///< n (1 - rho) / (1 + rho), in [1, n].
+  double quantum_m = 0.0;        ///< Lattice spacing used for the floor; 0 = none found.
+  std::size_t n_used = 0;
+  std::vector<Rejection> rejections;
+};
+
+/// Averages the samples of one sensor at one place.
+/// @error kTooFewNodes when no good sample is left
+Result<NodeStatistics> averageSamples(std::span<const Sample> samples, const AveragingOptions& options = {});
+
+/// Average rotation: the eigenvector of the largest eigenvalue of sum w q q^T; q and -q count as the same rotation.
+/// @param weights empty = equal; otherwise as many as rotations, not negative
+/// @source Markley, Cheng, Crassidis, Oshman 2007, Averaging Quaternions, eq. 12-13
+Eigen::Quaterniond meanRotation(std::span<const Eigen::Quaterniond> rotations, std::span<const double> weights = {});
+
+/// Lattice spacing of which all values are multiples (within rounding of the text they came from), if there is one.
+/// @param values_m at least a few dozen readings [m]
+/// @return spacing [m], or none when the values are not on a lattice coarser than their rounding
+std::optional<double> findQuantum_m(std::span<const double> values_m);
+
+double median(std::vector<double> values);
+/// Linear-interpolated quantile, fraction in [0, 1] (Hyndman and Fan 1996, type 7).
+double quantile(std::vector<double> values, double fraction);
+
+/// Copies the statistics into a node row (pose, covariance, counts), leaving identity, truth, times and role alone.
+void setStatistics(Node& node, const NodeStatistics& statistics);
+
+}  // namespace fieldtrue

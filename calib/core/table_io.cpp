@@ -1,0 +1,1 @@
+#include "calib/core/table_io.h"

@@ -1,0 +1,1 @@
+#include "calib/correctors/corrector.h"

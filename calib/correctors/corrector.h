@@ -1,0 +1,105 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/core/calibration_table.h"
+#include "calib/core/error.h"
+#include "calib/core/geometry.h"
+#include "calib/core/run_control.h"
+#include "calib/core/settings.h"
+#include "calib/correctors/fit_data.h"
+#include "calib/correctors/orientation_model.h"
+#include "calib/correctors/position_model.h"
+
+namespace fieldtrue {
+
+/// How tracker and rig frames are related: the nuisance part that is refitted everywhere unless the alignment is known.
+/// reference_from_sensor = reference_from_tracker * tracker_from_sensor * sensor_from_mount.
+struct Alignment {
+  Pose reference_from_tracker;
+  Eigen::Quaterniond sensor_from_mount = Eigen::Quaterniond::Identity();  ///< Constant rotation of the sensor in its holder.
+};
+
+enum class AlignMode { kNone, kRigid };
+
+/// `rigid` unless the table says the alignment is known.
+AlignMode defaultAlignMode(const TableMetadata& metadata);
+
+/// Fits the rigid part from positions, and the constant mounting rotation from orientations when present.
+/// @error kTooFewNodes, kDegenerate as fitRigid
+Result<Alignment> fitAlignment(std::span<const Node> nodes);
+
+/// Rows of a table as fit data in the tracker frame: truth brought there by the inverse alignment.
+FitData makeFitData(std::span<const Node> nodes, const Alignment& alignment);
+
+/// Which methods to fit, with their settings.
+struct CorrectorChoice {
+  std::string position_id = "none";
+  Settings position_settings;
+  std::string orientation_id = "none";
+  Settings orientation_settings;
+};
+
+/// Parses `method[:key=value,...]` for both parts and checks the settings.
+/// @error kBadInput
+Result<CorrectorChoice> parseCorrectorChoice(const std::string& position_text, const std::string& orientation_text);
+
+/// How a fit went on the nodes it saw. Errors after correction, in-sample: never a verdict.
+struct FitReport {
+  std::size_t n_nodes = 0;
+  double rms_before_mm = 0.0;  ///< After the rigid alignment, if one is fitted.
+  double rms_m = 0.0;
+  double max_m = 0.0;
+  std::optional<double> orientation_rms_rad;
+  std::vector<std::string> notes;
+};
+
+/// A fitted calibration: alignment, position part and orientation part, the region it holds in, and where it came from.
+/// Immutable; copies share the models.
+class Corrector {
+ public:
+  /// Fits on the rows given (the caller leaves out skipped and held-out rows).
+  /// @error as the methods' fits
+  static Result<Corrector> fit(std::span<const Node> nodes, const TableMetadata& metadata, const CorrectorChoice& choice,
+                               AlignMode align, const RunControl& control = {});
+
+  /// reference_from_sensor of a tracked pose. Where a part does not cover the position, only the alignment is applied.
+  Pose correct(const Pose& tracker_from_sensor) const;
+  void correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor) const;
+  Eigen::Vector3d correctPosition_m(const Eigen::Vector3d& p_tracked_m) const;
+
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const;
+  /// Inside the calibrated region, and covered by the method; otherwise the result is an extrapolation.
+  bool covers(const Eigen::Vector3d& p_tracked_m) const;
+  Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
+
+  const CorrectorChoice& choice() const { return choice_; }
+  const Alignment& alignment() const { return alignment_; }
+  const Region& region() const { return region_; }
+  const FitReport& report() const { return report_; }
+  const CalibrationTable& table() const { return table_; }  ///< The rows it was fitted on, with their metadata.
+
+  /// Writes `*.ftcal.json`, atomically. @error kIo
+  Result<void> save(const std::filesystem::path& path) const;
+  std::string toText() const;  ///< The file's content.
+  /// @error kIo; kBadInput for damaged content or a checksum that does not match; kNewerVersion
+  static Result<Corrector> load(const std::filesystem::path& path);
+  static Result<Corrector> fromText(const std::string& text, const std::string& name);
+
+ private:
+  Corrector() = default;
+  CorrectorChoice choice_;
+  Alignment alignment_;
+  std::shared_ptr<const PositionModel> position_;
+  std::shared_ptr<const OrientationModel> orientation_;
+  Region region_;
+  FitReport report_;
+  CalibrationTable table_;
+};
+
+}  // namespace fieldtrue

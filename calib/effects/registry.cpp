@@ -1,0 +1,1 @@
+#include "calib/effects/registry.h"

@@ -1,0 +1,1 @@
+#include "calib/evaluation/comparison.h"

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "calib/core/calibration_table.h"
+#include "calib/core/error.h"
+#include "calib/core/run_control.h"
+#include "calib/correctors/corrector.h"
+
+namespace fieldtrue {
+
+/// Statistics of per-place errors, in mm or degrees. The 90 % interval of the RMS is a percentile bootstrap over places.
+struct ErrorStats {
+  double mean = 0, median = 0, rms = 0, p95 = 0, max = 0, rms_low90 = 0, rms_high90 = 0;
+};
+
+/// @param seed of the bootstrap
+ErrorStats errorStats(const std::vector<double>& place_errors, std::uint64_t seed = 1);
+
+enum class ValidationKind { kRole, kLeaveOneOut, kFolds, kBlocks };
+struct Validation {
+  ValidationKind kind = ValidationKind::kLeaveOneOut;
+  int count = 0;  ///< Folds or blocks.
+};
+
+/// Reads `role`, `loo`, `kfold:10`, `block:8`. @error kBadInput
+Result<Validation> parseValidation(const std::string& text);
+/// `role` where the table has validation rows, else `loo`.
+Validation defaultValidation(const CalibrationTable& table);
+std::string toText(const Validation& validation);
+
+struct ComparisonOptions {
+  std::vector<MethodText> position_methods;     ///< Empty = all of the registry with default settings.
+  std::vector<MethodText> orientation_methods;  ///< Empty = all.
+  std::optional<Validation> validation;         ///< None = defaultValidation.
+  std::optional<AlignMode> align;               ///< None = defaultAlignMode.
+  std::uint64_t seed = 1;                       ///< Of folds and bootstrap.
+};
+
+/// One method's score on the places its fits did not see.
+struct MethodScore {
+  std::string method;
+  Settings settings;
+  ErrorStats stats;                        ///< mm or deg, over all scored places.
+  std::vector<double> place_errors;        ///< Same order as Comparison::places.
+  std::vector<Eigen::Vector3d> residual_m; ///< Position only: corrected minus true at each place, reference frame (mean over its rows).
+  int n_uncovered = 0;
+  double rms_common_mm = 0;                ///< Position only: over the places all methods cover.
+  double in_sample_rms = 0;                ///< On the rows it was fitted to, all at once. Not a verdict.
+  double fit_s = 0;                        ///< One fit on all rows.
+  double eval_ns = 0;                      ///< One evaluation.
+  std::optional<std::string> skipped;      ///< Why it cannot be used here; then nothing else is set.
+  std::vector<std::string> notes;
+};
+
+struct Verdict {
+  bool apply_position = false;
+  bool apply_orientation = false;
+  double gain_low90 = 0;   ///< Of the best position method: 1 - RMS after / RMS before, paired bootstrap over places.
+  double gain_high90 = 0;
+  double gain_without_worst_place = 0;
+  std::string text;  ///< One sentence.
+};
+
+struct Comparison {
+  Validation validation;
+  AlignMode align = AlignMode::kNone;
+  std::vector<int> places;  ///< Node numbers scored.
+  int n_places = 0;         ///< In the table, skipped ones left out.
+  int validation_places = 0;
+  double floor_position_mm = 0;
+  double floor_orientation_deg = 0;
+  ErrorStats before_position_mm;
+  std::optional<ErrorStats> before_orientation_deg;  ///< None without orientation.
+  std::vector<double> before_place_mm;
+  std::vector<Eigen::Vector3d> before_residual_m;
+  std::vector<MethodScore> position;
+  std::vector<MethodScore> orientation;
+  std::string best_position = "none";
+  std::string best_orientation = "none";
+  Verdict verdict;
+  std::vector<std::string> notes;  ///< E.g. that the nodes lie in one plane.
+};
+
+/// Scores every method on places its fits did not see.
+/// @error kTooFewNodes, kDegenerate when even the alignment cannot be fitted; kBadInput for unknown methods; kCancelled
+Result<Comparison> compareMethods(const CalibrationTable& table, const ComparisonOptions& options,
+                                  const RunControl& control = {});
+
+/// `fieldtrue.compare/1`.
+nlohmann::json toJson(const Comparison& comparison);
+
+}  // namespace fieldtrue

@@ -1,0 +1,1 @@
+#include "calib/field/coupling.h"

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "calib/core/pose.h"
+
+namespace fieldtrue {
+
+/// Field of three unit orthogonal dipoles at the origin, at p: G(p) = C (3uu^T - I)/r^3; column k is the field of dipole k.
+/// @param p_m in the dipoles' frame, not at the origin [m]
+/// @param dipole_constant_m3 C
+/// @source Raab 1979; Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709
+Eigen::Matrix3d dipoleField(const Eigen::Vector3d& p_m, double dipole_constant_m3);
+
+/// What a room does to the field at the sensor. Undisturbed G is given so that gains can scale it.
+class CouplingDistortion {
+ public:
+  virtual ~CouplingDistortion() = default;
+  /// Change of the 3x3 field matrix at the sensor, tracker frame (rows: field components, columns: transmitter coils).
+  virtual Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3, double time_s) const = 0;
+};
+
+/// The nine couplings S = R^T G: rows receiver coils, columns transmitter coils.
+Eigen::Matrix3d couplings(const Eigen::Matrix3d& field, const Eigen::Quaterniond& tracker_from_sensor);
+
+}  // namespace fieldtrue

@@ -1,0 +1,1 @@
+#include "calib/simulation/simulator.h"
