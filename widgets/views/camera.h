@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "widgets/views/scene_space.h"
+
+class vtkCamera;
+
+namespace fieldtrue {
+
+/// Views an operator knows: from behind the own side, straight from the front, the side and the top (north, +y, up).
+enum class CameraPreset { kOperator, kFront, kSide, kTop };
+
+/// An upright camera as the five things a person changes.
+struct CameraPose {
+  Eigen::Vector3d focus_m = Eigen::Vector3d::Zero();
+  double azimuth_rad = 0.0;      ///< Of the camera seen from the focus, about +z from +x.
+  double elevation_rad = 0.5;    ///< Of the camera above the horizontal plane, within +-90 degrees.
+  double view_height_m = 1.0;    ///< Height of what is seen in the focal plane.
+  double view_angle_rad = 0.45;  ///< Narrow looks parallel.
+  bool operator==(const CameraPose&) const = default;
+};
+
+/// The preset that shows all of a space in a view of the given width to height ratio.
+CameraPose presetPose(CameraPreset preset, const SceneSpace& space, double aspect);
+
+/// Between two poses, turning the short way. @param t 0 gives a, 1 gives b
+CameraPose interpolate(const CameraPose& a, const CameraPose& b, double t);
+
+void apply(const CameraPose& pose, vtkCamera* camera);
+
+}  // namespace fieldtrue

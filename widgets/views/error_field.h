@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <QString>
+#include <optional>
+#include <vector>
+
+#include "calib/core/pose.h"
+
+namespace fieldtrue {
+
+/// The error at one place: an arrow from where the sensor was to where the tracker said it was.
+struct FieldArrow {
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero();   ///< True position, reference frame [m].
+  Eigen::Vector3d error_m = Eigen::Vector3d::Zero();  ///< Tracked (or corrected) minus true, reference frame [m].
+  int node = 0;
+  std::optional<double> angle_deg;  ///< Orientation error.
+  bool validation = false;
+  std::optional<Eigen::Vector3d>
+      rotation_axis;  ///< Of the orientation error, reference frame, any length; none: vertical.
+  QString name;       ///< What hover calls the place; empty: "place 17".
+};
+
+struct ErrorField {
+  QString title;
+  std::vector<FieldArrow> arrows;
+  Pose reference_from_tracker;
+};
+
+}  // namespace fieldtrue

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "widgets/views/error_field.h"
+#include "widgets/views/orbit_view.h"
+#include "widgets/views/theme.h"
+
+namespace fieldtrue {
+
+class FieldScene;
+
+/// Arrows from the true to the tracked (or corrected) position of every place, coloured by length on a shared scale.
+class FieldView : public OrbitView {
+  Q_OBJECT
+ public:
+  explicit FieldView(QWidget* parent = nullptr);
+  ~FieldView() override;
+
+  void setField(const ErrorField& field);
+  /// One colour scale for every view compared: its upper end [mm].
+  void setScaleMax_mm(double scale_max_mm);
+  /// Arrows (and arcs) are drawn this much larger than true; the legend says so.
+  void setMagnification(double magnification);
+  void setShowOrientation(bool show);
+  /// Upper end of the orientation scale [deg]; until set, the largest error of the field.
+  void setAngleScaleMax_deg(double scale_max_deg);
+  void setSelected(std::optional<int> node);
+  void setLengthUnit(LengthUnit unit);
+
+ signals:
+  void nodeClicked(int node);
+  void nodeHovered(int node, QString text);  ///< -1 and an empty text when the mouse left it.
+
+ protected:
+  void restyle(double pixel_ratio) override;
+  std::vector<Eigen::Vector3d> pickPoints_m() const override;
+  void pointHovered(std::optional<int> index) override;
+  void pointClicked(int index) override;
+
+ private:
+  std::unique_ptr<FieldScene> scene_;
+};
+
+}  // namespace fieldtrue
