@@ -1,1 +1,197 @@
 #include "calib/core/geometry.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "calib/core/convex_hull.h"
+
+namespace fieldtrue {
+
+namespace {
+
+/// Points whose second spread is below this share of the first lie on one line as far as double precision can tell.
+constexpr double kLineRatio = 1e-6;
+/// Rounding of a distance to a half-space that passes through the point itself.
+constexpr double kRounding_m = 1e-12;
+
+Eigen::Vector3d mean(std::span<const Eigen::Vector3d> points_m) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point_m : points_m) sum += point_m;
+  return sum / static_cast<double>(points_m.size());
+}
+
+bool allFinite(std::span<const Eigen::Vector3d> points_m) {
+  return std::all_of(points_m.begin(), points_m.end(), [](const Eigen::Vector3d& p) { return p.allFinite(); });
+}
+
+/// The half-space of a normal that touches the points from outside.
+Eigen::Vector4d supporting(const Eigen::Vector3d& outward, std::span<const Eigen::Vector3d> points_m) {
+  double farthest_m = -std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& point_m : points_m) farthest_m = std::max(farthest_m, outward.dot(point_m));
+  return {outward.x(), outward.y(), outward.z(), -farthest_m};
+}
+
+/// Outward normals of the hull of points in a plane, taken within that plane; empty when they lie on one line.
+std::vector<Eigen::Vector3d> planarNormals(std::span<const Eigen::Vector3d> points_m, const PointSpread& spread) {
+  std::vector<Eigen::Vector2d> flat_m;
+  flat_m.reserve(points_m.size());
+  for (const Eigen::Vector3d& point_m : points_m) {
+    flat_m.emplace_back(spread.axes.leftCols<2>().transpose() * (point_m - spread.center_m));
+  }
+  const std::vector<Eigen::Vector2d> corners_m = convexPolygon(flat_m);
+  std::vector<Eigen::Vector3d> normals;
+  if (corners_m.size() < 3) return normals;
+  for (std::size_t i = 0; i < corners_m.size(); ++i) {
+    const Eigen::Vector2d edge_m = corners_m[(i + 1) % corners_m.size()] - corners_m[i];
+    normals.emplace_back((spread.axes.leftCols<2>() * Eigen::Vector2d(edge_m.y(), -edge_m.x())).normalized());
+  }
+  return normals;
+}
+
+/// A polytope of 26 faces around the points: what stands in for the hull where Qhull gives up.
+std::vector<Eigen::Vector3d> fallbackNormals(const PointSpread& spread) {
+  std::vector<Eigen::Vector3d> normals;
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) {
+        if (x == 0 && y == 0 && z == 0) continue;
+        normals.push_back((spread.axes * Eigen::Vector3d(x, y, z)).normalized());
+      }
+    }
+  }
+  return normals;
+}
+
+std::optional<Eigen::Vector4d> halfSpaceFromJson(const nlohmann::json& json) {
+  if (!json.is_array() || json.size() != 4) return std::nullopt;
+  Eigen::Vector4d half_space;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!json[i].is_number()) return std::nullopt;
+    half_space[static_cast<Eigen::Index>(i)] = json[i].get<double>();
+  }
+  const bool is_unit = std::abs(half_space.head<3>().norm() - 1.0) < 1e-6;
+  return half_space.allFinite() && is_unit ? std::optional(half_space) : std::nullopt;
+}
+
+}  // namespace
+
+Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m) {
+  FT_CHECK(from_m.size() == to_m.size());
+  if (from_m.size() < 3) {
+    return fail(ErrorCode::kTooFewNodes,
+                "A rigid fit needs 3 points not on one line, got " + std::to_string(from_m.size()));
+  }
+  if (!allFinite(from_m) || !allFinite(to_m)) {
+    return fail(ErrorCode::kBadInput, "A rigid fit needs finite points, got one that is not");
+  }
+  if (pointSpread(from_m, kLineRatio).dimension < 2 || pointSpread(to_m, kLineRatio).dimension < 2) {
+    return fail(ErrorCode::kDegenerate, "A rigid fit needs 3 points not on one line, got " +
+                                            std::to_string(from_m.size()) + " points on one line");
+  }
+  const Eigen::Vector3d from_center_m = mean(from_m);
+  const Eigen::Vector3d to_center_m = mean(to_m);
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < from_m.size(); ++i) {
+    covariance += (to_m[i] - to_center_m) * (from_m[i] - from_center_m).transpose();
+  }
+  // Umeyama 1991, eq. 40-43 without the scale; the last column's sign keeps a mirror image from being fitted.
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double handedness = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
+  const Eigen::Matrix3d R =
+      svd.matrixU() * Eigen::Vector3d(1.0, 1.0, handedness).asDiagonal() * svd.matrixV().transpose();
+  Pose to_from_from;
+  to_from_from.orientation = canonical(Eigen::Quaterniond(R));
+  to_from_from.position_m = to_center_m - to_from_from.orientation * from_center_m;
+  return to_from_from;
+}
+
+PointSpread pointSpread(std::span<const Eigen::Vector3d> points_m, double flat_ratio) {
+  PointSpread spread;
+  if (points_m.empty()) return spread;
+  spread.center_m = mean(points_m);
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& point_m : points_m) {
+    scatter += (point_m - spread.center_m) * (point_m - spread.center_m).transpose();
+  }
+  scatter /= static_cast<double>(points_m.size());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
+  for (int column = 0; column < 2; ++column) {
+    Eigen::Vector3d axis = eigen.eigenvectors().col(2 - column);
+    Eigen::Index largest = 0;
+    axis.cwiseAbs().maxCoeff(&largest);
+    spread.axes.col(column) = axis[largest] < 0.0 ? Eigen::Vector3d(-axis) : axis;
+  }
+  spread.axes.col(2) = spread.axes.col(0).cross(spread.axes.col(1));
+  spread.sd_m = eigen.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+  const double rounding_m = 1e-14 * spread.center_m.norm();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (spread.sd_m[axis] > std::max(flat_ratio * spread.sd_m[0], rounding_m)) ++spread.dimension;
+  }
+  return spread;
+}
+
+Region Region::around(std::span<const Eigen::Vector3d> points_m, int dimension, double margin_m) {
+  FT_CHECK(margin_m >= 0.0 && allFinite(points_m));
+  Region region;
+  region.margin_m_ = margin_m;
+  if (dimension < 2 || points_m.size() < 3) return region;
+  const PointSpread spread = pointSpread(points_m);
+  std::vector<Eigen::Vector3d> normals;
+  if (dimension == 2) {
+    normals = planarNormals(points_m, spread);
+    if (normals.empty()) return region;
+    normals.emplace_back(spread.axes.col(2));
+    normals.emplace_back(-spread.axes.col(2));
+  } else {
+    normals = convexHullNormals(points_m).value_or(std::vector<Eigen::Vector3d>());
+    if (normals.size() < 4) normals = fallbackNormals(spread);
+  }
+  for (const Eigen::Vector3d& normal : normals) region.half_spaces_.push_back(supporting(normal, points_m));
+  return region;
+}
+
+bool Region::contains(const Eigen::Vector3d& point_m) const {
+  return !empty() && outside_m(point_m) <= margin_m_ + kRounding_m;
+}
+
+double Region::outside_m(const Eigen::Vector3d& point_m) const {
+  if (empty() || !point_m.allFinite()) return std::numeric_limits<double>::infinity();
+  double farthest_m = -std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector4d& half_space : half_spaces_) {
+    farthest_m = std::max(farthest_m, half_space.head<3>().dot(point_m) + half_space[3]);
+  }
+  return farthest_m;
+}
+
+nlohmann::json Region::toJson() const {
+  nlohmann::json rows = nlohmann::json::array();
+  for (const Eigen::Vector4d& h : half_spaces_) rows.push_back({h[0], h[1], h[2], h[3]});
+  return {{"half_spaces_nx_ny_nz_d_m", rows}, {"margin_m", margin_m_}};
+}
+
+Result<Region> Region::fromJson(const nlohmann::json& json) {
+  const auto bad = [](const std::string& what) { return fail(ErrorCode::kBadInput, "The region " + what); };
+  if (!json.is_object() || !json.contains("half_spaces_nx_ny_nz_d_m") || !json.contains("margin_m")) {
+    return bad("needs half_spaces_nx_ny_nz_d_m and margin_m");
+  }
+  const nlohmann::json& margin = json["margin_m"];
+  if (!margin.is_number() || !(margin.get<double>() >= 0.0) || !std::isfinite(margin.get<double>())) {
+    return bad("needs a margin_m of 0 or more, got " + margin.dump());
+  }
+  if (!json["half_spaces_nx_ny_nz_d_m"].is_array()) return bad("needs half_spaces_nx_ny_nz_d_m as a list");
+  Region region;
+  region.margin_m_ = margin.get<double>();
+  for (const nlohmann::json& row : json["half_spaces_nx_ny_nz_d_m"]) {
+    const std::optional<Eigen::Vector4d> half_space = halfSpaceFromJson(row);
+    if (!half_space) return bad("has a half-space that is not a unit normal and a distance: " + row.dump());
+    region.half_spaces_.push_back(*half_space);
+  }
+  return region;
+}
+
+}  // namespace fieldtrue

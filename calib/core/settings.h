@@ -2,13 +2,12 @@
 
 #include <cstdint>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
-
-#include <nlohmann/json_fwd.hpp>
 
 #include "calib/core/error.h"
 
@@ -16,7 +15,8 @@ namespace fieldtrue {
 
 enum class SettingType { kNumber, kInteger, kBool, kChoice, kAutoNumber };
 
-/// A value of a setting: bool, integer, number, or a choice (text). An auto-number is the text "auto" or a number.
+/// A value of a setting: bool, integer, number, or a choice (text). An auto-number is the text "auto" or a number; a
+/// choice without choices is any text.
 using SettingValue = std::variant<bool, std::int64_t, double, std::string>;
 
 /// One setting as data: one form builder draws them all and one parser reads them all.
@@ -25,10 +25,10 @@ struct Setting {
   std::string label;
   SettingType type = SettingType::kNumber;
   std::string unit;  ///< Empty when dimensionless.
-  double min = 0.0;
+  double min = 0.0;  ///< min and max both 0: any finite number.
   double max = 0.0;
   SettingValue default_value = 0.0;
-  std::vector<std::string> choices;  ///< For kChoice.
+  std::vector<std::string> choices;  ///< For kChoice; empty = any text.
   std::string help;                  ///< One sentence.
 };
 
