@@ -28,8 +28,8 @@ class Transport : public QIODevice {
   void lineLost(const QString& reason);
 };
 
-/// Makes the transport an address asks for: `tcp:HOST:PORT`; a real serial line through libserialport; a pty or anything
-/// libserialport refuses through termios. `@BAUD` at the end sets the rate (default 115200).
+/// Makes the transport an address asks for: `tcp:HOST:PORT`; a real serial line through libserialport; a pty or
+/// anything libserialport refuses through termios. `@BAUD` at the end sets the rate (default 115200).
 /// @error kBadInput for an address that cannot be read
 Result<std::unique_ptr<Transport>> makeTransport(const std::string& address);
 
