@@ -14,8 +14,10 @@ namespace fieldtrue {
 /// How a node's samples are averaged.
 struct AveragingOptions {
   bool reject_outliers = true;
-  double rejection_threshold = 4.0;  ///< In robust SDs (1.4826 MAD) of the 3-D distance from the median, and of the rotation angle.
-  double quantum_m = 0.0;            ///< Position lattice of the tracker; 0 = found from the samples.
+  /// A sample is rejected when its 3-D distance from the median position exceeds the median of these distances by more
+  /// than this many robust SDs (1.4826 MAD) of the distances; rotation angles likewise.
+  double rejection_threshold = 4.0;
+  double quantum_m = 0.0;  ///< Position lattice of the tracker; 0 = found from the samples.
 };
 
 enum class RejectionReason { kStatus, kNotFinite, kPositionOutlier, kRotationOutlier };
@@ -29,13 +31,14 @@ struct Rejection {
 /// Mean pose of a still sensor and how well it is known.
 struct NodeStatistics {
   Pose mean;
-  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Of a single accepted sample, floored by quantum^2/12.
-  double sd_rot_rad = 0.0;       ///< RMS rotation angle of a single accepted sample about the mean.
-  double autocorrelation = 0.0;  ///< Lag 1, pooled over the axes, in sample order.
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Of a single accepted sample (n - 1), variances floored
+                                                            ///< by quantum^2/12, with 1 um where no quantum is known.
+  double sd_rot_rad = 0.0;       ///< RMS rotation angle of a single accepted sample about the mean, at least 1e-6.
+  double autocorrelation = 0.0;  ///< Lag 1, pooled over the axes, in sample order; 1 when all samples are the same.
   double n_effective = 1.0;      ///< n (1 - rho) / (1 + rho), in [1, n].
-  double quantum_m = 0.0;        ///< Lattice spacing used for the floor; 0 = none found.
+  double quantum_m = 0.0;        ///< Lattice or printed step used for the floor; 0 = none found.
   std::size_t n_used = 0;
-  std::vector<Rejection> rejections;
+  std::vector<Rejection> rejections;  ///< In sample order.
 };
 
 /// Averages the samples of one sensor at one place.
@@ -47,10 +50,18 @@ Result<NodeStatistics> averageSamples(std::span<const Sample> samples, const Ave
 /// @source Markley, Cheng, Crassidis, Oshman 2007, Averaging Quaternions, eq. 12-13
 Eigen::Quaterniond meanRotation(std::span<const Eigen::Quaterniond> rotations, std::span<const double> weights = {});
 
-/// Lattice spacing of which all values are multiples (within rounding of the text they came from), if there is one.
-/// @param values_m at least a few dozen readings [m]
-/// @return spacing [m], or none when the values are not on a lattice coarser than their rounding
+/// Lattice spacing of which all differences of the values are multiples (within rounding of the text they came from),
+/// if there is one.
+/// @param values_m at least a few dozen readings [m], of one or several axes
+/// @return spacing [m] of 1 um or more, or none when the values are not on a lattice coarser than their rounding
 std::optional<double> findQuantum_m(std::span<const double> values_m);
+
+/// The coarsest decimal step, in metres or inches, of which all values are multiples: what they were printed with.
+/// @return step [m] of 1e-9 or more, 0 when the values have no such step
+double printedStep_m(std::span<const double> values_m);
+
+/// Whether a number is one of the marks that trackers' recordings put for a missing reading, such as -3.7e28.
+bool isMissingMark(double value);
 
 double median(std::vector<double> values);
 /// Linear-interpolated quantile, fraction in [0, 1] (Hyndman and Fan 1996, type 7).
