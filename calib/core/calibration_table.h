@@ -42,14 +42,15 @@ struct Node {
   int sensor = 0;
   int visit = 0;
   std::optional<std::array<int, 3>> index;
-  Pose reference_from_sensor;     ///< True pose, in the frame named by the metadata.
-  Pose tracker_from_sensor;       ///< Mean of what the tracker reported.
-  bool has_orientation = true;    ///< Whether the tracker reported an orientation.
+  Pose reference_from_sensor;                    ///< True pose, in the frame named by the metadata.
+  Pose tracker_from_sensor;                      ///< Mean of what the tracker reported.
+  bool has_orientation = true;                   ///< Whether the tracker reported an orientation.
   std::optional<Eigen::Matrix3d> covariance_m2;  ///< Of a single accepted sample.
-  std::optional<double> sd_rot_rad;  ///< RMS rotation angle of a single accepted sample about the mean.
+  std::optional<double> sd_rot_rad;              ///< RMS rotation angle of a single accepted sample about the mean.
   int n_used = 1;
   int n_rejected = 0;
-  double n_effective = 1.0;  ///< Independent samples n_used is worth; covariance of the mean = covariance_m2 / n_effective.
+  double n_effective =
+      1.0;  ///< Independent samples n_used is worth; covariance of the mean = covariance_m2 / n_effective.
   std::optional<double> t_start_s;
   std::optional<double> t_end_s;
   NodeRole role = NodeRole::kFit;
@@ -67,7 +68,8 @@ struct TableMetadata {
   std::optional<double> quantum_m;
   std::optional<double> jig_tolerance_m;    ///< SD of placing, per axis.
   std::optional<double> jig_tolerance_rad;  ///< SD of placing, per axis.
-  bool alignment_known = false;             ///< `alignment: known`; false means the rigid part between rig and transmitter is a nuisance.
+  bool alignment_known =
+      false;  ///< `alignment: known`; false means the rigid part between rig and transmitter is a nuisance.
   std::optional<double> alignment_tolerance_m;
   std::optional<double> alignment_tolerance_rad;
   std::map<std::string, std::string> other;  ///< Keys this program does not interpret; kept and written back.

@@ -35,8 +35,7 @@ inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
 
 /// @error std::logic_error always; reached only through FT_CHECK.
 [[noreturn]] inline void checkFailed(const char* condition, const char* file, int line) {
-  throw std::logic_error(std::string("check failed: ") + condition + " (" + file + ":" +
-                         std::to_string(line) + ")");
+  throw std::logic_error(std::string("check failed: ") + condition + " (" + file + ":" + std::to_string(line) + ")");
 }
 
 }  // namespace fieldtrue

@@ -15,8 +15,7 @@ Result<std::string> readFile(const std::filesystem::path& path);
 /// Writes beside, syncs to disk, renames over: the path holds either the old or the whole new content, never a part.
 /// @param write fills the stream
 /// @error kIo with the system's reason (no such folder, no permission, no space left); the old file is untouched
-Result<void> writeFileAtomically(const std::filesystem::path& path,
-                                 const std::function<void(std::ostream&)>& write);
+Result<void> writeFileAtomically(const std::filesystem::path& path, const std::function<void(std::ostream&)>& write);
 
 /// Shortest text that reads back to the same double; "nan" for NaN.
 std::string formatNumber(double value);

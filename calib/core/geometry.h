@@ -1,9 +1,8 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <vector>
-
-#include <nlohmann/json_fwd.hpp>
 
 #include "calib/core/error.h"
 #include "calib/core/pose.h"
@@ -20,7 +19,8 @@ struct PointSpread {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   Eigen::Vector3d sd_m = Eigen::Vector3d::Zero();
-  int dimension = 0;  ///< 3 volume, 2 one plane, 1 one line, 0 one point; an axis counts when its SD exceeds `flat_ratio` of the longest.
+  int dimension = 0;  ///< 3 volume, 2 one plane, 1 one line, 0 one point; an axis counts when its SD exceeds
+                      ///< `flat_ratio` of the longest.
 };
 PointSpread pointSpread(std::span<const Eigen::Vector3d> points_m, double flat_ratio = 0.01);
 

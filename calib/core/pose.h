@@ -33,8 +33,8 @@ Eigen::Quaterniond rotationFromVector(const Eigen::Vector3d& rotation_vector_rad
 /// Angle between two rotations [rad], in [0, pi]; q and -q are the same rotation.
 double angleBetween_rad(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
-/// Rotation of azimuth about Z, then elevation about the new Y, then roll about the new X: R = Rz(az) Ry(el) Rx(roll) [rad],
-/// the convention of Polhemus and Ascension.
+/// Rotation of azimuth about Z, then elevation about the new Y, then roll about the new X: R = Rz(az) Ry(el) Rx(roll)
+/// [rad], the convention of Polhemus and Ascension.
 Eigen::Quaterniond rotationFromEuler(const Eigen::Vector3d& azimuth_elevation_roll_rad);
 
 /// The inverse of rotationFromEuler; elevation in [-pi/2, pi/2], at the gimbal poles roll is 0.

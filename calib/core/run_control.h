@@ -18,7 +18,8 @@ inline void serialFor(std::size_t count, const std::function<void(std::size_t)>&
 /// How a long computation is run, watched and stopped by its caller.
 struct RunControl {
   ParallelFor parallel_for = serialFor;
-  std::function<void(double fraction)> progress = [](double) {};  ///< May be called from any thread, fraction in [0, 1].
+  std::function<void(double fraction)> progress = [](double) {
+  };  ///< May be called from any thread, fraction in [0, 1].
   std::stop_token stop;
 };
 

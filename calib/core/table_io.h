@@ -20,7 +20,8 @@ struct TableReading {
 
 /// Reads a node table (`*.nodes.csv`), streaming; columns by name in any order.
 /// @param name stands in error messages ("room.nodes.csv")
-/// @error kBadInput naming file, line and column: missing required column, not a number, NaN or infinite, zero quaternion,
+/// @error kBadInput naming file, line and column: missing required column, not a number, NaN or infinite, zero
+/// quaternion,
 ///        repeated (node, sensor, visit), truncated last line. Never a partial table.
 Result<TableReading<CalibrationTable>> readNodeTable(std::istream& in, const std::string& name);
 Result<TableReading<CalibrationTable>> readNodeTable(const std::filesystem::path& path);
