@@ -1,2 +1,46 @@
-#include <QCoreApplication>
-int main() { return 0; }
+#include <QApplication>
+#include <QCommandLineParser>
+#include <QStyleHints>
+#include <QTimer>
+#include <cstdio>
+
+#include "widgets/pages/main_window.h"
+#include "widgets/views/gl_format.h"
+#include "widgets/views/theme.h"
+
+int main(int argc, char** argv) {
+  fieldtrue::setDefaultGlFormat();
+  QApplication application(argc, argv);
+  QApplication::setApplicationName(QStringLiteral("fieldtrue"));
+  QApplication::setApplicationVersion(QStringLiteral(FIELDTRUE_VERSION));
+
+  QCommandLineParser parser;
+  parser.setApplicationDescription(QApplication::tr("Calibrates electromagnetic trackers."));
+  parser.addHelpOption();
+  parser.addVersionOption();
+  parser.addPositionalArgument(QStringLiteral("session"),
+                               QApplication::tr("Session file (*.fieldtrue) to open where it was."),
+                               QStringLiteral("[session]"));
+  const QCommandLineOption demo(QStringLiteral("demo"),
+                                QApplication::tr("Run the demonstration with the simulated tracker."));
+  const QCommandLineOption dark(QStringLiteral("dark"), QApplication::tr("Dark colours, whatever the desktop uses."));
+  const QCommandLineOption light(QStringLiteral("light"),
+                                 QApplication::tr("Light colours, whatever the desktop uses."));
+  parser.addOptions({demo, dark, light});
+  parser.process(application);
+
+  const bool use_dark = parser.isSet(dark) || (!parser.isSet(light) && fieldtrue::systemPrefersDark());
+  fieldtrue::applyTheme(application, use_dark);
+  fieldtrue::MainWindow window;
+  window.show();
+  window.activateWindow();
+  const QStringList sessions = parser.positionalArguments();
+  QTimer::singleShot(0, &window, [&] {
+    if (parser.isSet(demo)) {
+      window.workbench().startDemonstration();
+    } else if (!sessions.isEmpty()) {
+      window.workbench().openSession(sessions.first());
+    }
+  });
+  return QApplication::exec();
+}

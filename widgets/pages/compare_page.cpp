@@ -1,0 +1,399 @@
+#include "widgets/pages/compare_page.h"
+
+#include <QApplication>
+#include <QCheckBox>
+#include <QClipboard>
+#include <QComboBox>
+#include <QHBoxLayout>
+#include <QHeaderView>
+#include <QLabel>
+#include <QProgressBar>
+#include <QPushButton>
+#include <QScrollArea>
+#include <QShortcut>
+#include <QSlider>
+#include <QSplitter>
+#include <QStackedWidget>
+#include <QTabWidget>
+#include <QTableView>
+#include <QVBoxLayout>
+#include <cmath>
+
+#include "calib/correctors/registry.h"
+#include "widgets/pages/empty_page.h"
+#include "widgets/pages/error_fields.h"
+#include "widgets/pages/settings_form.h"
+#include "widgets/pages/units.h"
+#include "widgets/views/chart_views.h"
+#include "widgets/views/field_view.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr int kInspectorWidth = 400;
+constexpr std::size_t kFewestPlaces = 5;
+
+// The slider runs over magnifications 1 to 100 in even ratios.
+double magnificationOf(int slider) { return std::pow(10.0, slider / 50.0); }
+
+template <class Method>
+void fillMethods(QComboBox* combo, std::span<const Method> methods) {
+  for (const Method& method : methods)
+    combo->addItem(QString::fromStdString(method.label), QString::fromStdString(method.id));
+}
+
+}  // namespace
+
+ComparePage::ComparePage(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
+  auto* content = new QWidget(this);
+  auto* rows = new QVBoxLayout(content);
+  rows->setContentsMargins(0, 0, 0, 0);
+  rows->setSpacing(0);
+  rows->addWidget(makeHeader());
+  auto* splitter = new QSplitter(content);
+  splitter->addWidget(makeViews());
+  splitter->addWidget(makeInspector());
+  splitter->setStretchFactor(0, 1);
+  splitter->setSizes({880, kInspectorWidth});
+  rows->addWidget(splitter, 1);
+
+  stack_ = new QStackedWidget(this);
+  stack_->addWidget(new EmptyPage(
+      tr("Nothing to compare yet."),
+      tr("At least %1 places must be taken; then every method is tried on places it did not see.").arg(kFewestPlaces),
+      {{tr("Acquire"), [this] { workbench_.goToStep(Step::kAcquire); }},
+       {tr("Run the demonstration"), [this] { workbench_.startDemonstration(); }}},
+      this));
+  stack_->addWidget(content);
+  auto* layout = new QVBoxLayout(this);
+  layout->setContentsMargins(0, 0, 0, 0);
+  layout->addWidget(stack_);
+
+  connect(&workbench_, &Workbench::tableChanged, this, &ComparePage::onTable);
+  connect(&workbench_, &Workbench::comparisonChanged, this, &ComparePage::onComparison);
+  connect(&workbench_, &Workbench::correctorChanged, this, &ComparePage::onCorrector);
+  connect(&workbench_, &Workbench::comparisonProgress, this,
+          [this](double fraction) { progress_->setValue(static_cast<int>(fraction * 1000.0)); });
+  onTable();
+}
+
+QWidget* ComparePage::makeHeader() {
+  auto* header = new QWidget(this);
+  header->setObjectName(QStringLiteral("verdictBar"));
+  header->setAttribute(Qt::WA_StyledBackground);
+  auto* layout = new QHBoxLayout(header);
+  layout->setContentsMargins(20, 12, 20, 12);
+  auto* texts = new QVBoxLayout;
+  verdict_ = new QLabel(header);
+  verdict_->setObjectName(QStringLiteral("verdict"));
+  verdict_->setProperty("role", "title");
+  verdict_->setWordWrap(true);
+  details_ = new QLabel(header);
+  details_->setProperty("role", "muted");
+  details_->setWordWrap(true);
+  texts->addWidget(verdict_);
+  texts->addWidget(details_);
+  layout->addLayout(texts, 1);
+  progress_ = new QProgressBar(header);
+  progress_->setRange(0, 1000);
+  progress_->setFixedWidth(140);
+  progress_->setAccessibleName(tr("Comparison"));
+  validation_ = new QComboBox(header);
+  validation_->addItem(tr("Leave one place out"), QStringLiteral("loo"));
+  validation_->addItem(tr("10 folds"), QStringLiteral("kfold:10"));
+  validation_->addItem(tr("8 blocks of space"), QStringLiteral("block:8"));
+  validation_->addItem(tr("Validation places"), QStringLiteral("role"));
+  validation_->setAccessibleName(tr("How methods are judged"));
+  connect(validation_, &QComboBox::activated, this, &ComparePage::runComparison);
+  run_ = new QPushButton(tr("Compare"), header);
+  run_->setObjectName(QStringLiteral("runComparison"));
+  run_->setProperty("primary", true);
+  connect(run_, &QPushButton::clicked, this, [this] {
+    if (workbench_.isComparing()) {
+      workbench_.stopComparing();
+    } else {
+      runComparison();
+    }
+  });
+  layout->addWidget(progress_);
+  layout->addWidget(validation_);
+  layout->addWidget(run_);
+  return header;
+}
+
+QWidget* ComparePage::makeViews() {
+  auto* panel = new QWidget(this);
+  auto* layout = new QVBoxLayout(panel);
+  layout->setContentsMargins(0, 0, 0, 0);
+  layout->setSpacing(0);
+  auto* vertical = new QSplitter(Qt::Vertical, panel);
+  auto* fields = new QSplitter(vertical);
+  before_ = new FieldView(fields);
+  after_ = new FieldView(fields);
+  before_->setObjectName(QStringLiteral("fieldBefore"));
+  after_->setObjectName(QStringLiteral("fieldAfter"));
+  after_->linkCamera(before_);
+  fields->addWidget(before_);
+  fields->addWidget(after_);
+  histogram_ = new HistogramView(vertical);
+  histogram_->setObjectName(QStringLiteral("histogram"));
+  vertical->addWidget(fields);
+  vertical->addWidget(histogram_);
+  vertical->setStretchFactor(0, 3);
+  vertical->setStretchFactor(1, 1);
+  vertical->setSizes({460, 170});
+  layout->addWidget(makeViewBar());
+  layout->addWidget(vertical, 1);
+  for (FieldView* view : {before_, after_}) {
+    connect(view, &FieldView::nodeHovered, this, [this](int, const QString& text) { hovered_->setText(text); });
+    connect(view, &FieldView::nodeClicked, this, &ComparePage::selectNode);
+  }
+  return panel;
+}
+
+QWidget* ComparePage::makeViewBar() {
+  auto* bar = new QWidget(this);
+  bar->setObjectName(QStringLiteral("viewBar"));
+  bar->setAttribute(Qt::WA_StyledBackground);
+  auto* layout = new QHBoxLayout(bar);
+  layout->setContentsMargins(12, 4, 12, 4);
+  auto* scale_label = new QLabel(tr("Arrows"), bar);
+  scale_ = new QSlider(Qt::Horizontal, bar);
+  scale_->setObjectName(QStringLiteral("glyphScale"));
+  scale_->setRange(0, 100);
+  scale_->setFixedWidth(140);
+  scale_->setAccessibleName(tr("Magnification of the arrows"));
+  scale_text_ = new QLabel(bar);
+  scale_text_->setMinimumWidth(48);
+  connect(scale_, &QSlider::valueChanged, this, [this](int value) {
+    const double magnification = magnificationOf(value);
+    scale_text_->setText(tr("x%1").arg(threeFigures(magnification)));
+    before_->setMagnification(magnification);
+    after_->setMagnification(magnification);
+  });
+  two_views_ = new QCheckBox(tr("Before and after"), bar);
+  two_views_->setChecked(true);
+  connect(two_views_, &QCheckBox::toggled, this, [this](bool on) { before_->setVisible(on); });
+  orientation_ = new QCheckBox(tr("Orientation error"), bar);
+  connect(orientation_, &QCheckBox::toggled, this, [this](bool on) {
+    before_->setShowOrientation(on);
+    after_->setShowOrientation(on);
+  });
+  layout->addWidget(scale_label);
+  layout->addWidget(scale_);
+  layout->addWidget(scale_text_);
+  layout->addWidget(two_views_);
+  layout->addWidget(orientation_);
+  struct View {
+    const char* label;
+    CameraPreset preset;
+  };
+  for (const View& view :
+       {View{QT_TR_NOOP("Operator"), CameraPreset::kOperator}, View{QT_TR_NOOP("Front"), CameraPreset::kFront},
+        View{QT_TR_NOOP("Side"), CameraPreset::kSide}, View{QT_TR_NOOP("Top"), CameraPreset::kTop}}) {
+    auto* button = new QPushButton(tr(view.label), bar);
+    button->setFlat(true);
+    connect(button, &QPushButton::clicked, this, [this, preset = view.preset] { before_->setCamera(preset); });
+    layout->addWidget(button);
+  }
+  hovered_ = new QLabel(bar);
+  hovered_->setProperty("role", "muted");
+  layout->addWidget(hovered_, 1);
+  return bar;
+}
+
+ComparePage::Part ComparePage::makePart(ScoreModel::Part which, const QString& name) {
+  Part part;
+  part.model = new ScoreModel(which, this);
+  part.sorted = new QSortFilterProxyModel(this);
+  part.sorted->setSourceModel(part.model);
+  part.sorted->setSortRole(ScoreModel::kSortRole);
+  part.table = new QTableView(this);
+  part.table->setObjectName(name + QStringLiteral("Table"));
+  part.table->setModel(part.sorted);
+  part.table->setSortingEnabled(true);
+  part.table->sortByColumn(1, Qt::AscendingOrder);
+  part.table->setShowGrid(false);
+  part.table->setSelectionBehavior(QAbstractItemView::SelectRows);
+  part.table->setSelectionMode(QAbstractItemView::SingleSelection);
+  part.table->verticalHeader()->hide();
+  part.table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
+  auto* copy = new QShortcut(QKeySequence::Copy, part.table);
+  copy->setContext(Qt::WidgetShortcut);
+  connect(copy, &QShortcut::activated, this,
+          [model = part.model] { QApplication::clipboard()->setText(model->toText()); });
+  part.method = new QComboBox(this);
+  part.method->setObjectName(name + QStringLiteral("Method"));
+  part.settings = new SettingsForm(this);
+  return part;
+}
+
+QWidget* ComparePage::partPanel(Part& part) {
+  auto* panel = new QWidget(this);
+  auto* layout = new QVBoxLayout(panel);
+  layout->setContentsMargins(0, 8, 0, 0);
+  layout->addWidget(part.table, 1);
+  layout->addWidget(part.method);
+  layout->addWidget(part.settings);
+  return panel;
+}
+
+QWidget* ComparePage::makeInspector() {
+  auto* inspector = new QWidget(this);
+  inspector->setObjectName(QStringLiteral("inspector"));
+  inspector->setAttribute(Qt::WA_StyledBackground);
+  auto* layout = new QVBoxLayout(inspector);
+  layout->setContentsMargins(12, 12, 12, 12);
+  position_ = makePart(ScoreModel::Part::kPosition, QStringLiteral("position"));
+  rotation_ = makePart(ScoreModel::Part::kOrientation, QStringLiteral("orientation"));
+  fillMethods(position_.method, positionMethods());
+  fillMethods(rotation_.method, orientationMethods());
+  auto* tabs = new QTabWidget(inspector);
+  tabs->addTab(partPanel(position_), tr("Position"));
+  tabs->addTab(partPanel(rotation_), tr("Orientation"));
+  layout->addWidget(tabs, 1);
+
+  auto showSettings = [this](Part& part, std::span<const Setting> declared) {
+    part.settings->setSettings(declared);
+    drawFields();
+  };
+  connect(position_.method, &QComboBox::currentIndexChanged, this, [this, showSettings](int row) {
+    showSettings(position_, positionMethods()[static_cast<std::size_t>(row)].settings);
+  });
+  connect(rotation_.method, &QComboBox::currentIndexChanged, this, [this, showSettings](int row) {
+    showSettings(rotation_, orientationMethods()[static_cast<std::size_t>(row)].settings);
+  });
+  for (Part* part : {&position_, &rotation_}) {
+    connect(part->table->selectionModel(), &QItemSelectionModel::currentRowChanged, this,
+            [this, part](const QModelIndex& row) {
+              if (row.isValid()) selectMethod(*part, part->model->method(part->sorted->mapToSource(row).row()));
+            });
+  }
+  fit_ = new QPushButton(tr("Fit these on every place"), inspector);
+  fit_->setObjectName(QStringLiteral("fit"));
+  fit_->setProperty("primary", true);
+  connect(fit_, &QPushButton::clicked, this, &ComparePage::fitChosen);
+  fitted_ = new QLabel(inspector);
+  fitted_->setObjectName(QStringLiteral("fitted"));
+  fitted_->setWordWrap(true);
+  layout->addWidget(fit_);
+  layout->addWidget(fitted_);
+  inspector->setMinimumWidth(kInspectorWidth);
+  return inspector;
+}
+
+void ComparePage::showEvent(QShowEvent* event) {
+  QWidget::showEvent(event);
+  if (out_of_date_ && stack_->currentIndex() == 1) runComparison();
+}
+
+void ComparePage::onTable() {
+  std::size_t usable = 0;
+  for (const Node& node : workbench_.table().nodes) usable += node.role != NodeRole::kSkipped;
+  stack_->setCurrentIndex(usable >= kFewestPlaces ? 1 : 0);
+  out_of_date_ = true;
+  if (stack_->currentIndex() == 1 && isVisible()) runComparison();
+}
+
+void ComparePage::runComparison() {
+  out_of_date_ = false;
+  ComparisonOptions options;
+  const auto validation = parseValidation(validation_->currentData().toString().toStdString());
+  if (validation) options.validation = *validation;
+  workbench_.compare(options);
+}
+
+void ComparePage::onComparison() {
+  const bool running = workbench_.isComparing();
+  progress_->setVisible(running);
+  run_->setText(running ? tr("Stop") : tr("Compare again"));
+  const std::optional<Comparison>& comparison = workbench_.comparison();
+  if (running && !comparison) {
+    verdict_->setText(tr("Trying every method on places it has not seen..."));
+    details_->clear();
+  }
+  if (running) return;
+  position_.model->setComparison(comparison);
+  rotation_.model->setComparison(comparison);
+  if (!comparison) {
+    verdict_->setText(tr("Not compared yet."));
+    details_->clear();
+    return;
+  }
+  verdict_->setText(QString::fromStdString(comparison->verdict.text));
+  QString details =
+      tr("%1 places scored. What a perfect correction would leave, from the samples' scatter and the jig: %2 mm.")
+          .arg(comparison->places.size())
+          .arg(threeFigures(comparison->floor_position_mm));
+  for (const std::string& note : comparison->notes) details += QStringLiteral(" ") + QString::fromStdString(note);
+  details_->setText(details);
+  const double scale_mm = sharedScaleMax_mm(*comparison);
+  before_->setScaleMax_mm(scale_mm);
+  after_->setScaleMax_mm(scale_mm);
+  if (scale_->value() == 0) scale_->setValue(50);
+  selectMethod(position_, QString::fromStdString(comparison->best_position));
+  selectMethod(rotation_, QString::fromStdString(comparison->best_orientation));
+  drawFields();
+}
+
+void ComparePage::selectMethod(Part& part, const QString& method) {
+  const int index = part.method->findData(method.isEmpty() ? QStringLiteral("none") : method);
+  if (index >= 0) part.method->setCurrentIndex(index);
+}
+
+void ComparePage::drawFields() {
+  const std::optional<Comparison>& comparison = workbench_.comparison();
+  if (!comparison) return;
+  const QString method = position_.method->currentData().toString();
+  const QString turned = rotation_.method->currentData().toString();
+  const QString label = position_.method->currentText();
+  before_->setField(heldOutField(*comparison, workbench_.table(), QString(), QString(), tr("Before correction")));
+  after_->setField(
+      heldOutField(*comparison, workbench_.table(), method, turned, tr("After: %1, places it did not see").arg(label)));
+  histogram_->setSeries({tr("Before"), label},
+                        {heldOutErrors_mm(*comparison, QString()), heldOutErrors_mm(*comparison, method)},
+                        tr("Position error on places the fit did not see [mm]"));
+}
+
+void ComparePage::fitChosen() {
+  CorrectorChoice choice;
+  choice.position_id = position_.method->currentData().toString().toStdString();
+  choice.position_settings = position_.settings->values();
+  choice.orientation_id = rotation_.method->currentData().toString().toStdString();
+  choice.orientation_settings = rotation_.settings->values();
+  workbench_.fit(choice, defaultAlignMode(workbench_.table().metadata));
+}
+
+void ComparePage::onCorrector() {
+  const std::optional<Corrector>& corrector = workbench_.corrector();
+  if (!corrector) {
+    fitted_->clear();
+    return;
+  }
+  const FitReport& report = corrector->report();
+  fitted_->setText(tr("Fitted on %1 rows; what is left on those same rows (no verdict): RMS %2. Kept in the session, "
+                      "ready to export.")
+                       .arg(report.n_nodes)
+                       .arg(errorText(report.rms_m)));
+}
+
+void ComparePage::selectNode(int node) {
+  before_->setSelected(node);
+  after_->setSelected(node);
+  hovered_->setText(describeNode(node));
+}
+
+QString ComparePage::describeNode(int node) const {
+  const std::optional<Comparison>& comparison = workbench_.comparison();
+  if (!comparison) return {};
+  for (std::size_t i = 0; i < comparison->places.size(); ++i) {
+    if (comparison->places[i] != node) continue;
+    const std::vector<double> after_mm = heldOutErrors_mm(*comparison, position_.method->currentData().toString());
+    return tr("Place %1: before %2 mm, after %3 mm")
+        .arg(node)
+        .arg(threeFigures(comparison->before_place_mm[i]), threeFigures(after_mm[i]));
+  }
+  return {};
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <QWidget>
+
+#include "widgets/pages/score_model.h"
+#include "widgets/pages/workbench.h"
+
+class QCheckBox;
+class QComboBox;
+class QLabel;
+class QProgressBar;
+class QPushButton;
+class QSlider;
+class QSortFilterProxyModel;
+class QStackedWidget;
+class QTableView;
+
+namespace fieldtrue {
+
+class FieldView;
+class HistogramView;
+class SettingsForm;
+
+/// Fit and compare: the verdict, the error field before and after on one colour scale, and every method's held-out
+/// figures.
+class ComparePage : public QWidget {
+  Q_OBJECT
+ public:
+  explicit ComparePage(Workbench& workbench, QWidget* parent = nullptr);
+
+ protected:
+  void showEvent(QShowEvent* event) override;
+
+ private:
+  struct Part {
+    ScoreModel* model = nullptr;
+    QSortFilterProxyModel* sorted = nullptr;
+    QTableView* table = nullptr;
+    QComboBox* method = nullptr;
+    SettingsForm* settings = nullptr;
+  };
+  QWidget* makeHeader();
+  QWidget* makeViews();
+  QWidget* makeViewBar();
+  QWidget* makeInspector();
+  Part makePart(ScoreModel::Part part, const QString& name);
+  QWidget* partPanel(Part& part);
+  void onTable();
+  void runComparison();
+  void onComparison();
+  void onCorrector();
+  void drawFields();
+  void selectMethod(Part& part, const QString& method);
+  void fitChosen();
+  void selectNode(int node);
+  QString describeNode(int node) const;
+
+  Workbench& workbench_;
+  QStackedWidget* stack_;
+  QLabel* verdict_;
+  QLabel* details_;
+  QProgressBar* progress_;
+  QPushButton* run_;
+  QComboBox* validation_;
+  FieldView* before_;
+  FieldView* after_;
+  HistogramView* histogram_;
+  QSlider* scale_;
+  QLabel* scale_text_;
+  QCheckBox* two_views_;
+  QCheckBox* orientation_;
+  QLabel* hovered_;
+  Part position_;
+  Part rotation_;
+  QPushButton* fit_;
+  QLabel* fitted_;
+  bool out_of_date_ = true;
+};
+
+}  // namespace fieldtrue

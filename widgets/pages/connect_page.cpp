@@ -1,0 +1,209 @@
+#include "widgets/pages/connect_page.h"
+
+#include <QComboBox>
+#include <QDir>
+#include <QFileDialog>
+#include <QFileInfo>
+#include <QFormLayout>
+#include <QHBoxLayout>
+#include <QLabel>
+#include <QLineEdit>
+#include <QPushButton>
+#include <QVBoxLayout>
+
+#include "acquisition/devices/registry.h"
+#include "widgets/pages/settings_form.h"
+#include "widgets/pages/units.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr int kColumnWidth = 640;
+
+QString sceneTitle(const QString& file_stem) {
+  QString title = file_stem;
+  title.replace(QLatin1Char('_'), QLatin1Char(' '));
+  return title;
+}
+
+// `key=value,...` of the settings that differ from their defaults.
+QString changedSettings(std::span<const Setting> declared, const Settings& values) {
+  QStringList parts;
+  for (const Setting& setting : declared) {
+    const SettingValue& value = values.at(setting.key);
+    if (value == setting.default_value) continue;
+    const std::string text = std::visit(
+        [](const auto& v) -> std::string {
+          using T = std::decay_t<decltype(v)>;
+          if constexpr (std::is_same_v<T, std::string>) {
+            return v;
+          } else if constexpr (std::is_same_v<T, bool>) {
+            return v ? "true" : "false";
+          } else {
+            return QString::number(v).toStdString();
+          }
+        },
+        value);
+    parts << QString::fromStdString(setting.key + "=" + text);
+  }
+  return parts.join(QLatin1Char(','));
+}
+
+}  // namespace
+
+ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
+  auto* outer = new QHBoxLayout(this);
+  auto* column = new QWidget(this);
+  column->setMaximumWidth(kColumnWidth);
+  auto* layout = new QVBoxLayout(column);
+  layout->setSpacing(12);
+  auto* title = new QLabel(tr("Connect a tracker"), column);
+  title->setProperty("role", "title");
+
+  kind_ = new QComboBox(column);
+  kind_->setObjectName(QStringLiteral("deviceKind"));
+  kind_->setAccessibleName(tr("Tracker"));
+  for (const DeviceKind& kind : deviceKinds())
+    kind_->addItem(QString::fromStdString(kind.label), QString::fromStdString(kind.id));
+  kind_help_ = new QLabel(column);
+  kind_help_->setProperty("role", "muted");
+  kind_help_->setWordWrap(true);
+  address_ = new QComboBox(column);
+  address_->setObjectName(QStringLiteral("deviceAddress"));
+  address_->setEditable(true);
+  address_->setAccessibleName(tr("Line"));
+  refresh_ = new QPushButton(tr("Look again"), column);
+  auto* address_row = new QHBoxLayout;
+  address_row->addWidget(address_, 1);
+  address_row->addWidget(refresh_);
+  address_label_ = new QLabel(tr("Line"), column);
+  scene_label_ = new QLabel(tr("Room"), column);
+  scene_ = new QComboBox(column);
+  scene_->setAccessibleName(tr("Simulated room"));
+  for (const QFileInfo& file : QDir(QStringLiteral(":/scenes")).entryInfoList())
+    scene_->addItem(sceneTitle(file.fileName().section(QLatin1Char('.'), 0, 0)),
+                    file.fileName().section(QLatin1Char('.'), 0, 0));
+  scene_->addItem(tr("Another scene file..."), QString());
+  settings_ = new SettingsForm(column);
+
+  auto* form = new QFormLayout;
+  form->addRow(tr("Tracker"), kind_);
+  form->addRow(QString(), kind_help_);
+  form->addRow(address_label_, address_row);
+  form->addRow(scene_label_, scene_);
+  form->addRow(tr("Settings"), settings_);
+
+  connect_ = new QPushButton(tr("Connect"), column);
+  connect_->setObjectName(QStringLiteral("connectButton"));
+  connect_->setProperty("primary", true);
+  next_ = new QPushButton(tr("Go on to the plan"), column);
+  auto* buttons = new QHBoxLayout;
+  buttons->addWidget(connect_);
+  buttons->addWidget(next_);
+  buttons->addStretch();
+  state_ = new QLabel(column);
+  state_->setProperty("role", "heading");
+  state_->setWordWrap(true);
+  numbers_ = new QLabel(column);
+  numbers_->setProperty("role", "muted");
+
+  layout->addStretch(1);
+  layout->addWidget(title);
+  layout->addLayout(form);
+  layout->addLayout(buttons);
+  layout->addWidget(state_);
+  layout->addWidget(numbers_);
+  layout->addStretch(2);
+  outer->addStretch();
+  outer->addWidget(column, 1);
+  outer->addStretch();
+
+  connect(kind_, &QComboBox::currentIndexChanged, this, &ConnectPage::onKind);
+  connect(refresh_, &QPushButton::clicked, this, &ConnectPage::refreshLines);
+  connect(scene_, &QComboBox::activated, this, [this] {
+    if (scene_->currentData().toString().isEmpty()) chooseScene();
+  });
+  connect(connect_, &QPushButton::clicked, this, [this] {
+    const DeviceState device = workbench_.status().device;
+    if (device == DeviceState::kRunning || device == DeviceState::kConnecting) {
+      workbench_.disconnectDevice();
+    } else {
+      workbench_.connectDevice(deviceText(), scenePath());
+    }
+  });
+  connect(next_, &QPushButton::clicked, this,
+          [this] { workbench_.goToStep(workbench_.sessionIsOpen() ? Step::kAcquire : Step::kPlan); });
+  connect(&workbench_, &Workbench::statusChanged, this, &ConnectPage::onStatus);
+  onKind();
+  onStatus(workbench_.status());
+}
+
+void ConnectPage::onKind() {
+  const DeviceKind& kind = deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
+  const bool simulated = kind_->currentIndex() == 0;
+  kind_help_->setText(QString::fromStdString(kind.address_help));
+  for (QWidget* widget :
+       {static_cast<QWidget*>(address_label_), static_cast<QWidget*>(address_), static_cast<QWidget*>(refresh_)})
+    widget->setVisible(!simulated);
+  scene_label_->setVisible(simulated);
+  scene_->setVisible(simulated);
+  settings_->setSettings(kind.settings);
+  if (!simulated) refreshLines();
+}
+
+void ConnectPage::refreshLines() {
+  const QString typed = address_->currentText();
+  address_->clear();
+  for (const SerialLine& line : serialLines()) {
+    address_->addItem(QString::fromStdString(line.path));
+    address_->setItemData(address_->count() - 1, QString::fromStdString(line.description), Qt::ToolTipRole);
+  }
+  if (!typed.isEmpty()) address_->setCurrentText(typed);
+  if (address_->count() == 0)
+    address_->lineEdit()->setPlaceholderText(tr("no serial line found; type a path or tcp:host:port"));
+}
+
+QString ConnectPage::deviceText() const {
+  const DeviceKind& kind = deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
+  const QString settings = changedSettings(kind.settings, settings_->values());
+  QStringList parts{QString::fromStdString(kind.id)};
+  if (kind_->currentIndex() != 0) parts << address_->currentText().trimmed();
+  if (!settings.isEmpty()) parts << settings;
+  return parts.join(QLatin1Char(':'));
+}
+
+void ConnectPage::chooseScene() {
+  const QString path = QFileDialog::getOpenFileName(this, tr("Choose a scene"), QString(), tr("Scenes (*.scene.json)"));
+  if (path.isEmpty()) {
+    scene_->setCurrentIndex(0);
+    return;
+  }
+  scene_->insertItem(0, QFileInfo(path).fileName(), path);
+  scene_->setCurrentIndex(0);
+}
+
+QString ConnectPage::scenePath() const {
+  const QString chosen = scene_->currentData().toString();
+  if (kind_->currentIndex() != 0 || chosen.isEmpty()) return {};
+  return chosen.contains(QLatin1Char('/')) ? chosen : Workbench::builtInScene(chosen);
+}
+
+void ConnectPage::onStatus(const AcquisitionStatus& status) {
+  const bool busy = status.device == DeviceState::kConnecting;
+  const bool running = status.device == DeviceState::kRunning;
+  connect_->setText(running ? tr("Disconnect") : busy ? tr("Stop connecting") : tr("Connect"));
+  for (QWidget* widget : {static_cast<QWidget*>(kind_), static_cast<QWidget*>(address_), static_cast<QWidget*>(scene_),
+                          static_cast<QWidget*>(settings_)})
+    widget->setEnabled(!running && !busy);
+  next_->setEnabled(running);
+  state_->setText(status.device == DeviceState::kClosed ? tr("Not connected") : status.device_text);
+  if (running && status.live) {
+    numbers_->setText(tr("%1 Hz    SD now %2    %3")
+                          .arg(status.rate_hz, 0, 'f', 0)
+                          .arg(errorText(status.sd_m), positionText(status.live->tracker_from_sensor.position_m)));
+  } else {
+    numbers_->clear();
+  }
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <QWidget>
+
+#include "widgets/pages/workbench.h"
+
+class QComboBox;
+class QLabel;
+class QLineEdit;
+class QPushButton;
+
+namespace fieldtrue {
+
+class SettingsForm;
+
+/// Chooses and connects a tracker: kind, line, settings; shows what it says of itself and whether it is alive.
+class ConnectPage : public QWidget {
+  Q_OBJECT
+ public:
+  explicit ConnectPage(Workbench& workbench, QWidget* parent = nullptr);
+
+ private:
+  void onKind();
+  void refreshLines();
+  void onStatus(const AcquisitionStatus& status);
+  QString deviceText() const;
+  void chooseScene();
+  QString scenePath() const;
+
+  Workbench& workbench_;
+  QComboBox* kind_;
+  QLabel* kind_help_;
+  QLabel* address_label_;
+  QComboBox* address_;
+  QPushButton* refresh_;
+  QLabel* scene_label_;
+  QComboBox* scene_;
+  SettingsForm* settings_;
+  QPushButton* connect_;
+  QPushButton* next_;
+  QLabel* state_;
+  QLabel* numbers_;
+};
+
+}  // namespace fieldtrue

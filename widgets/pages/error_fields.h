@@ -1,0 +1,22 @@
+#pragma once
+
+#include <QString>
+
+#include "calib/evaluation/comparison.h"
+#include "widgets/views/error_field.h"
+
+namespace fieldtrue {
+
+/// The held-out error field of a method as arrows at the true positions.
+/// @param method id of a position method; empty = before correction
+/// @param orientation_method whose held-out angles are drawn; empty = before
+ErrorField heldOutField(const Comparison& comparison, const CalibrationTable& table, const QString& method,
+                        const QString& orientation_method, const QString& title);
+
+/// Held-out errors per place [mm] of a method; empty method = before.
+std::vector<double> heldOutErrors_mm(const Comparison& comparison, const QString& method);
+
+/// Upper end of a colour scale that all fields share: a round number at or above the 95th percentile before [mm].
+double sharedScaleMax_mm(const Comparison& comparison);
+
+}  // namespace fieldtrue

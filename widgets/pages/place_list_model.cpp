@@ -1,0 +1,106 @@
+#include "widgets/pages/place_list_model.h"
+
+#include <QColor>
+#include <QFont>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "widgets/pages/units.h"
+#include "widgets/views/theme.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr std::array kColumns{QT_TRANSLATE_NOOP("PlaceListModel", "Place"),
+                              QT_TRANSLATE_NOOP("PlaceListModel", "State"), QT_TRANSLATE_NOOP("PlaceListModel", "n"),
+                              QT_TRANSLATE_NOOP("PlaceListModel", "SD mm"),
+                              QT_TRANSLATE_NOOP("PlaceListModel", "Rejected")};
+
+}  // namespace
+
+QString placeStateText(PlaceState state) {
+  switch (state) {
+    case PlaceState::kPlanned:
+      return QObject::tr("planned");
+    case PlaceState::kDone:
+      return QObject::tr("done");
+    case PlaceState::kSkipped:
+      return QObject::tr("skipped");
+    case PlaceState::kSuspicious:
+      return QObject::tr("look at it");
+  }
+  return {};
+}
+
+void PlaceListModel::setPlaces(const std::vector<PlannedPlace>& places) {
+  beginResetModel();
+  places_ = places;
+  states_.assign(places.size(), PlaceState::kPlanned);
+  nodes_.assign(places.size(), std::nullopt);
+  current_.reset();
+  endResetModel();
+}
+
+void PlaceListModel::setStates(const std::vector<PlaceState>& states, std::optional<std::size_t> current) {
+  if (states.size() != places_.size()) return;
+  states_ = states;
+  current_ = current;
+  if (!places_.empty()) emit dataChanged(index(0, 0), index(rowCount() - 1, columnCount() - 1));
+}
+
+void PlaceListModel::setTable(const CalibrationTable& table) {
+  std::map<std::pair<int, int>, const Node*> rows;
+  for (const Node& node : table.nodes) rows[{node.node, node.visit}] = &node;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const auto row = rows.find({places_[i].node, places_[i].visit});
+    nodes_[i] = row == rows.end() ? std::nullopt : std::optional<Node>(*row->second);
+  }
+  if (!places_.empty()) emit dataChanged(index(0, 0), index(rowCount() - 1, columnCount() - 1));
+}
+
+int PlaceListModel::rowCount(const QModelIndex& parent) const {
+  return parent.isValid() ? 0 : static_cast<int>(places_.size());
+}
+int PlaceListModel::columnCount(const QModelIndex&) const { return static_cast<int>(kColumns.size()); }
+
+QString PlaceListModel::text(std::size_t row, int column) const {
+  const std::optional<Node>& node = nodes_[row];
+  switch (column) {
+    case 0:
+      return QString::fromStdString(placeName(places_[row]));
+    case 1:
+      return current_ == row ? tr("next") : placeStateText(states_[row]);
+    case 2:
+      return node ? QString::number(node->n_used) : QString();
+    case 3:
+      return node && node->covariance_m2 ? threeFigures(1000.0 * std::sqrt(node->covariance_m2->trace())) : QString();
+    default:
+      return node ? QString::number(node->n_rejected) : QString();
+  }
+}
+
+QVariant PlaceListModel::data(const QModelIndex& index, int role) const {
+  const auto row = static_cast<std::size_t>(index.row());
+  if (role == Qt::DisplayRole) return text(row, index.column());
+  if (role == Qt::TextAlignmentRole && index.column() >= 2) return QVariant(Qt::AlignRight | Qt::AlignVCenter);
+  if (role == Qt::FontRole && current_ == row) {
+    QFont bold;
+    bold.setBold(true);
+    return bold;
+  }
+  if (role == Qt::ForegroundRole && index.column() == 1) {
+    if (states_[row] == PlaceState::kDone) return theme().done;
+    if (states_[row] == PlaceState::kSuspicious) return theme().attention;
+    if (states_[row] == PlaceState::kSkipped) return theme().text_muted;
+  }
+  return {};
+}
+
+QVariant PlaceListModel::headerData(int section, Qt::Orientation orientation, int role) const {
+  if (orientation != Qt::Horizontal || role != Qt::DisplayRole)
+    return QAbstractTableModel::headerData(section, orientation, role);
+  return tr(kColumns[static_cast<std::size_t>(section)]);
+}
+
+}  // namespace fieldtrue

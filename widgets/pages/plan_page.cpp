@@ -1,0 +1,234 @@
+#include "widgets/pages/plan_page.h"
+
+#include <QCheckBox>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QFileDialog>
+#include <QFormLayout>
+#include <QHBoxLayout>
+#include <QLabel>
+#include <QPushButton>
+#include <QScrollArea>
+#include <QSpinBox>
+#include <QSplitter>
+#include <QVBoxLayout>
+#include <cmath>
+#include <set>
+
+#include "widgets/pages/units.h"
+#include "widgets/views/room_view.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr std::array kAxes{"x", "y", "z"};
+constexpr int kFormWidth = 340;
+constexpr int kMaxCount = 40;
+// A practised operator carries the jig to the next mark and lets it settle in about this time.
+constexpr double kSecondsPerPlacement = 15.0;
+constexpr double kSamplesPerSecond = 120.0;
+
+QWidget* inRow(std::initializer_list<QWidget*> widgets) {
+  auto* row = new QWidget;
+  auto* layout = new QHBoxLayout(row);
+  layout->setContentsMargins(0, 0, 0, 0);
+  layout->setSpacing(4);
+  for (QWidget* widget : widgets) layout->addWidget(widget, 1);
+  return row;
+}
+
+}  // namespace
+
+PlanPage::PlanPage(Workbench& workbench, QWidget* parent)
+    : QWidget(parent), workbench_(workbench), shown_unit_(placingUnit()) {
+  auto* layout = new QHBoxLayout(this);
+  layout->setContentsMargins(0, 0, 0, 0);
+  auto* splitter = new QSplitter(this);
+  room_ = new RoomView(splitter);
+  room_->setObjectName(QStringLiteral("planView"));
+  auto* scroll = new QScrollArea(splitter);
+  scroll->setWidgetResizable(true);
+  scroll->setFrameShape(QFrame::NoFrame);
+  scroll->setWidget(makeForm());
+  scroll->setMinimumWidth(kFormWidth);
+  splitter->addWidget(room_);
+  splitter->addWidget(scroll);
+  splitter->setStretchFactor(0, 1);
+  splitter->setSizes({940, kFormWidth});
+  layout->addWidget(splitter);
+  onChanged();
+}
+
+QDoubleSpinBox* PlanPage::makeLength(const QString& name, double metres) {
+  auto* box = new QDoubleSpinBox(this);
+  box->setDecimals(3);
+  box->setRange(-100000.0, 100000.0);
+  box->setAccessibleName(name);
+  box->setValue(metres / metresPer(shown_unit_));
+  connect(box, &QDoubleSpinBox::valueChanged, this, &PlanPage::onChanged);
+  return box;
+}
+
+QWidget* PlanPage::makeForm() {
+  auto* panel = new QWidget(this);
+  panel->setObjectName(QStringLiteral("inspector"));
+  panel->setAttribute(Qt::WA_StyledBackground);
+  auto* layout = new QVBoxLayout(panel);
+  layout->setContentsMargins(12, 12, 12, 12);
+  auto* title = new QLabel(tr("Where the jig is to stand"), panel);
+  title->setProperty("role", "heading");
+  layout->addWidget(title);
+
+  const Plan start;
+  auto makeCount = [this](const QString& name, int value, int low, int high) {
+    auto* box = new QSpinBox(this);
+    box->setRange(low, high);
+    box->setValue(value);
+    box->setAccessibleName(name);
+    connect(box, &QSpinBox::valueChanged, this, &PlanPage::onChanged);
+    return box;
+  };
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const QString letter = QLatin1String(kAxes[axis]);
+    counts_[axis] = makeCount(tr("Places along %1").arg(letter), start.counts[axis], 1, kMaxCount);
+    counts_[axis]->setObjectName(QStringLiteral("count_") + letter);
+    pitch_[axis] = makeLength(tr("Pitch along %1").arg(letter), start.pitch_m[static_cast<Eigen::Index>(axis)]);
+    pitch_[axis]->setMinimum(0.001);
+    origin_[axis] = makeLength(tr("First place %1").arg(letter), origin_m(start)[static_cast<Eigen::Index>(axis)]);
+  }
+  unit_ = new QComboBox(this);
+  for (LengthUnit unit : {LengthUnit::kMetre, LengthUnit::kMillimetre, LengthUnit::kFoot, LengthUnit::kInch})
+    unit_->addItem(unitSymbol(unit), static_cast<int>(unit));
+  unit_->setCurrentIndex(static_cast<int>(shown_unit_));
+  unit_->setAccessibleName(tr("Unit of places"));
+  connect(unit_, &QComboBox::currentIndexChanged, this, &PlanPage::onUnit);
+  default_origin_ = new QCheckBox(tr("centred in front of the transmitter"), this);
+  default_origin_->setChecked(true);
+  connect(default_origin_, &QCheckBox::toggled, this, &PlanPage::onChanged);
+  order_ = new QComboBox(this);
+  order_->addItems({tr("Serpentine: shortest way, fewest pipe changes"), tr("Random: tells drift from place")});
+  order_->setAccessibleName(tr("Order"));
+  connect(order_, &QComboBox::currentIndexChanged, this, &PlanPage::onChanged);
+  seed_ = makeCount(tr("Seed of the random order"), 1, 0, 1000000);
+  orientations_ = makeCount(tr("Sensor orientations at each place"), 1, 1, 8);
+  reseat_ = makeCount(tr("Times each place is seated anew"), 1, 1, 8);
+  samples_ = makeCount(tr("Samples at each place"), 60, 1, 10000);
+  samples_->setObjectName(QStringLiteral("samplesPerNode"));
+
+  auto* form = new QFormLayout;
+  form->setRowWrapPolicy(QFormLayout::WrapLongRows);
+  form->addRow(tr("Unit"), unit_);
+  form->addRow(tr("Places x, y, z"), inRow({counts_[0], counts_[1], counts_[2]}));
+  form->addRow(tr("Pitch x, y, z"), inRow({pitch_[0], pitch_[1], pitch_[2]}));
+  form->addRow(tr("First place"), default_origin_);
+  form->addRow(QString(), inRow({origin_[0], origin_[1], origin_[2]}));
+  form->addRow(tr("Order"), order_);
+  form->addRow(tr("Seed"), seed_);
+  form->addRow(tr("Orientations"), orientations_);
+  form->addRow(tr("Seatings"), reseat_);
+  form->addRow(tr("Samples a place"), samples_);
+  layout->addLayout(form);
+
+  summary_ = new QLabel(panel);
+  summary_->setWordWrap(true);
+  layout->addWidget(summary_);
+  create_ = new QPushButton(tr("Start a session with this plan"), panel);
+  create_->setObjectName(QStringLiteral("createSession"));
+  create_->setProperty("primary", true);
+  connect(create_, &QPushButton::clicked, this, &PlanPage::create);
+  auto* load = new QPushButton(tr("Load a plan file..."), panel);
+  connect(load, &QPushButton::clicked, this, &PlanPage::loadPlanFile);
+  layout->addWidget(create_);
+  layout->addWidget(load);
+  layout->addStretch();
+  return panel;
+}
+
+Plan PlanPage::plan() const {
+  Plan plan;
+  const double unit_m = metresPer(shown_unit_);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    plan.counts[axis] = counts_[axis]->value();
+    plan.pitch_m[static_cast<Eigen::Index>(axis)] = pitch_[axis]->value() * unit_m;
+  }
+  if (!default_origin_->isChecked())
+    plan.origin_m = Eigen::Vector3d(origin_[0]->value(), origin_[1]->value(), origin_[2]->value()) * unit_m;
+  plan.order = order_->currentIndex() == 0 ? PlanOrder::kSerpentine : PlanOrder::kRandom;
+  plan.seed = static_cast<std::uint64_t>(seed_->value());
+  plan.orientations = orientations_->value();
+  plan.reseat = reseat_->value();
+  plan.explicit_places = explicit_places_;
+  return plan;
+}
+
+void PlanPage::onUnit() {
+  const auto unit = static_cast<LengthUnit>(unit_->currentData().toInt());
+  const double ratio = metresPer(shown_unit_) / metresPer(unit);
+  shown_unit_ = unit;
+  setPlacingUnit(unit);
+  for (const auto& boxes : {pitch_, origin_}) {
+    for (QDoubleSpinBox* box : boxes) {
+      const QSignalBlocker quiet(box);
+      box->setValue(box->value() * ratio);
+    }
+  }
+  room_->setLengthUnit(unit);
+  onChanged();
+}
+
+void PlanPage::onChanged() {
+  const Plan now = plan();
+  seed_->setEnabled(now.order == PlanOrder::kRandom);
+  const Eigen::Vector3d first_m = origin_m(now);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    origin_[axis]->setEnabled(now.origin_m.has_value());
+    if (now.origin_m) continue;
+    const QSignalBlocker quiet(origin_[axis]);
+    origin_[axis]->setValue(first_m[static_cast<Eigen::Index>(axis)] / metresPer(shown_unit_));
+  }
+  const std::vector<PlannedPlace> planned = places(now);
+  room_->setPlaces(planned);
+  room_->setTransmitter(Pose{});
+  summary_->setText(summary(planned));
+}
+
+QString PlanPage::summary(const std::vector<PlannedPlace>& planned) const {
+  std::set<double> levels_m;
+  for (const PlannedPlace& place : planned)
+    levels_m.insert(std::round(place.reference_from_sensor.position_m.z() * 1000.0) / 1000.0);
+  const double minutes =
+      static_cast<double>(planned.size()) * (kSecondsPerPlacement + samples_->value() / kSamplesPerSecond) / 60.0;
+  return tr("%1 placements on %2 levels, about %3 minutes for a practised operator.")
+      .arg(planned.size())
+      .arg(levels_m.size())
+      .arg(std::ceil(minutes), 0, 'f', 0);
+}
+
+void PlanPage::loadPlanFile() {
+  const QString path = QFileDialog::getOpenFileName(this, tr("Load a plan"), QString(), tr("Plans (*.plan.json)"));
+  if (path.isEmpty()) return;
+  const Result<Plan> loaded = readPlan(path.toStdString());
+  if (!loaded) {
+    workbench_.showMessage({QString::fromStdString(loaded.error().message), Severity::kAttention, {}, {}});
+    return;
+  }
+  explicit_places_ = loaded->explicit_places;
+  default_origin_->setChecked(!loaded->origin_m.has_value());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    counts_[axis]->setValue(loaded->counts[axis]);
+    pitch_[axis]->setValue(loaded->pitch_m[static_cast<Eigen::Index>(axis)] / metresPer(shown_unit_));
+    if (loaded->origin_m)
+      origin_[axis]->setValue((*loaded->origin_m)[static_cast<Eigen::Index>(axis)] / metresPer(shown_unit_));
+  }
+  order_->setCurrentIndex(loaded->order == PlanOrder::kSerpentine ? 0 : 1);
+  seed_->setValue(static_cast<int>(loaded->seed));
+  orientations_->setValue(loaded->orientations);
+  reseat_->setValue(loaded->reseat);
+  onChanged();
+}
+
+void PlanPage::create() {
+  workbench_.createSession(Workbench::freshSessionPath(QStringLiteral("session")), plan(), samples_->value());
+}
+
+}  // namespace fieldtrue

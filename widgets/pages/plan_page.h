@@ -1,0 +1,55 @@
+#pragma once
+
+#include <QWidget>
+#include <array>
+
+#include "widgets/pages/workbench.h"
+#include "widgets/views/theme.h"
+
+class QCheckBox;
+class QComboBox;
+class QDoubleSpinBox;
+class QLabel;
+class QPushButton;
+class QSpinBox;
+
+namespace fieldtrue {
+
+class RoomView;
+
+/// Where the jig is to stand: counts, pitch, origin, order, visits; the grid in 3-D, how long it takes, which pipes.
+class PlanPage : public QWidget {
+  Q_OBJECT
+ public:
+  explicit PlanPage(Workbench& workbench, QWidget* parent = nullptr);
+  /// The plan as the form shows it.
+  Plan plan() const;
+
+ private:
+  QWidget* makeForm();
+  QDoubleSpinBox* makeLength(const QString& name, double metres);
+  void onUnit();
+  void onChanged();
+  void loadPlanFile();
+  void create();
+  QString summary(const std::vector<PlannedPlace>& planned) const;
+
+  Workbench& workbench_;
+  RoomView* room_;
+  std::array<QSpinBox*, 3> counts_{};
+  std::array<QDoubleSpinBox*, 3> pitch_{};
+  std::array<QDoubleSpinBox*, 3> origin_{};
+  QCheckBox* default_origin_;
+  QComboBox* unit_;
+  QComboBox* order_;
+  QSpinBox* seed_;
+  QSpinBox* orientations_;
+  QSpinBox* reseat_;
+  QSpinBox* samples_;
+  QLabel* summary_;
+  QPushButton* create_;
+  LengthUnit shown_unit_;
+  std::vector<PlannedPlace> explicit_places_;
+};
+
+}  // namespace fieldtrue

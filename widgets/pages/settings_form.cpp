@@ -1,0 +1,116 @@
+#include "widgets/pages/settings_form.h"
+
+#include <QCheckBox>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QFormLayout>
+#include <QLineEdit>
+#include <QSpinBox>
+#include <algorithm>
+#include <cmath>
+
+namespace fieldtrue {
+namespace {
+
+constexpr int kDecimals = 4;
+
+QDoubleSpinBox* makeNumber(const Setting& setting, double value, bool may_be_automatic) {
+  auto* box = new QDoubleSpinBox;
+  box->setDecimals(kDecimals);
+  const double step = std::pow(10.0, std::floor(std::log10(std::max(1e-3, setting.max - setting.min))) - 1.0);
+  box->setRange(may_be_automatic ? setting.min - step : setting.min, setting.max);
+  box->setSingleStep(step);
+  if (!setting.unit.empty()) box->setSuffix(QStringLiteral(" ") + QString::fromStdString(setting.unit));
+  if (may_be_automatic) box->setSpecialValueText(QObject::tr("automatic"));
+  box->setValue(value);
+  return box;
+}
+
+SettingValue readEditor(const Setting& setting, QWidget* editor) {
+  switch (setting.type) {
+    case SettingType::kBool:
+      return static_cast<QCheckBox*>(editor)->isChecked();
+    case SettingType::kInteger:
+      return std::int64_t{static_cast<QSpinBox*>(editor)->value()};
+    case SettingType::kNumber:
+      return static_cast<QDoubleSpinBox*>(editor)->value();
+    case SettingType::kAutoNumber: {
+      auto* box = static_cast<QDoubleSpinBox*>(editor);
+      if (box->value() < setting.min) return std::string("auto");
+      return box->value();
+    }
+    case SettingType::kChoice:
+      if (auto* combo = qobject_cast<QComboBox*>(editor)) return combo->currentText().toStdString();
+      return static_cast<QLineEdit*>(editor)->text().toStdString();
+  }
+  return setting.default_value;
+}
+
+}  // namespace
+
+SettingsForm::SettingsForm(QWidget* parent) : QWidget(parent), layout_(new QFormLayout(this)) {
+  layout_->setContentsMargins(0, 0, 0, 0);
+}
+
+void SettingsForm::setSettings(std::span<const Setting> declared, const Settings& values) {
+  while (layout_->rowCount() > 0) layout_->removeRow(0);
+  declared_.assign(declared.begin(), declared.end());
+  editors_.clear();
+  for (const Setting& setting : declared_) {
+    const auto given = values.find(setting.key);
+    QWidget* editor = makeEditor(setting, given == values.end() ? setting.default_value : given->second);
+    editor->setToolTip(QString::fromStdString(setting.help));
+    editor->setAccessibleName(QString::fromStdString(setting.label));
+    editor->setObjectName(QStringLiteral("setting_") + QString::fromStdString(setting.key));
+    layout_->addRow(QString::fromStdString(setting.label), editor);
+    editors_.push_back(editor);
+  }
+  setVisible(!editors_.empty());
+}
+
+Settings SettingsForm::values() const {
+  Settings values;
+  for (std::size_t i = 0; i < declared_.size(); ++i) values[declared_[i].key] = readEditor(declared_[i], editors_[i]);
+  return values;
+}
+
+QWidget* SettingsForm::makeEditor(const Setting& setting, const SettingValue& value) {
+  switch (setting.type) {
+    case SettingType::kBool: {
+      auto* box = new QCheckBox;
+      box->setChecked(std::get<bool>(value));
+      connect(box, &QCheckBox::toggled, this, &SettingsForm::changed);
+      return box;
+    }
+    case SettingType::kInteger: {
+      auto* box = new QSpinBox;
+      box->setRange(static_cast<int>(setting.min), static_cast<int>(setting.max));
+      if (!setting.unit.empty()) box->setSuffix(QStringLiteral(" ") + QString::fromStdString(setting.unit));
+      box->setValue(static_cast<int>(std::get<std::int64_t>(value)));
+      connect(box, &QSpinBox::valueChanged, this, &SettingsForm::changed);
+      return box;
+    }
+    case SettingType::kNumber:
+    case SettingType::kAutoNumber: {
+      const double* number = std::get_if<double>(&value);
+      auto* box = makeNumber(setting, number ? *number : setting.min - 1.0, setting.type == SettingType::kAutoNumber);
+      connect(box, &QDoubleSpinBox::valueChanged, this, &SettingsForm::changed);
+      return box;
+    }
+    case SettingType::kChoice:
+      break;
+  }
+  const QString text = QString::fromStdString(std::get<std::string>(value));
+  if (setting.choices.empty()) {
+    auto* edit = new QLineEdit(text);
+    connect(edit, &QLineEdit::editingFinished, this, &SettingsForm::changed);
+    return edit;
+  }
+  auto* combo = new QComboBox;
+  for (const std::string& choice : setting.choices) combo->addItem(QString::fromStdString(choice));
+  combo->setCurrentText(text);
+  connect(combo, &QComboBox::currentTextChanged, this, &SettingsForm::changed);
+  return combo;
+}
+
+}  // namespace fieldtrue
