@@ -22,7 +22,8 @@ namespace fieldtrue {
 /// reference_from_sensor = reference_from_tracker * tracker_from_sensor * sensor_from_mount.
 struct Alignment {
   Pose reference_from_tracker;
-  Eigen::Quaterniond sensor_from_mount = Eigen::Quaterniond::Identity();  ///< Constant rotation of the sensor in its holder.
+  Eigen::Quaterniond sensor_from_mount =
+      Eigen::Quaterniond::Identity();  ///< Constant rotation of the sensor in its holder.
 };
 
 enum class AlignMode { kNone, kRigid };
@@ -65,8 +66,8 @@ class Corrector {
  public:
   /// Fits on the rows given (the caller leaves out skipped and held-out rows).
   /// @error as the methods' fits
-  static Result<Corrector> fit(std::span<const Node> nodes, const TableMetadata& metadata, const CorrectorChoice& choice,
-                               AlignMode align, const RunControl& control = {});
+  static Result<Corrector> fit(std::span<const Node> nodes, const TableMetadata& metadata,
+                               const CorrectorChoice& choice, AlignMode align, const RunControl& control = {});
 
   /// reference_from_sensor of a tracked pose. Where a part does not cover the position, only the alignment is applied.
   Pose correct(const Pose& tracker_from_sensor) const;
@@ -79,6 +80,7 @@ class Corrector {
   Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
 
   const CorrectorChoice& choice() const { return choice_; }
+  AlignMode align() const { return align_; }
   const Alignment& alignment() const { return alignment_; }
   const Region& region() const { return region_; }
   const FitReport& report() const { return report_; }
@@ -94,6 +96,7 @@ class Corrector {
  private:
   Corrector() = default;
   CorrectorChoice choice_;
+  AlignMode align_ = AlignMode::kNone;
   Alignment alignment_;
   std::shared_ptr<const PositionModel> position_;
   std::shared_ptr<const OrientationModel> orientation_;

@@ -1,15 +1,15 @@
 #pragma once
 
-#include <string>
-
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 
 #include "calib/core/pose.h"
 
 namespace fieldtrue {
 
-/// A fitted, immutable orientation correction. It models the error rotation q_error(p) as a function of tracked position
-/// and undoes it: q_true = q_error^-1 q_tracked (error frame `tracker`) or q_true = q_tracked q_error^-1 (`sensor`).
+/// A fitted, immutable orientation correction. It models the error rotation q_error(p) as a function of tracked
+/// position and undoes it: q_true = q_error^-1 q_tracked (error frame `tracker`) or q_true = q_tracked q_error^-1
+/// (`sensor`).
 class OrientationModel {
  public:
   virtual ~OrientationModel() = default;

@@ -1,10 +1,9 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
-
-#include <nlohmann/json_fwd.hpp>
 
 #include "calib/core/pose.h"
 
@@ -28,7 +27,8 @@ class PositionModel {
   /// SD of the corrected position [m], when the method knows it.
   virtual std::optional<double> uncertainty_m(const Eigen::Vector3d&) const { return std::nullopt; }
 
-  /// Whether the method can be evaluated there at all. Local methods cannot outside their cells; global ones always can.
+  /// Whether the method can be evaluated there at all. Local methods cannot outside their cells; global ones always
+  /// can.
   virtual bool covers(const Eigen::Vector3d&) const { return true; }
 
   /// What the user should know about this fit ("nodes lie in one plane: fitted in the plane"); empty when nothing.

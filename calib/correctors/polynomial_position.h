@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+
+#include "calib/correctors/fit_data.h"
+#include "calib/correctors/polynomial_field.h"
+#include "calib/correctors/position_model.h"
+
+namespace fieldtrue {
+
+/// The position correction p_true = p_tracked + polynomial(p_tracked), shared by `affine` and `polynomial`. In a plane
+/// the polynomial is one of the two coordinates in it.
+/// @param name stands in messages
+/// @error as PolynomialField::fit; kBadInput for numbers that are not finite
+Result<std::unique_ptr<PositionModel>> fitPolynomialPosition(const FitData& data, int degree, const std::string& name);
+
+/// @error kBadInput
+Result<std::unique_ptr<PositionModel>> loadPolynomialPosition(const nlohmann::json& parameters,
+                                                              const std::string& name);
+
+/// What a fitted polynomial has to tell: that it was fitted in the plane, that it is poorly determined; empty when
+/// nothing.
+std::string polynomialNote(const PolynomialField& field);
+
+}  // namespace fieldtrue

@@ -1,0 +1,83 @@
+#include "calib/correctors/polynomial_quaternion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/core/statistics.h"
+#include "calib/correctors/error_rotation.h"
+#include "calib/correctors/fit_checks.h"
+#include "calib/correctors/json_values.h"
+#include "calib/correctors/polynomial_position.h"
+#include "calib/correctors/shared_settings.h"
+
+namespace fieldtrue {
+namespace {
+
+/// The vector part tells rotations apart below 180 degrees only. Up to this angle errors are fitted as they are, as
+/// Ikits does; above, relative to their mean, which keeps w > 0 and so the sign continuous.
+constexpr double kDirectLimit_rad = 1.5707963267948966;
+
+class PolynomialErrorRotation : public ErrorRotationModel {
+ public:
+  PolynomialErrorRotation(ErrorFrame frame, const Eigen::Quaterniond& q_reference, PolynomialField vector_part)
+      : ErrorRotationModel(frame), q_reference_(q_reference), vector_part_(std::move(vector_part)) {}
+
+  std::string note() const override { return polynomialNote(vector_part_); }
+
+ protected:
+  Eigen::Quaterniond errorRotation(const Eigen::Vector3d& p_tracked_m) const override {
+    const Eigen::Vector3d v = vector_part_.value(p_tracked_m);
+    // Far outside the places the polynomial can leave the unit ball; there the nearest rotation is a half turn.
+    const double w = std::sqrt(std::max(0.0, 1.0 - v.squaredNorm()));
+    return (q_reference_ * Eigen::Quaterniond(w, v.x(), v.y(), v.z())).normalized();
+  }
+  nlohmann::json errorParameters() const override {
+    return {{"q_reference_wxyz", jsonOf(q_reference_)}, {"vector_part", vector_part_.toJson()}};
+  }
+
+ private:
+  Eigen::Quaterniond q_reference_;
+  PolynomialField vector_part_;
+};
+
+Result<std::unique_ptr<OrientationModel>> fitPolynomialQuaternion(const FitData& data, const Settings& settings,
+                                                                  const RunControl&) {
+  const int degree = static_cast<int>(integerSetting(settings, "degree"));
+  const std::string name = "Quaternion polynomial of degree " + std::to_string(degree);
+  if (auto checked = checkOrientations(data, name); !checked) return tl::unexpected(checked.error());
+  const ErrorFrame frame = errorFrame(settings);
+  const std::vector<Eigen::Quaterniond> q_error = errorRotations(data, frame);
+  const bool direct = std::all_of(q_error.begin(), q_error.end(), [](const Eigen::Quaterniond& q) {
+    return angleBetween_rad(q, Eigen::Quaterniond::Identity()) < kDirectLimit_rad;
+  });
+  const Eigen::Quaterniond q_reference = direct ? Eigen::Quaterniond::Identity() : canonical(meanRotation(q_error));
+  std::vector<Eigen::Vector3d> vector_parts(data.size());
+  for (std::size_t i = 0; i < data.size(); ++i) vector_parts[i] = canonical(q_reference.conjugate() * q_error[i]).vec();
+  const PolynomialProblem problem{name,   data.p_tracked_m, vector_parts,
+                                  degree, data.dimension,   mergePlaces(data).size()};
+  return PolynomialField::fit(problem).map([&](PolynomialField field) -> std::unique_ptr<OrientationModel> {
+    return std::make_unique<PolynomialErrorRotation>(frame, q_reference, std::move(field));
+  });
+}
+
+Result<std::unique_ptr<OrientationModel>> loadPolynomialQuaternion(const nlohmann::json& parameters) {
+  return guarded<std::unique_ptr<OrientationModel>>(
+      "parameters of polynomial_quaternion", [&]() -> Result<std::unique_ptr<OrientationModel>> {
+        return std::make_unique<PolynomialErrorRotation>(errorFrameFrom(parameters),
+                                                         quaternionFrom(parameters.at("q_reference_wxyz")),
+                                                         PolynomialField::fromJson(parameters.at("vector_part")));
+      });
+}
+
+}  // namespace
+
+OrientationMethod polynomialQuaternionOrientation() {
+  return {"polynomial_quaternion",
+          "Quaternion polynomial",
+          "Ikits, Brederson, Hansen, Hollerbach 2001; survey by Kindratenko, section 4.2",
+          {degreeSetting(), errorFrameSetting()},
+          fitPolynomialQuaternion,
+          loadPolynomialQuaternion};
+}
+
+}  // namespace fieldtrue
