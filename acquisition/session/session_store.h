@@ -1,14 +1,13 @@
 #pragma once
 
+#include <QDateTime>
 #include <QString>
-#include <QtSql/QSqlDatabase>
 #include <cstdint>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "acquisition/session/plan.h"
 #include "calib/core/calibration_table.h"
@@ -20,8 +19,8 @@ namespace fieldtrue {
 /// What is known of one planned place at this moment.
 enum class PlaceState { kPlanned, kDone, kSkipped, kSuspicious };
 
-/// One `*.fieldtrue` file: plan, raw samples, nodes, events and fits in SQLite. WAL with synchronous=FULL while open; one file
-/// again when closed. Use from one thread. Every write is on disk when the call returns.
+/// One `*.fieldtrue` file: plan, raw samples, nodes, events and fits in SQLite. WAL with synchronous=FULL while open;
+/// one file again when closed. Use from one thread. Every write is on disk when the call returns.
 class SessionStore {
  public:
   /// Creates a new session file. @error kIo (exists already, no such folder, disk full)
@@ -43,7 +42,8 @@ class SessionStore {
   /// Index of the first planned place that is neither done nor skipped, none when all are.
   std::optional<std::size_t> nextPlace() const;
 
-  /// Stores a finished take with its raw samples in one transaction; an earlier take of the place is kept but superseded.
+  /// Stores a finished take with its raw samples in one transaction; an earlier take of the place is kept but
+  /// superseded.
   /// @param suspicious reason, empty when the take is fine
   /// @error kIo with the reason (disk full): nothing of the take is stored
   Result<void> storeTake(std::size_t place, const std::vector<Sample>& samples, const NodeStatistics& statistics,
@@ -53,10 +53,16 @@ class SessionStore {
   Result<std::optional<std::size_t>> undo();
   /// Brings back what the last undo took back, until something new is stored.
   Result<std::optional<std::size_t>> redo();
+  bool canUndo() const;
+  bool canRedo() const;
+  /// Keeps something that happened (device lost, take failed) with the time of the wall clock.
   Result<void> addEvent(const std::string& kind, const std::string& text);
-  /// Keeps a fitted calibration's text with the session. 
+  /// Keeps a fitted calibration's text with the session.
   Result<void> storeFit(const std::string& name, const std::string& ftcal_text);
   std::vector<std::pair<std::string, std::string>> fits() const;  ///< name, ftcal text; newest first.
+
+  /// Every event, oldest first: kind, text.
+  std::vector<std::pair<std::string, std::string>> events() const;
 
   /// A small state of the program ("page": "compare") kept in the file, so that a session opens where it was.
   Result<void> setState(const std::string& key, const std::string& value);
@@ -66,9 +72,17 @@ class SessionStore {
   CalibrationTable nodeTable() const;
   /// Raw samples of the live takes.
   SampleTable sampleTable() const;
-  /// Statistics of the live take of a place. 
+  /// The live take of a place, none when there is none.
   std::optional<Node> node(std::size_t place) const;
+  /// Raw samples of the live take of a place.
   std::vector<Sample> samples(std::size_t place) const;
+
+  QDateTime created() const;  ///< When the session began, UTC.
+  /// Session time of the newest stored sample, of superseded takes too; none when there is none [s].
+  std::optional<double> newestSample_s() const;
+
+  /// The file may not grow beyond this; what does not fit fails as on a full disk. For quotas and tests.
+  Result<void> limitSize(std::int64_t bytes);
 
  private:
   struct Impl;
