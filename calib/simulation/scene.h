@@ -1,33 +1,39 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "calib/core/error.h"
 #include "calib/core/pose.h"
 
 namespace fieldtrue {
 
-/// The tracker as the simulator believes it to be. Every default is that of a long-range AC tracker of the Fastrak kind.
+/// The tracker as the simulator believes it to be. Every default is that of a long-range AC tracker of the Fastrak
+/// kind.
 struct TrackerModel {
-  std::string excitation = "ac";  ///< `ac` or `pulsed_dc`.
-  double carrier_hz = 10016.0;
-  double sampling_delay_s = 0.0;      ///< Pulsed DC: from the pulse's edge to the reading.
-  double dipole_constant_m3 = 1.0;    ///< C of G(p) = C (3uu^T - I)/r^3; couplings are in these units.
-  double rate_hz = 120.0;
-  double quantum_m = 0.0;             ///< Lattice of reported positions; 0 = none.
-  double coupling_noise = 2.0e-4;     ///< SD of each of the nine couplings (units of dipole_constant_m3 / m^3), per sample.
-  double correlation = 0.0;           ///< Lag-1 autocorrelation of successive readings left by the tracker's filter, [0, 1).
+  std::string name = "simulated tracker";
+  std::string excitation = "ac";    ///< `ac` or `pulsed_dc`.
+  double carrier_hz = 10016.0;      ///< AC only.
+  double sampling_delay_s = 0.0;    ///< Pulsed DC: from the pulse's edge to the reading.
+  double dipole_constant_m3 = 1.0;  ///< C of G(p) = C (3uu^T - I)/r^3; couplings are in these units.
+  double rate_hz = 120.0;           ///< Readings per second.
+  double quantum_m = 0.0;           ///< Lattice of reported positions; 0 = none.
+  double coupling_noise = 2.0e-4;   ///< SD of each coupling in each reading (units of dipole_constant_m3 / m^3).
+  double correlation = 0.0;         ///< Of the noise of successive readings, left by the tracker's filter, [0, 1).
+  double nearest_range_m = 0.1;     ///< Nearer, the receiver saturates.
+  double farthest_range_m = 9.144;  ///< Farther, the signal is too weak. 30 ft, the long-range transmitter's reach.
 };
 
 /// How truth is known: the jig and its tolerances.
 struct RigModel {
   std::string name = "wooden jig";
-  double tolerance_m = 0.0;    ///< SD of placing, per axis.
-  double tolerance_rad = 0.0;  ///< SD of placing, per axis.
+  double tolerance_m = 0.0;              ///< SD of placing, per axis, anew on every visit.
+  double tolerance_rad = 0.0;            ///< SD of placing, per axis, anew on every visit.
+  bool alignment_known = false;          ///< Whether the rig says where the transmitter stands.
+  double alignment_tolerance_m = 0.0;    ///< Where it says so: SD of the transmitter's true place about it, per axis.
+  double alignment_tolerance_rad = 0.0;  ///< Likewise of its rotation, per axis.
 };
 
 /// An effect in the scene: an id of the effect registry and its parameters (defaults filled in on reading).
@@ -45,10 +51,15 @@ struct Scene {
   std::vector<EffectInstance> effects;
 };
 
-/// Reads `*.scene.json` (`fieldtrue.scene/1`).
+/// Reads `*.scene.json` (`fieldtrue.scene/1`): the keys `schema`, `name`, `tracker`, `transmitter` (`position_m`,
+/// `orientation_wxyz`: its pose in the rig's frame), `rig` and `effects` (list of `id`, `parameters`). Every key is
+/// optional but an effect's id; the keys of `tracker` and `rig` are the members above, `alignment` is `known` or
+/// `unknown`. A key `comment` may stand anywhere and is ignored, and so are // comments.
 /// @error kIo; kBadInput naming the key, what was seen and what is needed; kNewerVersion
 Result<Scene> readScene(const std::filesystem::path& path);
+/// @param name stands in error messages ("lab.scene.json")
 Result<Scene> sceneFromJson(const nlohmann::json& json, const std::string& name);
+/// Writes every key; reading it back gives the same scene, bit for bit.
 nlohmann::json toJson(const Scene& scene);
 
 }  // namespace fieldtrue

@@ -13,6 +13,7 @@ namespace fieldtrue {
 
 /// A tracker in a scene: distorts the couplings by the scene's physics, adds noise, and solves for the pose under the
 /// undistorted model, as a tracker does. One object is one tracker's life (its filter and noise have memory); seeded.
+/// The filter acts on the noise and does not lag behind motion; the hemisphere follows the sensor.
 class TrackerSimulator {
  public:
   /// @error kBadInput for an unknown effect or bad parameters
@@ -50,9 +51,10 @@ struct Simulation {
   SampleTable samples;
 };
 
-/// Records a plan in a scene: places the jig with its tolerance, takes the samples, averages each node.
+/// Records a plan in a scene with sensor 0: places the jig with its tolerance, takes the samples, averages each node.
+/// Places with role skipped are passed over. The result depends on the seed only, never on `parallel_for`.
 /// The table's truth is the planned pose (what the rig says), not where the jig really stood.
-/// @error kBadInput; kUnsupported when a place gives no usable reading (named)
+/// @error kBadInput; kUnsupported when a place gives no usable reading (named); kCancelled
 Result<Simulation> simulate(const Scene& scene, std::span<const PlannedPlace> plan, const SimulationOptions& options,
                             const RunControl& control = {});
 

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "calib/effects/registry.h"
+
+namespace fieldtrue {
+
+/// What metal does to a quasi-static field: as a conductor it keeps the field out, as a ferromagnet it draws it in.
+EffectParameter materialParameter();
+/// Used only where the material is ferromagnetic.
+EffectParameter permeabilityParameter();
+
+/// Typed access to resolved parameters.
+double scalarOf(const nlohmann::json& parameters, const std::string& name);
+Eigen::Vector3d vectorOf(const nlohmann::json& parameters, const std::string& name);
+bool isFerromagnetic(const nlohmann::json& parameters);
+
+/// "(1, 0, -0.5)"
+std::string textOf(const Eigen::Vector3d& v);
+
+}  // namespace fieldtrue

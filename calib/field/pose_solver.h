@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <string_view>
+#include <tl/expected.hpp>
+
+#include "calib/core/pose.h"
+
+namespace fieldtrue {
+
+/// Why nine couplings give no pose.
+enum class SolveError {
+  kTooWeak,    ///< Weaker together than those of a sensor at the farthest range.
+  kSaturated,  ///< Stronger together than those of a sensor at the nearest range.
+  kNotFinite,  ///< A coupling is NaN or infinite.
+  kAmbiguous,  ///< Two directions fit equally well.
+};
+
+/// "the signal is too weak", to follow a colon.
+std::string_view describe(SolveError error);
+
+/// The ranges a tracker works between; couplings are judged by their root sum of squares, sqrt(6) C/r^3.
+struct SolverLimits {
+  double nearest_m = 0.0;
+  double farthest_m = std::numeric_limits<double>::infinity();
+};
+
+struct PoseSolution {
+  Pose tracker_from_sensor;
+  double residual_rms = 0.0;  ///< Over the nine couplings, in their units: how far they are from any undistorted pose.
+};
+
+/// The pose whose undistorted dipole couplings R^T G(p) come nearest the given ones, in unweighted least squares.
+///
+/// The minimum is reached in closed form, so there is no start value, no iteration and no local minimum. With the
+/// singular values d1 >= d2 >= d3 of S = P D Q^T and s = det(P) det(Q), the sum of squares is bounded below by
+/// |S|^2 + 6 k^2 - 2 k (2 d1 + d2 + s d3), k = C/r^3 (von Neumann's trace inequality, for G has the singular values
+/// k (2, 1, 1)), and that bound is met by
+///   u = q1,  R = Q diag(1, -1, -s) P^T,  k = (2 d1 + d2 + s d3)/6.
+/// An iterated least-squares solver of the nine equations ends at the same pose.
+///
+/// @param couplings S: rows receiver coils, columns transmitter coils
+/// @param dipole_constant_m3 C > 0
+/// @param hemisphere tracker frame, any length, not zero: p and -p give the same couplings, the answer has p.hemisphere
+/// >= 0. While tracking it is the last position.
+/// @error SolveError
+/// @source Raab 1981, IEEE Trans. AES-17 (direct solution, position first); the bound: Miranda and Thompson 1993
+tl::expected<PoseSolution, SolveError> solvePose(const Eigen::Matrix3d& couplings, double dipole_constant_m3,
+                                                 const Eigen::Vector3d& hemisphere, const SolverLimits& limits = {});
+
+}  // namespace fieldtrue
