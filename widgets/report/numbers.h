@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+namespace fieldtrue {
+
+/// A number as people read it: so many significant digits, no exponent, trailing zeros kept ("0.412", "41.3", "1240").
+/// @param digits at least 1
+/// @return "n/a" for NaN and infinity
+std::string significantText(double value, int digits = 3);
+
+/// A number with a fixed count of decimals; "n/a" for NaN and infinity.
+std::string decimalText(double value, int decimals);
+
+/// A duration in the unit that suits it: "120 ns", "3.10 us", "12.0 ms", "2.40 s".
+std::string durationText(double seconds);
+
+}  // namespace fieldtrue

@@ -1,0 +1,151 @@
+#include "widgets/report/report_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "calib/core/file_io.h"
+#include "calib/core/statistics.h"
+#include "calib/correctors/registry.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr double kMmPerM = 1000.0;
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+const MethodScore* findScore(const std::vector<MethodScore>& scores, const std::string& id) {
+  if (id == "none") return nullptr;
+  const auto found = std::find_if(scores.begin(), scores.end(),
+                                  [&](const MethodScore& score) { return score.method == id && !score.skipped; });
+  return found == scores.end() ? nullptr : &*found;
+}
+
+std::optional<double> sd_mm(const Node& node) {
+  if (!node.covariance_m2) return std::nullopt;
+  return kMmPerM * std::sqrt(node.covariance_m2->trace());
+}
+
+std::optional<double> medianOf(const std::vector<double>& values) {
+  if (values.empty()) return std::nullopt;
+  return median(values);
+}
+
+/// Undoes n_effective = n (1 - rho) / (1 + rho).
+double autocorrelation(const Node& node) {
+  const double ratio = node.n_effective / node.n_used;
+  return (1.0 - ratio) / (1.0 + ratio);
+}
+
+/// Adds a row of the table to its place.
+void addRow(PlaceSummary& place, const Node& node, bool first, double& variance_mm2, int& n_variances) {
+  if (first) {
+    place.p_true_m = node.reference_from_sensor.position_m;
+    place.name = placeName({node.node, node.visit, node.index, node.reference_from_sensor, node.role});
+    place.validation = node.role == NodeRole::kValidation;
+  }
+  place.n_used += node.n_used;
+  place.n_rejected += node.n_rejected;
+  if (const auto sd = sd_mm(node)) {
+    variance_mm2 += *sd * *sd;
+    ++n_variances;
+  }
+}
+
+PlaceSummary summarise(int node, const std::vector<const Node*>& rows) {
+  PlaceSummary place;
+  place.node = node;
+  double variance_mm2 = 0.0;
+  int n_variances = 0;
+  for (const Node* row : rows) addRow(place, *row, row == rows.front(), variance_mm2, n_variances);
+  if (n_variances > 0) place.sd_mm = std::sqrt(variance_mm2 / n_variances);
+  return place;
+}
+
+}  // namespace
+
+const MethodScore* bestPosition(const Comparison& comparison) {
+  return findScore(comparison.position, comparison.best_position);
+}
+
+const MethodScore* bestOrientation(const Comparison& comparison) {
+  return findScore(comparison.orientation, comparison.best_orientation);
+}
+
+std::vector<PlaceSummary> placeSummaries(const ReportInput& input) {
+  std::map<int, std::vector<const Node*>> rows_of;
+  for (const Node& node : input.table.nodes) {
+    if (node.role != NodeRole::kSkipped) rows_of[node.node].push_back(&node);
+  }
+  const Comparison& comparison = input.comparison;
+  const MethodScore* best = bestPosition(comparison);
+  std::vector<PlaceSummary> places;
+  places.reserve(comparison.places.size());
+  for (std::size_t i = 0; i < comparison.places.size(); ++i) {
+    PlaceSummary place = summarise(comparison.places[i], rows_of[comparison.places[i]]);
+    place.before_mm = comparison.before_place_mm[i];
+    place.before_m = comparison.before_residual_m[i];
+    place.after_mm = best != nullptr ? best->place_errors[i] : place.before_mm;
+    place.after_m = best != nullptr ? best->residual_m[i] : place.before_m;
+    places.push_back(std::move(place));
+  }
+  return places;
+}
+
+MeasurementSummary measurementSummary(const CalibrationTable& table) {
+  MeasurementSummary summary;
+  std::set<int> sensors;
+  std::vector<double> sds_mm, sds_deg, autocorrelations, times_s;
+  for (const Node& node : table.nodes) {
+    if (node.role == NodeRole::kSkipped) {
+      ++summary.n_skipped_rows;
+      continue;
+    }
+    ++summary.n_rows;
+    sensors.insert(node.sensor);
+    summary.n_used += node.n_used;
+    summary.n_rejected += node.n_rejected;
+    summary.has_orientation = summary.has_orientation || node.has_orientation;
+    if (const auto sd = sd_mm(node)) sds_mm.push_back(*sd);
+    if (node.sd_rot_rad) sds_deg.push_back(kDegPerRad * *node.sd_rot_rad);
+    if (node.n_used > 1) autocorrelations.push_back(autocorrelation(node));
+    if (node.t_start_s) times_s.push_back(*node.t_start_s);
+    if (node.t_end_s) times_s.push_back(*node.t_end_s);
+  }
+  summary.n_sensors = static_cast<int>(sensors.size());
+  summary.sd_mm = medianOf(sds_mm);
+  summary.sd_deg = medianOf(sds_deg);
+  summary.autocorrelation = medianOf(autocorrelations);
+  if (!times_s.empty()) {
+    const auto [first, last] = std::minmax_element(times_s.begin(), times_s.end());
+    summary.duration_s = *last - *first;
+  }
+  return summary;
+}
+
+std::string settingsText(const Settings& settings) {
+  std::string text;
+  for (const auto& [key, value] : settings) {
+    if (!text.empty()) text += ", ";
+    text += key + "=";
+    if (const auto* flag = std::get_if<bool>(&value)) text += *flag ? "true" : "false";
+    if (const auto* whole = std::get_if<std::int64_t>(&value)) text += std::to_string(*whole);
+    if (const auto* number = std::get_if<double>(&value)) text += formatNumber(*number);
+    if (const auto* choice = std::get_if<std::string>(&value)) text += *choice;
+  }
+  return text;
+}
+
+std::string positionLabel(const std::string& id) {
+  const auto row = findPositionMethod(id);
+  return row ? (*row)->label : id;
+}
+
+std::string orientationLabel(const std::string& id) {
+  const auto row = findOrientationMethod(id);
+  return row ? (*row)->label : id;
+}
+
+}  // namespace fieldtrue

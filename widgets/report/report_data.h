@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/core/settings.h"
+#include "calib/evaluation/comparison.h"
+#include "widgets/report/report.h"
+
+/// What the parts of a report share: numbers gathered from the table and the comparison, no markup.
+namespace fieldtrue {
+
+/// One scored place of a comparison.
+struct PlaceSummary {
+  int node = 0;
+  std::string name;
+  Eigen::Vector3d p_true_m = Eigen::Vector3d::Zero();  ///< Of its first row, reference frame.
+  bool validation = false;
+  double before_mm = 0.0;
+  double after_mm = 0.0;                               ///< With the best position method.
+  Eigen::Vector3d before_m = Eigen::Vector3d::Zero();  ///< Tracked minus true, reference frame.
+  Eigen::Vector3d after_m = Eigen::Vector3d::Zero();
+  std::optional<double> sd_mm;  ///< 3-D SD of a single sample, RMS over the place's rows.
+  int n_used = 0;
+  int n_rejected = 0;
+};
+
+/// What the table as a whole holds.
+struct MeasurementSummary {
+  std::size_t n_rows = 0;
+  int n_skipped_rows = 0;
+  int n_sensors = 0;
+  long n_used = 0;
+  long n_rejected = 0;
+  bool has_orientation = false;
+  std::optional<double> sd_mm;            ///< Median over the rows of the 3-D SD of a single sample.
+  std::optional<double> sd_deg;           ///< Median over the rows.
+  std::optional<double> autocorrelation;  ///< Lag 1, median over the rows with more than one sample.
+  std::optional<double> duration_s;
+};
+
+/// The score of the best position method; none when nothing was better than the input.
+const MethodScore* bestPosition(const Comparison& comparison);
+const MethodScore* bestOrientation(const Comparison& comparison);
+
+/// The scored places in the comparison's order.
+std::vector<PlaceSummary> placeSummaries(const ReportInput& input);
+MeasurementSummary measurementSummary(const CalibrationTable& table);
+
+/// "degree=3, lambda=auto"; empty without settings.
+std::string settingsText(const Settings& settings);
+
+/// The label of a method as menus show it; the id itself when no registry has it.
+std::string positionLabel(const std::string& id);
+std::string orientationLabel(const std::string& id);
+
+}  // namespace fieldtrue
