@@ -1,11 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <nlohmann/json_fwd.hpp>
 
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
@@ -14,7 +13,8 @@
 
 namespace fieldtrue {
 
-/// Statistics of per-place errors, in mm or degrees. The 90 % interval of the RMS is a percentile bootstrap over places.
+/// Statistics of per-place errors, in mm or degrees; the error of a place is the RMS over its rows. The 90 % interval
+/// of the RMS is a percentile bootstrap over places.
 struct ErrorStats {
   double mean = 0, median = 0, rms = 0, p95 = 0, max = 0, rms_low90 = 0, rms_high90 = 0;
 };
@@ -46,41 +46,64 @@ struct ComparisonOptions {
 struct MethodScore {
   std::string method;
   Settings settings;
-  ErrorStats stats;                        ///< mm or deg, over all scored places.
-  std::vector<double> place_errors;        ///< Same order as Comparison::places.
-  std::vector<Eigen::Vector3d> residual_m; ///< Position only: corrected minus true at each place, reference frame (mean over its rows).
+  ErrorStats stats;                  ///< mm or deg, over all scored places.
+  std::vector<double> place_errors;  ///< Same order as Comparison::places.
+  std::vector<Eigen::Vector3d>
+      residual_m;  ///< Position only: corrected minus true at each place, reference frame (mean over its rows).
   int n_uncovered = 0;
-  double rms_common_mm = 0;                ///< Position only: over the places all methods cover.
-  double in_sample_rms = 0;                ///< On the rows it was fitted to, all at once. Not a verdict.
-  double fit_s = 0;                        ///< One fit on all rows.
-  double eval_ns = 0;                      ///< One evaluation.
-  std::optional<std::string> skipped;      ///< Why it cannot be used here; then nothing else is set.
+  double rms_common_mm = 0;            ///< Position only: over the places all methods cover.
+  double in_sample_rms = 0;            ///< On the rows it was fitted to, all at once. Not a verdict.
+  double fit_s = 0;                    ///< One fit on all rows.
+  double eval_ns = 0;                  ///< One evaluation.
+  std::optional<std::string> skipped;  ///< Why it cannot be used here; then nothing else is set.
   std::vector<std::string> notes;
 };
+
+/// Whether a correction is worth applying: the paired 90 % interval of its gain excludes zero and the gain is at least
+/// 10 %, also without the place whose removal lowers the gain most.
+struct GainTest {
+  double gain = 0;  ///< 1 - RMS after / RMS before, over the places scored.
+  double low90 = 0;
+  double high90 = 0;
+  int worst_place = -1;  ///< Node number; -1 = nothing was tested.
+  double gain_without_worst_place = 0;
+  double low90_without_worst_place = 0;
+  bool apply = false;
+};
+
+/// @param places node numbers, before and after in the same order; fewer than 3 never pass
+GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
+                  std::uint64_t seed = 1);
 
 struct Verdict {
   bool apply_position = false;
   bool apply_orientation = false;
-  double gain_low90 = 0;   ///< Of the best position method: 1 - RMS after / RMS before, paired bootstrap over places.
+  double gain_low90 = 0;  ///< Of the best position method: 1 - RMS after / RMS before, paired bootstrap over places.
   double gain_high90 = 0;
   double gain_without_worst_place = 0;
-  std::string text;  ///< One sentence.
+  GainTest position;     ///< Of the best position method.
+  GainTest orientation;  ///< Of the best orientation method.
+  std::string text;      ///< One sentence.
 };
 
 struct Comparison {
   Validation validation;
   AlignMode align = AlignMode::kNone;
-  std::vector<int> places;  ///< Node numbers scored.
-  int n_places = 0;         ///< In the table, skipped ones left out.
-  int validation_places = 0;
-  double floor_position_mm = 0;
+  std::vector<int> places;       ///< Node numbers scored.
+  int n_places = 0;              ///< In the table, skipped ones left out.
+  int validation_places = 0;     ///< Scored by fits that did not see them; the size of `places`.
+  double floor_position_mm = 0;  ///< 0 = the table states neither noise nor tolerance.
   double floor_orientation_deg = 0;
+  std::string floor_from;  ///< "samples and jig tolerance", and the like.
   ErrorStats before_position_mm;
   std::optional<ErrorStats> before_orientation_deg;  ///< None without orientation.
   std::vector<double> before_place_mm;
+  std::vector<double> before_place_deg;  ///< Empty without orientation.
   std::vector<Eigen::Vector3d> before_residual_m;
   std::vector<MethodScore> position;
   std::vector<MethodScore> orientation;
+  std::optional<std::size_t> best_position_row;     ///< Into `position`; none where nothing beats the error before.
+  std::optional<std::size_t> best_orientation_row;  ///< Into `orientation`.
   std::string best_position = "none";
   std::string best_orientation = "none";
   Verdict verdict;

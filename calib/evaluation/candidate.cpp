@@ -1,0 +1,108 @@
+#include "calib/evaluation/candidate.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr double kDegreesPerRadian = 57.29577951308232;
+
+RowScore positionScore(const Eigen::Vector3d& p_corrected_m, const Node& node, const Alignment& alignment) {
+  RowScore score;
+  score.residual_m = alignment.reference_from_tracker * p_corrected_m - node.reference_from_sensor.position_m;
+  score.error = 1000.0 * score.residual_m.norm();
+  return score;
+}
+
+RowScore orientationScore(const Eigen::Quaterniond& q_corrected, const Node& node, const Alignment& alignment) {
+  const Eigen::Quaterniond reference_from_mount =
+      alignment.reference_from_tracker.orientation * q_corrected * alignment.sensor_from_mount;
+  RowScore score;
+  score.error = kDegreesPerRadian * angleBetween_rad(reference_from_mount, node.reference_from_sensor.orientation);
+  return score;
+}
+
+RowScore scoreOf(const PositionModel& model, const Node& node, const Alignment& alignment) {
+  const Eigen::Vector3d& p_tracked_m = node.tracker_from_sensor.position_m;
+  const bool covered = model.covers(p_tracked_m);
+  const Eigen::Vector3d p_true_m = covered ? p_tracked_m + model.displacement_m(p_tracked_m) : p_tracked_m;
+  RowScore score = positionScore(p_true_m, node, alignment);
+  score.covered = covered;
+  return score;
+}
+
+RowScore scoreOf(const OrientationModel& model, const Node& node, const Alignment& alignment) {
+  const Pose& tracked = node.tracker_from_sensor;
+  const bool covered = model.covers(tracked.position_m);
+  const Eigen::Quaterniond q_true =
+      covered ? model.correct(tracked.position_m, tracked.orientation) : tracked.orientation;
+  RowScore score = orientationScore(q_true, node, alignment);
+  score.covered = covered;
+  return score;
+}
+
+double evaluateOnce(const PositionModel& model, const Pose& tracked) {
+  return model.displacement_m(tracked.position_m).x();
+}
+
+double evaluateOnce(const OrientationModel& model, const Pose& tracked) {
+  return model.correct(tracked.position_m, tracked.orientation).w();
+}
+
+template <class Model>
+Candidate makeCandidate(const CorrectionMethod<Model>& method, Settings settings) {
+  Candidate candidate;
+  candidate.id = method.id;
+  candidate.settings = settings;
+  candidate.is_position = std::is_same_v<Model, PositionModel>;
+  candidate.fit = [&method, settings = std::move(settings)](const FitData& data,
+                                                            const RunControl& control) -> Result<FittedCandidate> {
+    auto fitted = method.fit(data, settings, control);
+    if (!fitted) return tl::unexpected(fitted.error());
+    const std::shared_ptr<const Model> model = *std::move(fitted);
+    return FittedCandidate{
+        [model](const Node& node, const Alignment& alignment) { return scoreOf(*model, node, alignment); },
+        [model](const Node& node) {
+          return model->covers(node.tracker_from_sensor.position_m) ? evaluateOnce(*model, node.tracker_from_sensor)
+                                                                    : 0.0;
+        },
+        model->note()};
+  };
+  return candidate;
+}
+
+template <class Model>
+Result<std::vector<Candidate>> makeCandidates(const std::vector<MethodText>& methods,
+                                              std::span<const CorrectionMethod<Model>> registry,
+                                              Result<const CorrectionMethod<Model>*> (*find)(std::string_view)) {
+  std::vector<MethodText> wanted = methods;
+  if (wanted.empty())
+    for (const CorrectionMethod<Model>& method : registry) wanted.push_back({method.id, {}});
+  std::vector<Candidate> candidates;
+  for (const MethodText& text : wanted) {
+    const auto method = find(text.id);
+    if (!method) return tl::unexpected(method.error());
+    auto settings = resolveSettings(text.id, (*method)->settings, text.given);
+    if (!settings) return tl::unexpected(settings.error());
+    candidates.push_back(makeCandidate(**method, *std::move(settings)));
+  }
+  return candidates;
+}
+
+}  // namespace
+
+Result<std::vector<Candidate>> positionCandidates(const std::vector<MethodText>& methods) {
+  return makeCandidates<PositionModel>(methods, positionMethods(), findPositionMethod);
+}
+
+Result<std::vector<Candidate>> orientationCandidates(const std::vector<MethodText>& methods) {
+  return makeCandidates<OrientationModel>(methods, orientationMethods(), findOrientationMethod);
+}
+
+RowScore alignedPositionScore(const Node& node, const Alignment& alignment) {
+  return positionScore(node.tracker_from_sensor.position_m, node, alignment);
+}
+
+RowScore alignedOrientationScore(const Node& node, const Alignment& alignment) {
+  return orientationScore(node.tracker_from_sensor.orientation, node, alignment);
+}
+
+}  // namespace fieldtrue

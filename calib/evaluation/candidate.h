@@ -1,0 +1,44 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "calib/core/run_control.h"
+#include "calib/correctors/corrector.h"
+#include "calib/correctors/registry.h"
+
+namespace fieldtrue {
+
+/// How one corrected row differs from the truth.
+struct RowScore {
+  double error = 0.0;                                    ///< mm, or degrees for an orientation.
+  Eigen::Vector3d residual_m = Eigen::Vector3d::Zero();  ///< Corrected minus true, reference frame; positions only.
+  bool covered = true;  ///< Where false, the input stands unchanged but for the alignment.
+};
+
+/// A fitted model of either kind, seen only through what a comparison asks of it.
+struct FittedCandidate {
+  std::function<RowScore(const Node&, const Alignment&)> score;
+  std::function<double(const Node&)> evaluate;  ///< One evaluation, for timing; the value means nothing.
+  std::string note;
+};
+
+/// A method with its settings, of either kind.
+struct Candidate {
+  std::string id;
+  Settings settings;
+  bool is_position = true;
+  std::function<Result<FittedCandidate>(const FitData&, const RunControl&)> fit;
+};
+
+/// The candidates that texts name; all of the registry with default settings when there are none.
+/// @error kBadInput
+Result<std::vector<Candidate>> positionCandidates(const std::vector<MethodText>& methods);
+Result<std::vector<Candidate>> orientationCandidates(const std::vector<MethodText>& methods);
+
+/// The score of a row that only the alignment touches.
+RowScore alignedPositionScore(const Node& node, const Alignment& alignment);
+RowScore alignedOrientationScore(const Node& node, const Alignment& alignment);
+
+}  // namespace fieldtrue

@@ -1,0 +1,87 @@
+#include <nlohmann/json.hpp>
+
+#include "calib/evaluation/comparison.h"
+
+namespace fieldtrue {
+namespace {
+
+using nlohmann::json;
+
+json statsToJson(const ErrorStats& stats) {
+  return {{"mean", stats.mean},
+          {"median", stats.median},
+          {"rms", stats.rms},
+          {"p95", stats.p95},
+          {"max", stats.max},
+          {"rms_low90", stats.rms_low90},
+          {"rms_high90", stats.rms_high90}};
+}
+
+/// What cannot be stated is null, never absent and never zero.
+json nullUnless(bool stated, const json& value) { return stated ? value : json(nullptr); }
+
+json scoreToJson(const MethodScore& score, const char* stats_key, bool is_position) {
+  const bool used = !score.skipped;
+  json to = {{"method", score.method},
+             {"settings", toJson(score.settings)},
+             {stats_key, nullUnless(used, statsToJson(score.stats))},
+             {"n_uncovered", nullUnless(used, score.n_uncovered)},
+             {"fit_s", nullUnless(used, score.fit_s)},
+             {"eval_ns", nullUnless(used, score.eval_ns)},
+             {is_position ? "in_sample_rms_mm" : "in_sample_rms_deg", nullUnless(used, score.in_sample_rms)},
+             {"notes", score.notes},
+             {"skipped", nullUnless(!used, score.skipped.value_or(""))}};
+  if (is_position) to["rms_common_mm"] = nullUnless(used, score.rms_common_mm);
+  return to;
+}
+
+json testToJson(const GainTest& test) {
+  return {{"gain", test.gain},
+          {"low90", test.low90},
+          {"high90", test.high90},
+          {"worst_place", nullUnless(test.worst_place >= 0, test.worst_place)},
+          {"gain_without_worst_place", test.gain_without_worst_place},
+          {"low90_without_worst_place", test.low90_without_worst_place}};
+}
+
+json verdictToJson(const Verdict& verdict) {
+  return {{"apply_position", verdict.apply_position},
+          {"apply_orientation", verdict.apply_orientation},
+          {"gain_low90", verdict.gain_low90},
+          {"gain_high90", verdict.gain_high90},
+          {"gain_without_worst_place", verdict.gain_without_worst_place},
+          {"position", testToJson(verdict.position)},
+          {"orientation", testToJson(verdict.orientation)},
+          {"text", verdict.text}};
+}
+
+}  // namespace
+
+json toJson(const Comparison& comparison) {
+  json position = json::array();
+  for (const MethodScore& score : comparison.position) position.push_back(scoreToJson(score, "position_mm", true));
+  json orientation = json::array();
+  for (const MethodScore& score : comparison.orientation)
+    orientation.push_back(scoreToJson(score, "orientation_deg", false));
+  const json before_orientation =
+      comparison.before_orientation_deg ? statsToJson(*comparison.before_orientation_deg) : json();
+  return {{"schema", "fieldtrue.compare/1"},
+          {"software", "Fieldtrue " FIELDTRUE_VERSION},
+          {"validate", toText(comparison.validation)},
+          {"align", comparison.align == AlignMode::kRigid ? "rigid" : "none"},
+          {"places", comparison.n_places},
+          {"validation_places", comparison.validation_places},
+          {"floor",
+           {{"position_mm", nullUnless(comparison.floor_position_mm > 0.0, comparison.floor_position_mm)},
+            {"orientation_deg", nullUnless(comparison.floor_orientation_deg > 0.0, comparison.floor_orientation_deg)},
+            {"from", comparison.floor_from}}},
+          {"before",
+           {{"position_mm", statsToJson(comparison.before_position_mm)}, {"orientation_deg", before_orientation}}},
+          {"position", std::move(position)},
+          {"orientation", std::move(orientation)},
+          {"best", {{"position", comparison.best_position}, {"orientation", comparison.best_orientation}}},
+          {"verdict", verdictToJson(comparison.verdict)},
+          {"notes", comparison.notes}};
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "calib/evaluation/comparison.h"
+
+namespace fieldtrue {
+
+/// One hold-out: the rows fitted to, and the rows scored. No place is in both.
+struct Fold {
+  std::vector<std::size_t> fitted;
+  std::vector<std::size_t> scored;
+};
+
+/// Splits rows by place.
+/// @param nodes rows that count (skipped ones left out)
+/// @error kBadInput when the table has no rows with the roles that `role` needs; kTooFewNodes when nothing can be held
+/// out
+Result<std::vector<Fold>> makeFolds(std::span<const Node> nodes, const Validation& validation, std::uint64_t seed);
+
+/// Place numbers in order of first appearance.
+std::vector<int> placesOf(std::span<const Node> nodes);
+
+}  // namespace fieldtrue

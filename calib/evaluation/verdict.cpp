@@ -1,0 +1,154 @@
+#include "calib/evaluation/verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "calib/correctors/method_text.h"
+#include "calib/evaluation/resampling.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr double kNeededGain = 0.10;
+constexpr std::size_t kFewestPlaces = 3;
+/// Differences of the last bits are not a win: a millionth of a millimetre or of a degree.
+constexpr double kTie = 1e-6;
+
+/// Independent of the locale, which a desktop program sets and which may write a decimal comma.
+std::string fixedText(double value, int decimals) {
+  std::array<char, 64> buffer;
+  const auto written =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::fixed, decimals);
+  return written.ec == std::errc() ? std::string(buffer.data(), written.ptr) : std::string("?");
+}
+
+std::string errorText(double value) {
+  return fixedText(value, value >= 9.95 ? (value >= 99.5 ? 0 : 1) : (value >= 0.0995 ? 2 : 4));
+}
+
+std::string percentText(double fraction) { return fixedText(100.0 * fraction, std::abs(fraction) < 0.2 ? 1 : 0); }
+
+/// The id; with its settings where the same method was tried with several.
+std::string nameOf(const std::vector<MethodScore>& scores, std::size_t row) {
+  const MethodScore& score = scores[row];
+  const auto same =
+      std::count_if(scores.begin(), scores.end(), [&](const MethodScore& s) { return s.method == score.method; });
+  return same < 2 ? score.method : methodText(score.method, score.settings);
+}
+
+std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, double before_rms) {
+  std::optional<std::size_t> best;
+  double lowest = before_rms;
+  for (std::size_t row = 0; row < scores.size(); ++row) {
+    if (scores[row].skipped || !(scores[row].stats.rms < lowest - kTie)) continue;
+    lowest = scores[row].stats.rms;
+    best = row;
+  }
+  return best;
+}
+
+std::string intervalText(const GainTest& test) {
+  return "90 % interval " + percentText(test.low90) + " to " + percentText(test.high90) + " %";
+}
+
+/// Why a best method fails the rule; the sentence's middle, without a full stop.
+std::string whyNot(const GainTest& test, std::size_t n_places) {
+  if (n_places < kFewestPlaces) return ", and " + std::to_string(n_places) + " places are too few to judge by";
+  if (test.gain < kNeededGain) return ", and at least 10 % is needed";
+  if (test.low90 <= 0.0) return ", and the interval does not exclude zero";
+  const std::string without = ", and without place " + std::to_string(test.worst_place) + " it is " +
+                              percentText(test.gain_without_worst_place) + " %";
+  return test.gain_without_worst_place < kNeededGain ? without + " where 10 % is needed"
+                                                     : without + " with an interval that does not exclude zero";
+}
+
+std::string placesText(std::size_t n_places) {
+  return "on " + std::to_string(n_places) + " places the fits did not see";
+}
+
+std::string positionText(const Comparison& comparison, const std::string& do_not_apply) {
+  const GainTest& test = comparison.verdict.position;
+  const std::size_t n_places = comparison.places.size();
+  const std::string before = errorText(comparison.before_position_mm.rms) + " mm";
+  if (!comparison.best_position_row)
+    return do_not_apply + "no method does better than " +
+           (comparison.align == AlignMode::kRigid ? "the rigid alignment alone" : "the tracker as it is") + " (" +
+           before + ") " + placesText(n_places);
+  const MethodScore& best = comparison.position[*comparison.best_position_row];
+  const std::string name = nameOf(comparison.position, *comparison.best_position_row);
+  const std::string after = errorText(best.stats.rms) + " mm";
+  if (test.apply)
+    return "Apply " + name + ": error before " + before + ", after " + after + " (" + placesText(n_places) +
+           "), gain " + percentText(test.gain) + " % (" + intervalText(test) + ")";
+  return do_not_apply + "the best method, " + name + ", takes the error from " + before + " to " + after + " (" +
+         placesText(n_places) + "), a gain of " + percentText(test.gain) + " % (" + intervalText(test) + ")" +
+         whyNot(test, n_places);
+}
+
+std::string orientationText(const Comparison& comparison) {
+  if (!comparison.before_orientation_deg) return {};
+  const GainTest& test = comparison.verdict.orientation;
+  const std::string before = errorText(comparison.before_orientation_deg->rms);
+  if (!comparison.best_orientation_row) return "; orientation stays as it is (" + before + " degrees)";
+  const std::string name = nameOf(comparison.orientation, *comparison.best_orientation_row);
+  const std::string after = errorText(comparison.orientation[*comparison.best_orientation_row].stats.rms);
+  if (test.apply) return "; for orientation apply " + name + ": " + before + " degrees before, " + after + " after";
+  return "; orientation stays as it is (" + before + " degrees; the best method, " + name + ", gains " +
+         percentText(test.gain) + " %" + whyNot(test, comparison.places.size()) + ")";
+}
+
+}  // namespace
+
+GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
+                  std::uint64_t seed) {
+  FT_CHECK(places.size() == before.size() && before.size() == after.size());
+  GainTest test;
+  if (places.empty()) return test;
+  const PairedGain all = pairedGain(before, after, seed);
+  test.gain = all.gain;
+  test.low90 = all.low90;
+  test.high90 = all.high90;
+  const std::size_t worst = worstPlace(before, after);
+  test.worst_place = places[worst];
+  if (places.size() < kFewestPlaces) return test;
+  const auto without = [&](std::vector<double> errors) {
+    errors.erase(errors.begin() + static_cast<std::ptrdiff_t>(worst));
+    return errors;
+  };
+  const PairedGain rest = pairedGain(without(before), without(after), seed);
+  test.gain_without_worst_place = rest.gain;
+  test.low90_without_worst_place = rest.low90;
+  test.apply = all.low90 > 0.0 && all.gain >= kNeededGain && rest.low90 > 0.0 && rest.gain >= kNeededGain;
+  return test;
+}
+
+void judge(Comparison& comparison, std::uint64_t seed) {
+  Verdict& verdict = comparison.verdict;
+  comparison.best_position_row = bestRow(comparison.position, comparison.before_position_mm.rms);
+  if (const auto row = comparison.best_position_row) {
+    comparison.best_position = comparison.position[*row].method;
+    verdict.position =
+        testGain(comparison.places, comparison.before_place_mm, comparison.position[*row].place_errors, seed);
+  }
+  if (comparison.before_orientation_deg)
+    comparison.best_orientation_row = bestRow(comparison.orientation, comparison.before_orientation_deg->rms);
+  if (const auto row = comparison.best_orientation_row) {
+    comparison.best_orientation = comparison.orientation[*row].method;
+    verdict.orientation =
+        testGain(comparison.places, comparison.before_place_deg, comparison.orientation[*row].place_errors, seed);
+  }
+  verdict.apply_position = verdict.position.apply;
+  verdict.apply_orientation = verdict.orientation.apply;
+  verdict.gain_low90 = verdict.position.low90;
+  verdict.gain_high90 = verdict.position.high90;
+  verdict.gain_without_worst_place = verdict.position.gain_without_worst_place;
+  if (comparison.before_position_mm.rms <= comparison.floor_position_mm)
+    comparison.notes.push_back("The position error before correction is no larger than noise and jig tolerance make.");
+  const std::string do_not_apply =
+      verdict.apply_orientation ? "Do not apply a position correction: " : "Do not apply: ";
+  verdict.text = positionText(comparison, do_not_apply) + orientationText(comparison) + ".";
+}
+
+}  // namespace fieldtrue
