@@ -170,6 +170,17 @@ Result<std::string> readFile(const std::filesystem::path& path) {
   }
 }
 
+Result<std::ifstream> openForReading(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": it is a folder");
+  }
+  errno = 0;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": " + reasonText(errno));
+  return in;
+}
+
 Result<void> writeFileAtomically(const std::filesystem::path& path, const std::function<void(std::ostream&)>& write) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);

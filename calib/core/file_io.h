@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <ostream>
 #include <string>
@@ -11,6 +12,9 @@ namespace fieldtrue {
 
 /// The whole file as bytes. @error kIo with the system's reason.
 Result<std::string> readFile(const std::filesystem::path& path);
+
+/// A stream over the file's bytes, for readers that need not hold it whole. @error kIo with the system's reason
+Result<std::ifstream> openForReading(const std::filesystem::path& path);
 
 /// Writes beside, syncs to disk, renames over: the path holds either the old or the whole new content, never a part.
 /// @param write fills the stream

@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <fstream>
 #include <map>
-#include <system_error>
 #include <tuple>
 
 #include "calib/core/csv_reader.h"
@@ -313,14 +310,9 @@ using Read = Result<TableReading<Table>> (*)(std::istream&, const std::string&);
 
 template <class Table>
 Result<TableReading<Table>> readPath(const std::filesystem::path& path, Read<Table> read) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
-    return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": it is a folder");
-  }
-  errno = 0;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": " + std::generic_category().message(errno));
-  return read(in, path.filename().string());
+  Result<std::ifstream> in = openForReading(path);
+  if (!in) return tl::unexpected(in.error());
+  return read(*in, path.filename().string());
 }
 
 }  // namespace

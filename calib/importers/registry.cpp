@@ -1,1 +1,36 @@
+// To add an importer:
+// 1. Write calib/importers/<id>.h with `Importer <id>Importer();` and <id>.cpp with its row: id, label, source,
+// settings,
+//    whether it needs a truth file, and the reading function.
+// 2. Put the row into the table below.
+// 3. Add a test beside the others in tests/calib/importers; importer_contract_test checks the new row by itself.
+
 #include "calib/importers/registry.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "calib/importers/anser.h"
+#include "calib/importers/columns.h"
+#include "calib/importers/fcsv.h"
+#include "calib/importers/plus.h"
+#include "calib/importers/traj.h"
+
+namespace fieldtrue {
+
+std::span<const Importer> importers() {
+  static const std::vector<Importer> table{fcsvImporter(), anserImporter(), plusImporter(), columnsImporter(),
+                                           trajImporter()};
+  return table;
+}
+
+Result<const Importer*> findImporter(std::string_view id) {
+  const std::span<const Importer> rows = importers();
+  const auto found = std::find_if(rows.begin(), rows.end(), [&](const Importer& row) { return row.id == id; });
+  if (found != rows.end()) return &*found;
+  std::string known;
+  for (const Importer& row : rows) known += (known.empty() ? "" : ", ") + row.id;
+  return fail(ErrorCode::kBadInput, "There is no format '" + std::string(id) + "' to import; the formats are " + known);
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,99 @@
+#include "calib/importers/anser.h"
+
+#include <algorithm>
+#include <array>
+
+#include "calib/core/csv_reader.h"
+#include "calib/core/file_io.h"
+
+namespace fieldtrue {
+
+namespace {
+
+constexpr double kMm_m = 1e-3;
+constexpr std::array<std::string_view, 8> kColumns{"condition", "node",         "true_x_mm",    "true_y_mm",
+                                                   "true_z_mm", "tracked_x_mm", "tracked_y_mm", "tracked_z_mm"};
+
+Eigen::Vector3d position_m(CsvReader& reader, const std::vector<std::size_t>& columns, std::size_t first) {
+  const double x_mm = reader.number(columns[first]);
+  const double y_mm = reader.number(columns[first + 1]);
+  const double z_mm = reader.number(columns[first + 2]);
+  return kMm_m * Eigen::Vector3d(x_mm, y_mm, z_mm);
+}
+
+Node readNode(CsvReader& reader, const std::vector<std::size_t>& columns) {
+  Node node;
+  node.node = reader.integer(columns[1]);
+  node.reference_from_sensor.position_m = position_m(reader, columns, 2);
+  node.tracker_from_sensor.position_m = position_m(reader, columns, 5);
+  node.has_orientation = false;
+  return node;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+Result<Import> importAnser(const std::filesystem::path& path, const std::optional<std::filesystem::path>&,
+                           const Settings& settings) {
+  Result<std::ifstream> in = openForReading(path);
+  if (!in) return tl::unexpected(in.error());
+  Result<CsvReader> reader = CsvReader::open(*in, path.filename().string());
+  if (!reader) return tl::unexpected(reader.error());
+  const Result<std::vector<std::size_t>> columns = reader->require(kColumns);
+  if (!columns) return tl::unexpected(columns.error());
+  const std::string& wanted = choiceSetting(settings, "condition");
+  std::vector<std::string> found;
+  CalibrationTable table;
+  while (true) {
+    const Result<bool> more = reader->next();
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) break;
+    const std::string condition(reader->field((*columns)[0]));
+    if (std::find(found.begin(), found.end(), condition) == found.end()) found.push_back(condition);
+    if (condition != wanted) continue;
+    const Node node = readNode(*reader, *columns);
+    const bool is_repeated =
+        std::any_of(table.nodes.begin(), table.nodes.end(), [&](const Node& other) { return other.node == node.node; });
+    if (is_repeated) {
+      reader->failAt((*columns)[1], "node " + std::to_string(node.node) + " comes twice in condition " + wanted);
+    }
+    if (reader->error()) return tl::unexpected(*reader->error());
+    table.nodes.push_back(node);
+  }
+  if (table.nodes.empty()) {
+    return fail(ErrorCode::kBadInput,
+                reader->name() + " has no condition " + wanted + "; its conditions are " + joined(found));
+  }
+  table.metadata.tracker = "Anser EMT";
+  table.metadata.rig = "LEGO Duplo board, 31.75 mm pitch";
+  table.metadata.other["condition"] = wanted;
+  Import import;
+  import.notes.push_back("Condition " + wanted + " of " + joined(found));
+  import.notes.push_back("There is one position and no orientation at each place");
+  import.table = std::move(table);
+  return import;
+}
+
+}  // namespace
+
+Importer anserImporter() {
+  Setting condition;
+  condition.key = "condition";
+  condition.label = "Condition";
+  condition.type = SettingType::kChoice;
+  condition.default_value = std::string("standard_data_grid");
+  condition.choices = {"standard_data_grid", "interpolate_data_grid", "interpolate_data_grid_probe_calibrate",
+                       "finer_mesh_points",  "finer_mesh_3axis",      "steel_shield"};
+  condition.help = "Which of the table's recordings to take";
+  return {"anser",
+          "Anser EMT Duplo-board table (.csv)",
+          "Jaeger, O'Donoghue, Matlab-Anser, mapping/data_out",
+          {condition},
+          false,
+          importAnser};
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,106 @@
+#include "calib/importers/traj.h"
+
+#include <array>
+#include <string>
+
+#include "calib/core/csv_reader.h"
+#include "calib/core/file_io.h"
+
+namespace fieldtrue {
+
+namespace {
+
+/// The matrices are printed with six digits; more than this is no rotation.
+constexpr double kLargestRotationError = 1e-2;
+
+/// Four numbers of a line; none when it holds anything else.
+std::optional<Eigen::RowVector4d> numbersOf(std::string_view line) {
+  Eigen::RowVector4d row;
+  std::string_view rest = trimBlanks(line);
+  for (Eigen::Index column = 0; column < 4; ++column) {
+    const std::size_t end = std::min(rest.find_first_of(" \t"), rest.size());
+    const std::optional<double> value = parseFinite(rest.substr(0, end));
+    if (!value) return std::nullopt;
+    row[column] = *value;
+    rest = trimBlanks(rest.substr(end));
+  }
+  return rest.empty() ? std::optional(row) : std::nullopt;
+}
+
+/// What keeps a matrix from being a pose, empty when nothing.
+std::string wrongWith(const Eigen::Matrix4d& matrix) {
+  if (matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) return "the last row is not 0 0 0 1";
+  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (error > kLargestRotationError || R.determinant() < 0.0) return "its upper left part is not a rotation";
+  return {};
+}
+
+Result<std::vector<SampleRow>> readMatrices(std::istream& in, const std::string& name, double rate_hz) {
+  std::vector<SampleRow> rows;
+  Eigen::Matrix4d matrix;
+  Eigen::Index next_row = 0;
+  int line_number = 0;
+  const auto bad = [&](const std::string& what) {
+    return fail(ErrorCode::kBadInput, name + ", line " + std::to_string(line_number) + ": " + what);
+  };
+  for (std::string line; std::getline(in, line);) {
+    ++line_number;
+    if (trimBlanks(line).empty()) {
+      if (next_row != 0) return bad("a matrix has " + std::to_string(next_row) + " rows, it needs 4");
+      continue;
+    }
+    const std::optional<Eigen::RowVector4d> numbers = numbersOf(line);
+    if (!numbers) return bad("a row of a matrix needs 4 finite numbers, got '" + line.substr(0, 60) + "'");
+    matrix.row(next_row++) = *numbers;
+    if (next_row < 4) continue;
+    if (const std::string wrong = wrongWith(matrix); !wrong.empty()) return bad("the matrix is no pose: " + wrong);
+    next_row = 0;
+    SampleRow row;
+    row.sample.time_s = static_cast<double>(rows.size()) / rate_hz;
+    row.sample.tracker_from_sensor.position_m = matrix.topRightCorner<3, 1>();
+    row.sample.tracker_from_sensor.orientation =
+        canonical(Eigen::Quaterniond(Eigen::Matrix3d(matrix.topLeftCorner<3, 3>())));
+    rows.push_back(row);
+  }
+  if (next_row != 0) return bad("the file ends after " + std::to_string(next_row) + " of the 4 rows of a matrix");
+  if (rows.empty())
+    return fail(ErrorCode::kBadInput, name + " holds no matrix; it needs 4x4 matrices separated by blank lines");
+  return rows;
+}
+
+Result<Import> importTraj(const std::filesystem::path& path, const std::optional<std::filesystem::path>&,
+                          const Settings& settings) {
+  Result<std::ifstream> in = openForReading(path);
+  if (!in) return tl::unexpected(in.error());
+  const double rate_hz = numberSetting(settings, "rate_hz");
+  Result<std::vector<SampleRow>> rows = readMatrices(*in, path.filename().string(), rate_hz);
+  if (!rows) return tl::unexpected(rows.error());
+  Import import;
+  import.samples.emplace();
+  import.samples->metadata.frame = "tracker";
+  import.samples->metadata.rate_hz = rate_hz;
+  import.samples->rows = std::move(*rows);
+  import.notes.push_back("The file has no times; its rows were put " + formatNumber(1.0 / rate_hz) +
+                         " s apart, as the setting rate_hz says");
+  import.notes.push_back("A trajectory has no true positions: samples only");
+  return import;
+}
+
+}  // namespace
+
+Importer trajImporter() {
+  Setting rate;
+  rate.key = "rate_hz";
+  rate.label = "Rate";
+  rate.type = SettingType::kNumber;
+  rate.unit = "Hz";
+  rate.min = 0.001;
+  rate.max = 100000.0;
+  rate.default_value = 100.0;
+  rate.help = "Rows in a second; the file itself has no times";
+  return {"traj",    "Trajectory of 4x4 matrices in metres (.traj)", "RMonica, hand-polhemus-dataset", {rate}, false,
+          importTraj};
+}
+
+}  // namespace fieldtrue
