@@ -1,1 +1,94 @@
+// A new tracker:
+// 1. acquisition/protocols/<id>: bytes to samples and commands to bytes, pure functions, no I/O.
+// 2. acquisition/emulators/<id>: the device side, so that it can be tested without hardware.
+// 3. acquisition/devices/<id>_device: a TrackerDevice over a Transport.
+// 4. One row below. Menus, command line and the contract test read the table.
 #include "acquisition/devices/registry.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "acquisition/devices/fastrak_device.h"
+#include "acquisition/devices/simulated_device.h"
+#include "acquisition/transports/serial_ports.h"
+
+namespace fieldtrue {
+namespace {
+
+Result<Settings> readSettings(const std::string& owner, const std::vector<Setting>& declared, const std::string& text) {
+  if (text.empty()) return resolveSettings(owner, declared, {});
+  auto parsed = parseMethodText(owner + ":" + text);
+  if (!parsed) return tl::unexpected(parsed.error());
+  return resolveSettings(owner, declared, parsed->given);
+}
+
+Result<std::unique_ptr<TrackerDevice>> makeSimulated(const std::string& address, const Scene& scene) {
+  auto settings = readSettings("simulated", simulatedSettings(), address);
+  if (!settings) return tl::unexpected(settings.error());
+  auto setup = simulatedSetup(*settings);
+  if (!setup) return tl::unexpected(setup.error());
+  return SimulatedDevice::make(scene, *setup);
+}
+
+int baudOf(const std::string& line) {
+  int baud = FastrakSetup{}.baud;
+  const std::size_t at = line.rfind('@');
+  if (at != std::string::npos) std::from_chars(line.data() + at + 1, line.data() + line.size(), baud);
+  return baud;
+}
+
+Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const Scene&) {
+  const std::size_t comma = std::min(address.find(','), address.size());
+  const std::string line = address.substr(0, comma);
+  auto settings = readSettings("fastrak", fastrakSettings(), address.substr(std::min(comma + 1, address.size())));
+  if (!settings) return tl::unexpected(settings.error());
+  // Made once now, so that an address that cannot be read is refused here and not when the device is started.
+  if (auto readable = makeTransport(line); !readable) return tl::unexpected(readable.error());
+  FastrakSetup setup;
+  setup.where = line;
+  setup.device_text = "fastrak:" + line.substr(0, line.rfind('@'));
+  setup.baud = baudOf(line);
+  applyFastrakSettings(*settings, setup);
+  return std::make_unique<FastrakDevice>(std::move(setup), [line] { return makeTransport(line); });
+}
+
+}  // namespace
+
+std::span<const DeviceKind> deviceKinds() {
+  static const std::vector<DeviceKind> kKinds = {
+      {"simulated", "Simulated tracker", "nothing, or settings: simulated:speed=4,seed=2,travel_s=1",
+       "A Fastrak in a scene, with an operator who carries the jig", simulatedSettings(), makeSimulated},
+      {"fastrak", "Polhemus Fastrak",
+       "the line, then settings: fastrak:/dev/ttyUSB0@115200, fastrak:tcp:localhost:4000,hemisphere=-x",
+       "3SPACE Fastrak manual OPM00PI002 rev. G", fastrakSettings(), makeFastrak},
+  };
+  return kKinds;
+}
+
+Result<DeviceAddress> parseDevice(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  DeviceAddress device{text.substr(0, colon), colon == std::string::npos ? "" : text.substr(colon + 1)};
+  if (device.kind.empty()) {
+    return fail(ErrorCode::kBadInput, "No device is named; write e.g. simulated or fastrak:/dev/ttyUSB0@115200");
+  }
+  return device;
+}
+
+Result<std::unique_ptr<TrackerDevice>> makeDevice(const std::string& text, const Scene& scene) {
+  auto device = parseDevice(text);
+  if (!device) return tl::unexpected(device.error());
+  std::string known;
+  for (const auto& kind : deviceKinds()) {
+    if (kind.id == device->kind) return kind.make(device->address, scene);
+    known += (known.empty() ? "" : ", ") + kind.id;
+  }
+  return fail(ErrorCode::kBadInput, "\"" + device->kind + "\" is not a known device; known are " + known);
+}
+
+std::vector<SerialLine> serialLines() {
+  std::vector<SerialLine> lines;
+  for (const auto& port : listSerialPorts()) lines.push_back({port.path, port.description});
+  return lines;
+}
+
+}  // namespace fieldtrue

@@ -12,7 +12,8 @@ namespace fieldtrue {
 
 enum class DeviceState { kClosed, kConnecting, kRunning, kFailed };
 
-/// A tracker that streams. Lives in one thread; all I/O is asynchronous. One row of the device registry makes each kind.
+/// A tracker that streams. Lives in one thread; all I/O is asynchronous. One row of the device registry makes each
+/// kind.
 class TrackerDevice : public QObject {
   Q_OBJECT
  public:
@@ -22,7 +23,8 @@ class TrackerDevice : public QObject {
   virtual void start() = 0;
   virtual void stop() = 0;
 
-  /// Tells where the operator has been sent. Only the simulated tracker cares: its virtual operator carries the jig there.
+  /// Tells where the operator has been sent. Only the simulated tracker cares: its virtual operator carries the jig
+  /// there.
   /// @param reference_from_sensor true pose in the rig's frame
   virtual void guideTo(const Pose& /*reference_from_sensor*/) {}
 

@@ -30,11 +30,12 @@ Result<std::unique_ptr<Transport>> makeTcp(const std::string& address, std::stri
 }
 
 std::unique_ptr<Transport> makeLocal(const std::string& path, int baud) {
-  const std::string resolved = resolvedPath(path);
   std::vector<std::unique_ptr<LineDriver>> drivers;
-  if (!isPseudoTerminal(resolved) && isSerialPort(resolved)) drivers.push_back(makeSerialPortDriver());
+  const std::string resolved = resolvedPath(path);
+  const bool serial = !isPseudoTerminal(resolved) && isSerialPort(resolved);
+  if (serial) drivers.push_back(makeSerialPortDriver());
   drivers.push_back(makeTermiosDriver());
-  return std::make_unique<LocalTransport>(resolved, baud, std::move(drivers));
+  return std::make_unique<LocalTransport>(serial ? resolved : path, baud, std::move(drivers));
 }
 
 }  // namespace

@@ -1,0 +1,126 @@
+#include "acquisition/devices/simulated_device.h"
+
+#include <algorithm>
+
+namespace fieldtrue {
+namespace {
+
+FastrakSetup driverSetup(double speed, double rate_hz) {
+  FastrakSetup setup;
+  setup.where = "the simulated line";
+  setup.device_text = "simulated";
+  setup.hemisphere = "tracked";
+  setup.may_reset = false;
+  setup.rate_hz = rate_hz;
+  const auto scaled = [speed](int ms) { return std::max(2, static_cast<int>(ms / std::max(1.0, speed))); };
+  FastrakTimings& t = setup.timings;
+  t.settle_ms = scaled(t.settle_ms);
+  t.clear_ms = scaled(t.clear_ms);
+  t.command_ms = scaled(t.command_ms / 4);
+  t.quiet_ms = scaled(t.quiet_ms);
+  t.stop_quiet_ms = scaled(t.stop_quiet_ms);
+  return setup;
+}
+
+}  // namespace
+
+std::vector<Setting> simulatedSettings() {
+  const auto number = [](const char* key, const char* label, const char* unit, double min, double max, double value,
+                         const char* help) {
+    return Setting{key, label, SettingType::kNumber, unit, min, max, value, {}, help};
+  };
+  Setting fault{"fault",
+                "Fault",
+                SettingType::kChoice,
+                "",
+                0.0,
+                0.0,
+                std::string("none"),
+                {"none"},
+                "What the emulated tracker does wrong on purpose."};
+  for (const auto& row : emulatorFaults()) {
+    if (!row.needs_count) fault.choices.push_back(row.id);
+  }
+  return {
+      number("speed", "Speed", "", 0.1, 100.0, 1.0, "The tracker's seconds per second."),
+      Setting{"seed",
+              "Seed",
+              SettingType::kInteger,
+              "",
+              0.0,
+              2147483647.0,
+              std::int64_t{1},
+              {},
+              "Noise and placing errors follow from it."},
+      number("travel_s", "Travel", "s", 0.0, 60.0, 1.0, "Time the operator takes from one place to the next."),
+      number("tremor_m", "Tremor", "m", 0.0, 0.05, OperatorHabits{}.tremor_m, "Amplitude of the hand while carrying."),
+      fault,
+  };
+}
+
+Result<SimulatedSetup> simulatedSetup(const Settings& settings) {
+  SimulatedSetup setup;
+  setup.speed = numberSetting(settings, "speed");
+  setup.seed = static_cast<std::uint64_t>(integerSetting(settings, "seed"));
+  setup.habits.travel_s = numberSetting(settings, "travel_s");
+  setup.habits.tremor_m = numberSetting(settings, "tremor_m");
+  const std::string& fault = choiceSetting(settings, "fault");
+  if (fault == "none") return setup;
+  auto faults = parseFaults(fault);
+  if (!faults) return tl::unexpected(faults.error());
+  setup.faults = *faults;
+  return setup;
+}
+
+Result<std::unique_ptr<SimulatedDevice>> SimulatedDevice::make(const Scene& scene, const SimulatedSetup& setup) {
+  if (auto usable = TrackerSimulator::make(scene, setup.seed); !usable) return tl::unexpected(usable.error());
+  return std::unique_ptr<SimulatedDevice>(
+      new SimulatedDevice(scene, setup, driverSetup(setup.speed, scene.tracker.rate_hz)));
+}
+
+SimulatedDevice::SimulatedDevice(const Scene& scene, const SimulatedSetup& setup, FastrakSetup driver)
+    : FastrakDevice(
+          std::move(driver), [this] { return plugIn(); }, setup.speed),
+      scene_(scene),
+      simulated_(setup) {}
+
+Result<std::unique_ptr<Transport>> SimulatedDevice::plugIn() {
+  delete emulator_;
+  emulator_ = nullptr;
+  jig_ = nullptr;
+  auto simulator = TrackerSimulator::make(scene_, simulated_.seed);
+  if (!simulator) return tl::unexpected(simulator.error());
+  auto jig = std::make_unique<SimulatedJig>(std::move(*simulator), simulated_.habits, simulated_.seed);
+  jig_ = jig.get();
+  auto [host_end, device_end] = LoopbackTransport::pair();
+  FastrakEmulatorOptions options;
+  options.faults = simulated_.faults;
+  options.seed = simulated_.seed;
+  options.identity = "simulated: " + scene_.name;
+  auto emulator = makeFastrakEmulator(std::move(jig), std::move(device_end), options, simulated_.speed);
+  emulator->setParent(this);
+  if (auto started = emulator->start(); !started) return tl::unexpected(started.error());
+  emulator_ = emulator.release();
+  if (asked_) jig_->guideTo(*asked_, 0.0);
+  return std::move(host_end);
+}
+
+void SimulatedDevice::guideTo(const Pose& reference_from_sensor) {
+  asked_ = reference_from_sensor;
+  if (jig_) jig_->guideTo(reference_from_sensor, emulator_->time_s());
+}
+
+TableMetadata SimulatedDevice::describe() const {
+  TableMetadata metadata = FastrakDevice::describe();
+  metadata.tracker = "simulated Fastrak in " + scene_.name;
+  metadata.excitation = scene_.tracker.excitation;
+  metadata.carrier_hz = scene_.tracker.carrier_hz;
+  metadata.rate_hz = scene_.tracker.rate_hz;
+  metadata.rig = scene_.rig.name;
+  metadata.jig_tolerance_m = scene_.rig.tolerance_m;
+  metadata.jig_tolerance_rad = scene_.rig.tolerance_rad;
+  if (scene_.tracker.quantum_m > 0.0) metadata.quantum_m = scene_.tracker.quantum_m;
+  return metadata;
+}
+
+}  // namespace fieldtrue

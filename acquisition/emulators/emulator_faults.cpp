@@ -1,0 +1,82 @@
+#include "acquisition/emulators/emulator_faults.h"
+
+#include <algorithm>
+#include <charconv>
+#include <vector>
+
+namespace fieldtrue {
+
+std::span<const EmulatorFault> emulatorFaults() {
+  static const std::vector<EmulatorFault> kFaults = {
+      {"garbage_at_open", "200 random bytes before the first answer", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.garbage_at_open = true; }},
+      {"lost_bytes", "one byte in 400 is lost on the line", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.lost_bytes = true; }},
+      {"split_writes", "every answer and record comes in pieces of 1 to 7 bytes", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.split_writes = true; }},
+      {"error_status", "for one second in four the records carry error k (signal too low) and a wrong position", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.error_status = true; }},
+      {"hemisphere_flip", "for one second in four positions are mirrored through the transmitter", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.hemisphere_flip = true; }},
+      {"wrong_baud", "answers with 0xFF noise, as a line at the wrong rate does", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.wrong_baud = true; }},
+      {"unplug_after", "the line is pulled after N records", true,
+       [](EmulatorFaults& f, std::uint64_t n) { f.unplug_after = n; }},
+      {"silence", "never answers", false, [](EmulatorFaults& f, std::uint64_t) { f.silence = true; }},
+      {"already_streaming", "streams from the start, before anybody asks", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.already_streaming = true; }},
+      {"slow_reply", "every answer comes 0.6 s late", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.slow_reply = true; }},
+      {"outliers", "one record in a hundred is 0.1 to 0.3 m off", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.outliers = true; }},
+  };
+  return kFaults;
+}
+
+namespace {
+
+std::string knownFaults() {
+  std::string names;
+  for (const auto& fault : emulatorFaults()) {
+    names += (names.empty() ? "" : ", ") + fault.id + (fault.needs_count ? "=N" : "");
+  }
+  return names;
+}
+
+Result<void> applyFault(const std::string& text, EmulatorFaults& faults) {
+  const std::size_t equals = text.find('=');
+  const std::string id = text.substr(0, equals);
+  const auto rows = emulatorFaults();
+  const auto row = std::find_if(rows.begin(), rows.end(), [&id](const auto& fault) { return fault.id == id; });
+  if (row == rows.end()) {
+    return fail(ErrorCode::kBadInput, "\"" + id + "\" is not a fault; known are " + knownFaults());
+  }
+  std::uint64_t count = 0;
+  if (row->needs_count) {
+    const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), count);
+    if (number.empty() || error != std::errc() || end != number.data() + number.size() || count == 0) {
+      return fail(ErrorCode::kBadInput, "Fault " + id + " needs a count of at least 1: " + id + "=500");
+    }
+  } else if (equals != std::string::npos) {
+    return fail(ErrorCode::kBadInput, "Fault " + id + " takes no value, got \"" + text.substr(equals + 1) + "\"");
+  }
+  row->set(faults, count);
+  return {};
+}
+
+}  // namespace
+
+Result<EmulatorFaults> parseFaults(const std::string& list) {
+  EmulatorFaults faults;
+  for (std::size_t start = 0; start < list.size();) {
+    const std::size_t comma = std::min(list.find(',', start), list.size());
+    if (auto applied = applyFault(list.substr(start, comma - start), faults); !applied) {
+      return tl::unexpected(applied.error());
+    }
+    start = comma + 1;
+  }
+  return faults;
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "acquisition/emulators/emulated_tracker.h"
+#include "acquisition/emulators/emulator_faults.h"
+#include "acquisition/emulators/pose_source.h"
+#include "acquisition/protocols/fastrak.h"
+
+namespace fieldtrue {
+
+struct FastrakEmulatorOptions {
+  double reset_silence_s = 10.0;  ///< After ^Y.
+  std::string version = "G1.02";
+  std::string identity = "Fieldtrue Fastrak emulator";
+  EmulatorFaults faults;
+  std::uint64_t seed = 1;
+};
+
+/// A Fastrak without its line: interprets the commands of the manual and keeps their state. Hemisphere, alignment,
+/// boresight, tip offset, increment and envelopes act on the readings; filters, mounting frame, stylus mode and line
+/// rate are kept and read back only.
+class FastrakEmulatorCore : public EmulatedTracker {
+ public:
+  FastrakEmulatorCore(std::unique_ptr<PoseSource> source, FastrakEmulatorOptions options = {});
+
+  void receive(std::string_view bytes, double time_s, std::vector<EmulatedOutput>& out) override;
+  bool tick(double time_s, std::vector<EmulatedOutput>& out, int most_cycles = 256) override;
+  bool streaming() const override { return setup_.continuous; }
+
+  PoseSource& source() { return *source_; }
+  FastrakStatus status() const;
+  bool stationActive(int station) const { return setup_.active[static_cast<std::size_t>(station - 1)]; }
+  const std::vector<int>& outputList(int station) const { return setup_.items[static_cast<std::size_t>(station - 1)]; }
+  /// Numbers of a setting as last set, e.g. 'H' of station 2; station 0 for settings of the whole tracker ('x', 'v').
+  const std::vector<double>& numbers(char letter, int station) const;
+  /// Data records sent so far.
+  std::uint64_t records() const { return records_; }
+
+ private:
+  struct Setup {
+    FastrakFormat format = FastrakFormat::kAscii;
+    FastrakUnit unit = FastrakUnit::kInch;
+    bool continuous = false;
+    bool compensation = true;
+    std::array<bool, kFastrakStations> active{};
+    std::array<std::vector<int>, kFastrakStations> items;
+    std::map<std::pair<char, int>, std::vector<double>> numbers;
+    std::array<std::optional<Eigen::Quaterniond>, kFastrakStations> boresight;
+    std::array<Pose, kFastrakStations> tracker_from_aligned;
+    std::string identity;
+  };
+  struct Memory {
+    std::optional<Eigen::Vector3d> last_position_m;
+    std::optional<Eigen::Vector3d> last_sent_m;
+  };
+  using Handler = void (FastrakEmulatorCore::*)(const FastrakCommand&, std::vector<EmulatedOutput>&);
+  static const std::map<char, Handler>& handlers();
+
+  Setup factorySetup() const;
+  void obey(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void refuse(const FastrakCommand& command, int code, std::vector<EmulatedOutput>& out) const;
+  std::optional<int> stationOf(const FastrakCommand& command, std::vector<EmulatedOutput>& out) const;
+  void readBack(char letter, int station, const std::string& text, std::vector<EmulatedOutput>& out) const;
+
+  void setFlag(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void sendPoint(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void sendStatus(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void setContinuous(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void setOutputList(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void setActive(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void setBoresight(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void resetAlignment(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void setNumbers(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void setIdentity(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void restart(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void flow(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  void accept(const FastrakCommand&, std::vector<EmulatedOutput>&) {}
+  void realign(int station);
+  void changeUnit(FastrakUnit unit);
+
+  std::vector<int> activeSensors() const;
+  Sample misread(Sample sample, double time_s);
+  Pose reported(int station, const Pose& tracker_from_sensor) const;
+  char errorOf(const Sample& sample, int station, const Pose& pose) const;
+  void send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out);
+  FastrakLayout layout(int station) const;
+
+  std::unique_ptr<PoseSource> source_;
+  FastrakEmulatorOptions options_;
+  Setup setup_, saved_;
+  FastrakCommandReader reader_;
+  std::mt19937_64 random_;
+  std::array<Memory, kFastrakStations> memory_;
+  double now_s_ = 0.0;
+  double stream_start_s_ = 0.0;
+  double silent_until_s_ = 0.0;
+  std::uint64_t cycle_ = 0;
+  std::uint64_t records_ = 0;
+  bool paused_ = false;
+};
+
+}  // namespace fieldtrue

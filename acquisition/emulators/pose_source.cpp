@@ -1,0 +1,74 @@
+#include "acquisition/emulators/pose_source.h"
+
+#include <algorithm>
+
+#include "calib/core/error.h"
+
+namespace fieldtrue {
+
+StandingSource::StandingSource(std::vector<Pose> tracker_from_sensor, double rate_hz)
+    : poses_(std::move(tracker_from_sensor)), rate_hz_(rate_hz) {
+  FT_CHECK(!poses_.empty() && poses_.size() <= 4);
+}
+
+unsigned StandingSource::sensors() const { return (1u << poses_.size()) - 1u; }
+
+std::optional<double> StandingSource::due_s(std::uint64_t cycle, int active) const {
+  return static_cast<double>(cycle) * active / rate_hz_;
+}
+
+std::vector<Sample> StandingSource::read(std::uint64_t, std::span<const int> sensors, double time_s) {
+  return readNow(sensors, time_s);
+}
+
+std::vector<Sample> StandingSource::readNow(std::span<const int> sensors, double time_s) {
+  std::vector<Sample> samples;
+  for (const int sensor : sensors) {
+    const auto index = static_cast<std::size_t>(sensor);
+    if (index < poses_.size()) samples.push_back({time_s, sensor, poses_[index], {}});
+  }
+  return samples;
+}
+
+ReplaySource::ReplaySource(const SampleTable& table) {
+  FT_CHECK(!table.rows.empty());
+  double latest_s = 0.0;
+  for (const auto& row : table.rows) {
+    rows_.push_back(row.sample);
+    latest_s = std::max(latest_s, row.sample.time_s - table.rows.front().sample.time_s);
+    due_s_.push_back(latest_s);
+  }
+}
+
+unsigned ReplaySource::sensors() const {
+  unsigned map = 0;
+  for (const auto& row : rows_) {
+    if (row.sensor >= 0 && row.sensor < 4) map |= 1u << row.sensor;
+  }
+  return map;
+}
+
+std::optional<double> ReplaySource::due_s(std::uint64_t cycle, int) const {
+  return cycle < due_s_.size() ? std::optional(due_s_[cycle]) : std::nullopt;
+}
+
+std::vector<Sample> ReplaySource::read(std::uint64_t cycle, std::span<const int> sensors, double) {
+  const Sample& row = rows_.at(cycle);
+  if (std::find(sensors.begin(), sensors.end(), row.sensor) == sensors.end()) return {};
+  return {row};
+}
+
+std::vector<Sample> ReplaySource::readNow(std::span<const int> sensors, double) {
+  std::vector<Sample> samples;
+  for (const int sensor : sensors) {
+    const auto row = std::find_if(rows_.begin(), rows_.end(), [sensor](const auto& r) { return r.sensor == sensor; });
+    if (row != rows_.end()) samples.push_back(*row);
+  }
+  return samples;
+}
+
+double ReplaySource::rate_hz() const {
+  return due_s_.back() > 0.0 ? static_cast<double>(rows_.size() - 1) / due_s_.back() : 0.0;
+}
+
+}  // namespace fieldtrue
