@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Renders the pictures of README.md into resources/pictures, headless: the guided session in the window, page by page.
+# Needs a finished build (./test.sh or ./run.sh). `tests/pictures.sh FOLDER` writes somewhere else.
+set -euo pipefail
+root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+target="${1:-$root/resources/pictures}"
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+render() { # render NAME [VARIABLE=VALUE...]
+  local name="$1"
+  shift
+  mkdir -p "$work/$name"
+  env QT_QPA_PLATFORM=xcb XDG_RUNTIME_DIR="$work" FIELDTRUE_ARTEFACTS="$work/$name" "$@" \
+    xvfb-run --auto-servernum --server-args="-screen 0 2800x1800x24" \
+    "$root/build/ci/tests/widgets_guided_session_test" >"$work/$name.log" || { cat "$work/$name.log" >&2; exit 1; }
+}
+chmod 700 "$work"
+render light
+render dark FIELDTRUE_DARK=1
+mkdir -p "$target"
+cp "$work/light/4-acquire.png" "$target/acquire.png"
+cp "$work/light/5-compare.png" "$target/compare.png"
+cp "$work/dark/5-compare.png" "$target/compare-dark.png"
+cp "$work/light/3-plan.png" "$target/plan.png"
+if [ -n "${FIELDTRUE_ALL_PICTURES:-}" ]; then cp -r "$work/light" "$work/dark" "$target/"; fi
+echo "Pictures: $target"

@@ -1,0 +1,266 @@
+// A whole guided session in the window, by keys and clicks only: connect the simulated tracker, plan 5x5x4 places, take
+// 60 samples at each, compare, fit, export, close, reopen. Leaves a picture of every page in FIELDTRUE_ARTEFACTS (or
+// the folder `artefacts` beside the test).
+
+#include <QApplication>
+#include <QComboBox>
+#include <QDir>
+#include <QFileInfo>
+#include <QLabel>
+#include <QLineEdit>
+#include <QListWidget>
+#include <QPushButton>
+#include <QSettings>
+#include <QSlider>
+#include <QSpinBox>
+#include <QTableView>
+#include <QTemporaryDir>
+#include <QTest>
+#include <memory>
+
+#include "calib/core/table_io.h"
+#include "widgets/pages/main_window.h"
+#include "widgets/views/gl_format.h"
+#include "widgets/views/theme.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr int kPlaces = 5 * 5 * 4;
+constexpr int kWaitMs = 30000;
+
+}  // namespace
+
+class GuidedSessionTest : public QObject {
+  Q_OBJECT
+
+ private slots:
+  void initTestCase();
+  void startPageOffersWhatToDo();
+  void connectsTheSimulatedTracker();
+  void plansTheGrid();
+  void takesEveryPlace();
+  void undoSkipAndRetake();
+  void comparesTheMethods();
+  void fitsAndExports();
+  void reopensWhereItWas();
+
+ private:
+  template <class T>
+  T* find(const char* name) {
+    T* widget = window_->findChild<T*>(QString::fromLatin1(name));
+    if (!widget) qFatal("no widget named %s", name);
+    return widget;
+  }
+  void click(const char* name) { QTest::mouseClick(find<QWidget>(name), Qt::LeftButton); }
+  bool onPage(const char* name) { return find<QWidget>(name)->isVisible(); }
+  void openWindow();
+  void picture(const QString& name);
+  bool waitUntilStillAtPlace();
+  bool takeWith(Qt::Key key);
+  const AcquisitionStatus& status() { return window_->workbench().status(); }
+
+  QTemporaryDir folder_;
+  QString artefacts_;
+  QString session_;
+  std::unique_ptr<MainWindow> window_;
+};
+
+void GuidedSessionTest::initTestCase() {
+  QVERIFY(folder_.isValid());
+  qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
+  qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+  artefacts_ = qEnvironmentVariable("FIELDTRUE_ARTEFACTS", QStringLiteral("artefacts"));
+  QVERIFY(QDir().mkpath(artefacts_));
+  applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
+  openWindow();
+}
+
+void GuidedSessionTest::openWindow() {
+  window_ = std::make_unique<MainWindow>();
+  window_->resize(1280, 800);
+  window_->show();
+  window_->activateWindow();
+  QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
+}
+
+void GuidedSessionTest::picture(const QString& name) {
+  QTest::qWait(400);
+  const QString path = artefacts_ + QLatin1Char('/') + name + QStringLiteral(".png");
+  QVERIFY2(window_->grab().save(path), qPrintable(path));
+}
+
+void GuidedSessionTest::startPageOffersWhatToDo() {
+  QVERIFY(onPage("page_start"));
+  QVERIFY(find<QPushButton>("startDemo")->isVisible());
+  picture(QStringLiteral("1-start"));
+  click("step_acquire");
+  QVERIFY(onPage("page_acquire"));
+  picture(QStringLiteral("1-acquire-empty"));
+  click("step_start");
+  click("startConnect");
+  QVERIFY(onPage("page_connect"));
+}
+
+void GuidedSessionTest::connectsTheSimulatedTracker() {
+  auto* kind = find<QComboBox>("deviceKind");
+  QCOMPARE(kind->currentData().toString(), QStringLiteral("simulated"));
+  auto* speed = find<QWidget>("setting_speed");
+  QTest::keyClick(speed, Qt::Key_A, Qt::ControlModifier);
+  QTest::keyClicks(speed, QStringLiteral("10"));
+  QTest::keyClick(speed, Qt::Key_Tab);
+  QTest::keyClick(kind, Qt::Key_Tab);
+  click("connectButton");
+  QTRY_COMPARE_WITH_TIMEOUT(status().device, DeviceState::kRunning, kWaitMs);
+  QTRY_VERIFY_WITH_TIMEOUT(status().rate_hz > 10.0, kWaitMs);
+  picture(QStringLiteral("2-connect"));
+}
+
+void GuidedSessionTest::plansTheGrid() {
+  click("step_plan");
+  QVERIFY(onPage("page_plan"));
+  const std::pair<const char*, int> counts[] = {{"count_x", 5}, {"count_y", 5}, {"count_z", 4}};
+  for (const auto& [name, count] : counts) {
+    auto* box = find<QSpinBox>(name);
+    QTest::keyClick(box, Qt::Key_A, Qt::ControlModifier);
+    QTest::keyClicks(box, QString::number(count));
+    QCOMPARE(box->value(), count);
+  }
+  QCOMPARE(find<QSpinBox>("samplesPerNode")->value(), 60);
+  picture(QStringLiteral("3-plan"));
+  click("createSession");
+  QTRY_VERIFY_WITH_TIMEOUT(onPage("page_acquire"), kWaitMs);
+  QTRY_COMPARE_WITH_TIMEOUT(status().places.size(), std::size_t{kPlaces}, kWaitMs);
+  session_ = window_->workbench().sessionPath();
+  QVERIFY(QFileInfo::exists(session_));
+}
+
+bool GuidedSessionTest::waitUntilStillAtPlace() {
+  return QTest::qWaitFor(
+      [this] {
+        if (status().device != DeviceState::kRunning || !status().current || !status().still) return false;
+        const Pose planned = status().places[*status().current].reference_from_sensor;
+        const Pose live = status().reference_from_tracker * status().live->tracker_from_sensor;
+        return !status().reference_known || (planned.position_m - live.position_m).norm() < 0.15;
+      },
+      kWaitMs);
+}
+
+bool GuidedSessionTest::takeWith(Qt::Key key) {
+  const std::size_t done = status().n_done;
+  if (!waitUntilStillAtPlace()) return false;
+  QTest::keyClick(window_.get(), key);
+  return QTest::qWaitFor([this, done] { return status().n_done > done; }, kWaitMs);
+}
+
+void GuidedSessionTest::takesEveryPlace() {
+  for (int place = 0; place < kPlaces; ++place) {
+    QVERIFY2(takeWith(place % 2 == 0 ? Qt::Key_Space : Qt::Key_PageDown),
+             qPrintable(QStringLiteral("place %1: %2").arg(place).arg(status().reason)));
+    if (place == 37) picture(QStringLiteral("4-acquire"));
+  }
+  QCOMPARE(status().n_done, std::size_t{kPlaces});
+  QVERIFY(!status().current.has_value());
+  QTRY_COMPARE_WITH_TIMEOUT(window_->workbench().table().nodes.size(), std::size_t{kPlaces}, kWaitMs);
+  for (const Node& node : window_->workbench().table().nodes) QCOMPARE(node.n_used + node.n_rejected, 60);
+}
+
+void GuidedSessionTest::undoSkipAndRetake() {
+  QTest::keyClick(window_.get(), Qt::Key_U);
+  QTRY_COMPARE_WITH_TIMEOUT(status().n_done, std::size_t{kPlaces - 1}, kWaitMs);
+  QTest::keyClick(window_.get(), Qt::Key_S);
+  QTRY_COMPARE_WITH_TIMEOUT(status().n_skipped, std::size_t{1}, kWaitMs);
+  QTest::keyClick(window_.get(), Qt::Key_U);
+  QTRY_COMPARE_WITH_TIMEOUT(status().n_skipped, std::size_t{0}, kWaitMs);
+  QVERIFY(takeWith(Qt::Key_Space));
+
+  auto* list = find<QTableView>("placeList");
+  list->selectRow(12);
+  QTest::keyClick(window_.get(), Qt::Key_R);
+  QTRY_VERIFY_WITH_TIMEOUT(status().current == std::size_t{12}, kWaitMs);
+  picture(QStringLiteral("4-acquire-retake"));
+  QVERIFY(waitUntilStillAtPlace());
+  QTest::keyClick(window_.get(), Qt::Key_Space);
+  QTRY_VERIFY_WITH_TIMEOUT(!status().current.has_value(), kWaitMs);
+  QCOMPARE(status().n_done, std::size_t{kPlaces});
+}
+
+void GuidedSessionTest::comparesTheMethods() {
+  click("step_compare");
+  QVERIFY(onPage("page_compare"));
+  QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().comparison().has_value() && !window_->workbench().isComparing(),
+                           120000);
+  const Comparison& comparison = *window_->workbench().comparison();
+  QCOMPARE(comparison.places.size(), std::size_t{kPlaces});
+  // The room has a steel floor: its error is many times the noise, and smooth.
+  QVERIFY(comparison.verdict.apply_position);
+  QCOMPARE(find<QLabel>("verdict")->text(), QString::fromStdString(comparison.verdict.text));
+  auto* table = find<QTableView>("positionTable");
+  QCOMPARE(table->model()->rowCount(), static_cast<int>(comparison.position.size()));
+  picture(QStringLiteral("5-compare"));
+
+  auto* scale = find<QSlider>("glyphScale");
+  const int before = scale->value();
+  QTest::keyClick(scale, Qt::Key_PageUp);
+  QVERIFY(scale->value() != before);
+}
+
+void GuidedSessionTest::fitsAndExports() {
+  click("fit");
+  QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().corrector().has_value(), kWaitMs);
+  click("step_export");
+  QVERIFY(onPage("page_export"));
+  auto* list = find<QListWidget>("exportList");
+  auto* path = find<QLineEdit>("exportPath");
+  for (int row = 0; row < list->count(); ++row) {
+    list->setCurrentRow(row);
+    const QString target = folder_.filePath(QStringLiteral("out%1").arg(row));
+    QTest::keyClick(path, Qt::Key_A, Qt::ControlModifier);
+    QTest::keyClicks(path, target);
+    click("exportWrite");
+    QTRY_VERIFY2_WITH_TIMEOUT(QFileInfo::exists(target), qPrintable(list->item(row)->text()), kWaitMs);
+    QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("exportWrite")->isEnabled(), kWaitMs);
+    if (list->item(row)->text().contains(QStringLiteral("ftcal"), Qt::CaseInsensitive)) {
+      const auto loaded = Corrector::load(target.toStdString());
+      QVERIFY(loaded.has_value());
+      const Pose probe{Eigen::Vector3d(1.1, 0.1, 0.2), Eigen::Quaterniond::Identity()};
+      QCOMPARE(loaded->correct(probe).position_m, window_->workbench().corrector()->correct(probe).position_m);
+    }
+  }
+  picture(QStringLiteral("6-export"));
+}
+
+void GuidedSessionTest::reopensWhereItWas() {
+  const CalibrationTable before = window_->workbench().table();
+  window_->close();
+  window_.reset();
+  QVERIFY(!QFileInfo::exists(session_ + QStringLiteral("-wal")));
+
+  openWindow();
+  QVERIFY(onPage("page_start"));
+  window_->workbench().openSession(session_);
+  QTRY_VERIFY_WITH_TIMEOUT(onPage("page_export"), kWaitMs);
+  QTRY_COMPARE_WITH_TIMEOUT(window_->workbench().table().nodes.size(), before.nodes.size(), kWaitMs);
+  for (std::size_t i = 0; i < before.nodes.size(); ++i)
+    QCOMPARE(window_->workbench().table().nodes[i].tracker_from_sensor.position_m,
+             before.nodes[i].tracker_from_sensor.position_m);
+  QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().corrector().has_value(), kWaitMs);
+  QCOMPARE(QSettings().value(QStringLiteral("recent")).toStringList().first(), session_);
+  window_.reset();
+}
+
+}  // namespace fieldtrue
+
+int main(int argc, char** argv) {
+  if (qEnvironmentVariableIsEmpty("DISPLAY")) {
+    qInfo("skipped: there is no display; run it under xvfb-run");
+    return 0;
+  }
+  fieldtrue::setDefaultGlFormat();
+  QApplication application(argc, argv);
+  QApplication::setApplicationName(QStringLiteral("fieldtrue-test"));
+  fieldtrue::GuidedSessionTest test;
+  return QTest::qExec(&test, argc, argv);
+}
+
+#include "guided_session_test.moc"

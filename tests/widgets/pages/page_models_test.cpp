@@ -1,0 +1,179 @@
+#include <QApplication>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QSettings>
+#include <QSpinBox>
+#include <QTemporaryDir>
+#include <QTest>
+
+#include "widgets/pages/error_fields.h"
+#include "widgets/pages/place_list_model.h"
+#include "widgets/pages/score_model.h"
+#include "widgets/pages/settings_form.h"
+#include "widgets/pages/units.h"
+
+namespace fieldtrue {
+namespace {
+
+ErrorStats statsOf(double rms) { return {rms, rms, rms, rms, rms, rms, rms}; }
+
+// Two places; polynomial halves the error, hmq doubles it, affine cannot be used.
+Comparison smallComparison() {
+  Comparison comparison;
+  comparison.places = {3, 7};
+  comparison.before_position_mm = statsOf(10.0);
+  comparison.before_place_mm = {10.0, 10.0};
+  comparison.before_residual_m = {Eigen::Vector3d(0.01, 0, 0), Eigen::Vector3d(0, 0.01, 0)};
+  auto score = [](const char* method, double rms) {
+    MethodScore result;
+    result.method = method;
+    result.stats = statsOf(rms);
+    result.place_errors = {rms, rms};
+    result.residual_m = {Eigen::Vector3d(rms / 1000.0, 0, 0), Eigen::Vector3d(0, rms / 1000.0, 0)};
+    return result;
+  };
+  MethodScore unusable;
+  unusable.method = "affine";
+  unusable.skipped = "Affine needs 4 places, got 2";
+  comparison.position = {score("none", 10.0), score("polynomial", 5.0), score("hmq", 20.0), unusable};
+  comparison.best_position = "polynomial";
+  return comparison;
+}
+
+}  // namespace
+
+class PageModelsTest : public QObject {
+  Q_OBJECT
+
+ private slots:
+  void initTestCase() {
+    QVERIFY(folder_.isValid());
+    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+  }
+
+  void scoresMarkBestWorseAndUnusable() {
+    ScoreModel model(ScoreModel::Part::kPosition);
+    model.setComparison(smallComparison());
+    QCOMPARE(model.rowCount(), 4);  // Before, polynomial, hmq, affine; "none" is "before".
+    const int polynomial = model.rowOf(QStringLiteral("polynomial"));
+    const int hmq = model.rowOf(QStringLiteral("hmq"));
+    const int affine = model.rowOf(QStringLiteral("affine"));
+    QVERIFY(model.data(model.index(polynomial, 1), Qt::FontRole).value<QFont>().bold());
+    QVERIFY(!model.data(model.index(hmq, 1), Qt::FontRole).value<QFont>().bold());
+    QVERIFY(model.data(model.index(hmq, 0), Qt::DisplayRole).toString().contains(QStringLiteral("worse")));
+    QCOMPARE(model.data(model.index(polynomial, 1), Qt::DisplayRole).toString(), QStringLiteral("5.00"));
+    QCOMPARE(model.data(model.index(affine, 0), Qt::ToolTipRole).toString(),
+             QStringLiteral("Affine needs 4 places, got 2"));
+    QVERIFY(model.data(model.index(affine, 1), ScoreModel::kSortRole).toDouble() > 1e6);
+    QCOMPARE(model.toText().count(QLatin1Char('\n')), 4);
+  }
+
+  void settingsFormRoundTrips() {
+    const std::vector<Setting> declared = {
+        {"degree", "Degree", SettingType::kInteger, "", 1, 6, std::int64_t{3}, {}, ""},
+        {"radius", "Radius", SettingType::kNumber, "cm2", 10, 1000, 100.0, {}, ""},
+        {"smoothing", "Smoothing", SettingType::kAutoNumber, "", 0, 1, std::string("auto"), {}, ""},
+        {"robust", "Robust", SettingType::kBool, "", 0, 0, true, {}, ""},
+        {"frame", "Frame", SettingType::kChoice, "", 0, 0, std::string("tracker"), {"tracker", "sensor"}, ""}};
+    SettingsForm form;
+    form.setSettings(declared);
+    Settings expected;
+    for (const Setting& setting : declared) expected[setting.key] = setting.default_value;
+    QVERIFY(form.values() == expected);
+
+    int changes = 0;
+    connect(&form, &SettingsForm::changed, this, [&changes] { ++changes; });
+    form.findChild<QSpinBox*>(QStringLiteral("setting_degree"))->setValue(5);
+    form.findChild<QComboBox*>(QStringLiteral("setting_frame"))->setCurrentText(QStringLiteral("sensor"));
+    form.findChild<QDoubleSpinBox*>(QStringLiteral("setting_smoothing"))->setValue(0.25);
+    QCOMPARE(changes, 3);
+    expected["degree"] = std::int64_t{5};
+    expected["frame"] = std::string("sensor");
+    expected["smoothing"] = 0.25;
+    QVERIFY(form.values() == expected);
+    form.findChild<QSpinBox*>(QStringLiteral("setting_degree"))->setValue(99);
+    QVERIFY(form.values().at("degree") == SettingValue(std::int64_t{6}));
+  }
+
+  void fieldsShareOneScale() {
+    Comparison comparison = smallComparison();
+    comparison.before_position_mm.p95 = 41.0;
+    QCOMPARE(sharedScaleMax_mm(comparison), 50.0);
+    comparison.before_position_mm.p95 = 1.3;
+    QCOMPARE(sharedScaleMax_mm(comparison), 2.0);
+  }
+
+  void fieldArrowsStandAtTheTruePlaces() {
+    const Comparison comparison = smallComparison();
+    CalibrationTable table;
+    for (int number : {3, 7}) {
+      Node node;
+      node.node = number;
+      node.reference_from_sensor.position_m = Eigen::Vector3d(number, 0, 0);
+      table.nodes.push_back(node);
+    }
+    const ErrorField after = heldOutField(comparison, table, QStringLiteral("polynomial"), QString(), QString());
+    QCOMPARE(after.arrows.size(), std::size_t{2});
+    QCOMPARE(after.arrows[1].node, 7);
+    QCOMPARE(after.arrows[1].from_m, Eigen::Vector3d(7, 0, 0));
+    QCOMPARE(after.arrows[1].error_m, Eigen::Vector3d(0, 0.005, 0));
+    const ErrorField before = heldOutField(comparison, table, QString(), QString(), QString());
+    QCOMPARE(before.arrows[0].error_m, Eigen::Vector3d(0.01, 0, 0));
+  }
+
+  void placesTellTheirStateAndNumbers() {
+    std::vector<PlannedPlace> planned(2);
+    planned[1].node = 1;
+    PlaceListModel model;
+    model.setPlaces(planned);
+    model.setStates({PlaceState::kDone, PlaceState::kSkipped}, std::nullopt);
+    CalibrationTable table;
+    Node node;
+    node.n_used = 58;
+    node.n_rejected = 2;
+    node.covariance_m2 = Eigen::Matrix3d(Eigen::Vector3d(1e-6, 2e-6, 1e-6).asDiagonal());  // 3-D SD = 2 mm
+    table.nodes.push_back(node);
+    model.setTable(table);
+    auto text = [&model](int row, int column) {
+      return model.data(model.index(row, column), Qt::DisplayRole).toString();
+    };
+    QCOMPARE(text(0, 1), QStringLiteral("done"));
+    QCOMPARE(text(0, 2), QStringLiteral("58"));
+    QCOMPARE(text(0, 3), QStringLiteral("2.00"));
+    QCOMPARE(text(0, 4), QStringLiteral("2"));
+    QCOMPARE(text(1, 1), QStringLiteral("skipped"));
+    model.setStates({PlaceState::kDone, PlaceState::kSkipped}, 1);
+    QCOMPARE(text(1, 1), QStringLiteral("next"));
+  }
+
+  void threeFigures_data() {
+    QTest::addColumn<double>("value");
+    QTest::addColumn<QString>("text");
+    QTest::newRow("large") << 412.34 << "412";
+    QTest::newRow("tens") << 41.234 << "41.2";
+    QTest::newRow("ones") << 4.1234 << "4.12";
+    QTest::newRow("small") << 0.041234 << "0.0412";
+    QTest::newRow("zero") << 0.0 << "0";
+    QTest::newRow("negative") << -4.1234 << "-4.12";
+    QTest::newRow("unknown") << std::nan("") << "n/a";
+  }
+  void threeFigures() {
+    QFETCH(double, value);
+    QTEST(fieldtrue::threeFigures(value), "text");
+  }
+
+ private:
+  QTemporaryDir folder_;
+};
+
+}  // namespace fieldtrue
+
+int main(int argc, char** argv) {
+  qputenv("QT_QPA_PLATFORM", "offscreen");
+  QApplication application(argc, argv);
+  QApplication::setApplicationName(QStringLiteral("fieldtrue-test"));
+  fieldtrue::PageModelsTest test;
+  return QTest::qExec(&test, argc, argv);
+}
+
+#include "page_models_test.moc"
