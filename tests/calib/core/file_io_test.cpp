@@ -1,0 +1,161 @@
+#include "calib/core/file_io.h"
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <QTemporaryDir>
+#include <QTest>
+#include <charconv>
+#include <cmath>
+#include <csignal>
+#include <limits>
+#include <stdexcept>
+
+#include "tests/support/matchers.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
+  return writeFileAtomically(path, [&](std::ostream& out) { out << text; });
+}
+
+/// While it lives, no file of this process can grow beyond a size: what a full disk looks like.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+  ~FileSizeLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+std::size_t filesIn(const std::filesystem::path& folder) {
+  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
+}
+
+}  // namespace
+
+class FileIoTest : public QObject {
+  Q_OBJECT
+
+ private slots:
+  void init() {
+    QVERIFY(folder_.isValid());
+    path_ = std::filesystem::path(folder_.path().toStdString()) / "table.csv";
+    std::filesystem::remove_all(path_);
+  }
+
+  void writesAndReads() {
+    const std::string text = std::string("a\0b\r\n", 5) + std::string(200000, 'x');
+    FT_VERIFY_OK(writeText(path_, text));
+    const auto back = readFile(path_);
+    FT_VERIFY_OK(back);
+    QVERIFY(*back == text);
+    FT_VERIFY_OK(writeText(path_, ""));
+    QVERIFY(readFile(path_)->empty());
+    QCOMPARE(filesIn(path_.parent_path()), std::size_t{1});
+  }
+
+  void keepsPermissionsAndLinks() {
+    FT_VERIFY_OK(writeText(path_, "old"));
+    ::chmod(path_.c_str(), 0640);
+    const std::filesystem::path link = path_.parent_path() / "link.csv";
+    std::filesystem::create_symlink("table.csv", link);
+    FT_VERIFY_OK(writeText(link, "new"));
+    QVERIFY(std::filesystem::is_symlink(link));
+    QCOMPARE(*readFile(path_), std::string("new"));
+    struct stat status {};
+    QCOMPARE(::stat(path_.c_str(), &status), 0);
+    QCOMPARE(status.st_mode & 0777, mode_t{0640});
+    std::filesystem::remove(link);
+  }
+
+  void fullDiskLeavesTheOldFile() {
+    FT_VERIFY_OK(writeText(path_, "old"));
+    Result<void> written;
+    {
+      const FileSizeLimit limit(100000);
+      written = writeText(path_, std::string(500000, 'x'));
+    }
+    QVERIFY(!written);
+    QVERIFY(written.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(holdsAll(written.error().message,
+                             {"Cannot write", "table.csv", "File too large", "the file that was there is unchanged"}));
+    QCOMPARE(*readFile(path_), std::string("old"));
+    QCOMPARE(filesIn(path_.parent_path()), std::size_t{1});
+  }
+
+  void fullDeviceSaysSo() {
+    const auto written = writeText("/dev/full", "anything");
+    QVERIFY(!written);
+    QVERIFY(written.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(holdsAll(written.error().message, {"Cannot write /dev/full", "No space left on device"}));
+    QVERIFY(std::filesystem::is_character_file("/dev/full"));
+  }
+
+  void throwingWriterLeavesTheOldFile() {
+    FT_VERIFY_OK(writeText(path_, "old"));
+    const auto throwing = [](std::ostream& out) {
+      out << "half";
+      throw std::logic_error("mistake");
+    };
+    QVERIFY_EXCEPTION_THROWN((void)writeFileAtomically(path_, throwing), std::logic_error);
+    QCOMPARE(*readFile(path_), std::string("old"));
+    QCOMPARE(filesIn(path_.parent_path()), std::size_t{1});
+  }
+
+  void badPaths() {
+    const std::filesystem::path absent = path_.parent_path() / "absent" / "table.csv";
+    const auto written = writeText(absent, "text");
+    QVERIFY(!written);
+    FT_VERIFY_MATCH(holdsAll(written.error().message, {"absent/table.csv", "No such file or directory"}));
+    const auto folder = writeText(path_.parent_path(), "text");
+    QVERIFY(!folder);
+    FT_VERIFY_MATCH(holdsAll(folder.error().message, {"it is a folder"}));
+    const auto read = readFile(absent);
+    QVERIFY(!read && read.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(holdsAll(read.error().message, {"Cannot read", "absent/table.csv", "No such file or directory"}));
+    QVERIFY(!readFile(path_.parent_path()));
+    QVERIFY(!openForReading(absent) && !openForReading(path_.parent_path()));
+  }
+
+  void numbers_data() {
+    QTest::addColumn<double>("value");
+    QTest::addColumn<QString>("text");
+    QTest::newRow("tenth") << 0.1 << "0.1";
+    QTest::newRow("third") << 1.0 / 3.0 << "0.3333333333333333";
+    QTest::newRow("whole") << 1.0 << "1";
+    QTest::newRow("negative zero") << -0.0 << "-0";
+    QTest::newRow("smallest") << 5e-324 << "5e-324";
+    QTest::newRow("largest") << std::numeric_limits<double>::max() << "1.7976931348623157e+308";
+    QTest::newRow("nan") << -std::nan("") << "nan";
+  }
+  void numbers() {
+    QFETCH(double, value);
+    QFETCH(QString, text);
+    const std::string written = formatNumber(value);
+    QCOMPARE(QString::fromStdString(written), text);
+    if (std::isnan(value)) return;
+    double back = 0.0;
+    std::from_chars(written.data(), written.data() + written.size(), back);
+    FT_VERIFY_MATCH(sameBits(back, value));
+  }
+
+ private:
+  QTemporaryDir folder_;
+  std::filesystem::path path_;
+};
+
+QTEST_GUILESS_MAIN(FileIoTest)
+#include "file_io_test.moc"
