@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "calib/correctors/fit_data.h"
+#include "calib/correctors/registry.h"
+
+namespace fieldtrue::testing {
+
+using Displacement = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
+using Rotation = std::function<Eigen::Quaterniond(const Eigen::Vector3d&)>;
+
+/// Tracked positions on a grid that is shaken a little, so that no two coordinates repeat [m].
+inline std::vector<Eigen::Vector3d> shakenGrid(const std::array<int, 3>& counts, double pitch_m, double shake_m,
+                                               std::uint64_t seed = 5) {
+  std::mt19937_64 generator(seed);
+  std::uniform_real_distribution<double> uniform(-shake_m, shake_m);
+  std::vector<Eigen::Vector3d> points_m;
+  for (int i = 0; i < counts[0]; ++i)
+    for (int j = 0; j < counts[1]; ++j)
+      for (int k = 0; k < counts[2]; ++k)
+        points_m.emplace_back(0.4 + pitch_m * i + uniform(generator), -0.3 + pitch_m * j + uniform(generator),
+                              -0.2 + pitch_m * k + uniform(generator));
+  return points_m;
+}
+
+/// Fit data whose truth is tracked + displacement, and, with an error rotation, q_tracked = q_error q_true.
+inline FitData fitDataOf(const std::vector<Eigen::Vector3d>& p_tracked_m, const Displacement& displacement_m,
+                         const Rotation& q_error = {},
+                         const Eigen::Quaterniond& q_true = Eigen::Quaterniond::Identity()) {
+  FitData data;
+  for (std::size_t i = 0; i < p_tracked_m.size(); ++i) {
+    data.p_tracked_m.push_back(p_tracked_m[i]);
+    data.p_true_m.push_back(p_tracked_m[i] + displacement_m(p_tracked_m[i]));
+    data.node.push_back(static_cast<int>(i));
+    if (!q_error) continue;
+    data.q_true.push_back(q_true);
+    data.q_tracked.push_back(q_error(p_tracked_m[i]) * q_true);
+  }
+  return data;
+}
+
+/// Defaults of a method, with some settings given as text.
+template <class Model>
+Settings settingsOf(const CorrectionMethod<Model>& method, const std::map<std::string, std::string>& given = {}) {
+  return resolveSettings(method.id, method.settings, given).value();
+}
+
+/// Fits a method of the registry by id.
+inline Result<std::unique_ptr<PositionModel>> fitPosition(const std::string& id, const FitData& data,
+                                                          const std::map<std::string, std::string>& given = {}) {
+  const PositionMethod& method = *findPositionMethod(id).value();
+  return method.fit(data, settingsOf(method, given), {});
+}
+
+inline Result<std::unique_ptr<OrientationModel>> fitOrientation(const std::string& id, const FitData& data,
+                                                                const std::map<std::string, std::string>& given = {}) {
+  const OrientationMethod& method = *findOrientationMethod(id).value();
+  return method.fit(data, settingsOf(method, given), {});
+}
+
+/// Points in and a little around the shaken grid [m].
+inline std::vector<Eigen::Vector3d> randomPoints(std::size_t count, std::uint64_t seed = 17) {
+  std::mt19937_64 generator(seed);
+  std::uniform_real_distribution<double> uniform(-0.2, 1.4);
+  std::vector<Eigen::Vector3d> points_m(count);
+  for (Eigen::Vector3d& p_m : points_m)
+    p_m = Eigen::Vector3d(0.4 + uniform(generator), -0.3 + uniform(generator), -0.2 + uniform(generator));
+  return points_m;
+}
+
+}  // namespace fieldtrue::testing
