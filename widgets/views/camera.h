@@ -30,4 +30,7 @@ CameraPose interpolate(const CameraPose& a, const CameraPose& b, double t);
 
 void apply(const CameraPose& pose, vtkCamera* camera);
 
+/// The pose of a camera set by apply().
+CameraPose poseOf(vtkCamera* camera);
+
 }  // namespace fieldtrue

@@ -24,7 +24,7 @@ class HistogramView : public VtkHost {
 
  protected:
   void restyle(double pixel_ratio) override;
-  void resizeGL(int width, int height) override;
+  void prepareFrame() override;
   void mouseMoveEvent(QMouseEvent* event) override;
   void leaveEvent(QEvent* event) override;
 

@@ -38,7 +38,8 @@ class OrbitView : public VtkHost {
   void wheelEvent(QWheelEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
   void leaveEvent(QEvent* event) override;
-  void paintGL() override;
+  void resizeGL(int width, int height) override;
+  void prepareFrame() override;
 
   /// The space to show, for presets; changing it does not move a camera the user has placed.
   void setSpace(const SceneSpace& space);
@@ -51,16 +52,21 @@ class OrbitView : public VtkHost {
 
  private:
   std::optional<int> pointAt(const QPointF& position) const;
-  void observeCamera(vtkCamera* camera);
+  void observeCamera(vtkSmartPointer<vtkCamera> camera);
   void cameraModified();
+  double aspect() const;
+  void fitPreset();
+  void setHovered(std::optional<int> index);
   void turn(double azimuth_rad, double elevation_rad);
+  void move(const QPointF& pixels);
   void zoom(double factor);
 
   SceneSpace space_;
   Camera preset_ = Camera::kOperator;
   bool placed_by_user_ = false;
+  bool follows_ = false;  ///< Another view's camera is used; that view fits it.
   QVariantAnimation* easing_ = nullptr;
-  CameraPose drawn_;
+  CameraPose ease_from_, ease_to_, drawn_;
   vtkSmartPointer<vtkCamera> camera_;
   unsigned long camera_observer_ = 0;
   std::optional<int> hovered_;

@@ -42,6 +42,7 @@ class RoomView : public OrbitView {
 
  protected:
   void restyle(double pixel_ratio) override;
+  void prepareFrame() override;
   void showEvent(QShowEvent* event) override;
   void hideEvent(QHideEvent* event) override;
   std::vector<Eigen::Vector3d> pickPoints_m() const override;
@@ -49,11 +50,11 @@ class RoomView : public OrbitView {
   void pointClicked(int index) override;
 
  private:
-  void updateSpace();
   void updatePulse();
 
   std::unique_ptr<RoomScene> scene_;
   QTimer* pulse_ = nullptr;
+  int pulse_ms_ = 0;
 };
 
 }  // namespace fieldtrue

@@ -6,15 +6,14 @@
 #include <QOpenGLWidget>
 
 class vtkGenericOpenGLRenderWindow;
-class vtkGenericRenderWindowInteractor;
 class vtkRenderer;
 
 namespace fieldtrue {
 
 /// A VTK render window inside a Qt 6 window: one host for 3-D views and charts.
 ///
-/// VTK draws in the widget's own context; repaints are asked for with requestRender() and happen once per event loop
-/// turn.
+/// VTK draws in the widget's own context and never sees an event: views answer mouse and keys in Qt's terms; repaints
+/// are asked for with requestRender() and happen once per event loop turn.
 class VtkHost : public QOpenGLWidget {
   Q_OBJECT
  public:
@@ -42,24 +41,20 @@ class VtkHost : public QOpenGLWidget {
   void paintGL() override;
   bool event(QEvent* event) override;
 
-  /// Hands a mouse event to VTK's interactor (charts); 3-D views answer the mouse themselves.
-  void forwardToVtk(QEvent* event);
+  /// Called before every frame with the context current: put what follows the camera in its place.
+  virtual void prepareFrame() {}
 
   /// Applies colours and text sizes; called once when the view is first drawn, on a theme change and on a new pixel
   /// ratio.
   virtual void restyle(double pixel_ratio);
 
-  vtkGenericRenderWindowInteractor* interactor() const;
-
  private:
   void releaseGl();
   void blitToWidget();
-  void useContext();
   void restyleNow();
 
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> window_;
   vtkSmartPointer<vtkRenderer> renderer_;
-  vtkSmartPointer<vtkGenericRenderWindowInteractor> interactor_;
   double styled_ratio_ = 0.0;
 };
 

@@ -1,0 +1,28 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "widgets/views/theme.h"
+
+namespace fieldtrue {
+namespace {
+
+/// Ten equally spaced colours of viridis.
+constexpr std::array<QRgb, 10> kControlColors = {0x440154, 0x482878, 0x3e4989, 0x31688e, 0x26828e,
+                                                 0x1f9e89, 0x35b779, 0x6ece58, 0xb5de2b, 0xfde725};
+constexpr QRgb kUnknown = 0x9a9a9a;
+
+}  // namespace
+
+QColor magnitudeColor(double fraction) {
+  if (std::isnan(fraction)) return QColor(kUnknown);
+  const double along = std::clamp(fraction, 0.0, 1.0) * (kControlColors.size() - 1);
+  const auto below = std::min(static_cast<std::size_t>(along), kControlColors.size() - 2);
+  const double share = along - static_cast<double>(below);
+  const QColor a(kControlColors[below]);
+  const QColor b(kControlColors[below + 1]);
+  const auto mix = [share](int x, int y) { return static_cast<int>(std::lround(x + share * (y - x))); };
+  return QColor(mix(a.red(), b.red()), mix(a.green(), b.green()), mix(a.blue(), b.blue()));
+}
+
+}  // namespace fieldtrue

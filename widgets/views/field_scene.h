@@ -1,0 +1,65 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "widgets/views/error_field.h"
+#include "widgets/views/room_parts.h"
+
+namespace fieldtrue {
+
+/// What FieldView and renderFieldPicture draw. Setters only note the change; update() does the work before a frame.
+class FieldScene {
+ public:
+  explicit FieldScene(vtkRenderer* renderer);
+
+  void setField(const ErrorField& field);
+  void setScaleMax_mm(double scale_max_mm);
+  void setMagnification(double magnification);
+  void setShowOrientation(bool show);
+  void setAngleScaleMax_deg(double scale_max_deg);
+  void setSelected(std::optional<int> node);
+  void setHovered(std::optional<int> index);
+  void setUnit(LengthUnit unit);
+  void setStyle(const Theme& theme, double ratio);
+
+  const SceneSpace& space() const { return space_; }
+  const ErrorField& field() const { return field_; }
+  /// What hover says of an arrow, one line each: its name, its position error, its orientation error.
+  std::vector<std::string> describe(std::size_t index) const;
+
+  void update();
+  /// Turns marks and arcs to the camera of the moment.
+  void faceCamera();
+
+ private:
+  void updateArrows();
+  void updateMarks();
+  void updateArcs(const Eigen::Matrix3d& world_from_view);
+  void updateOverlay();
+  double angleScaleMax_deg() const;
+  bool arcsShown() const;
+
+  vtkRenderer* renderer_;
+  RoomBox box_;
+  TransmitterPart transmitter_part_;
+  MarkLayer places_, validation_, halo_;
+  ArrowLayer arrows_;
+  vtkSmartPointer<vtkActor> arcs_;
+  vtkSmartPointer<Overlay> overlay_;
+
+  ErrorField field_;
+  SceneSpace space_;
+  double scale_max_mm_ = 10.0;
+  double magnification_ = 10.0;
+  bool show_orientation_ = false;
+  std::optional<double> angle_scale_max_deg_;
+  std::optional<int> selected_, hovered_;
+  const Theme* theme_ = &Theme::of(false);
+  double ratio_ = 1.0;
+  bool changed_ = true, arcs_changed_ = true, overlay_changed_ = true;
+  Eigen::Matrix3d arcs_view_ = Eigen::Matrix3d::Zero();
+};
+
+}  // namespace fieldtrue

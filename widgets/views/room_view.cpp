@@ -1,0 +1,116 @@
+#include "widgets/views/room_view.h"
+
+#include <QTimer>
+
+#include "widgets/views/room_scene.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr int kPulseFrame_ms = 50;
+constexpr int kPulse_ms = 1400;
+
+}  // namespace
+
+RoomView::RoomView(QWidget* parent) : OrbitView(parent), scene_(std::make_unique<RoomScene>(renderer())) {
+  setAccessibleName(tr("Room with the places to visit"));
+  pulse_ = new QTimer(this);
+  pulse_->setInterval(kPulseFrame_ms);
+  connect(pulse_, &QTimer::timeout, this, [this] {
+    pulse_ms_ = (pulse_ms_ + kPulseFrame_ms) % kPulse_ms;
+    scene_->setPulse(static_cast<double>(pulse_ms_) / kPulse_ms);
+    requestRender();
+  });
+}
+
+RoomView::~RoomView() = default;
+
+void RoomView::setPlaces(const std::vector<PlannedPlace>& places) {
+  scene_->setPlaces(places);
+  setSpace(scene_->space());
+  updatePulse();
+}
+
+void RoomView::setStates(const std::vector<PlaceState>& states, std::optional<std::size_t> current) {
+  scene_->setStates(states, current);
+  updatePulse();
+  requestRender();
+}
+
+void RoomView::setTransmitter(const Pose& reference_from_tracker) {
+  const SceneSpace before = scene_->space();
+  scene_->setTransmitter(reference_from_tracker);
+  const SceneSpace& after = scene_->space();
+  // The guess of where the transmitter stands creeps while places are recorded: the camera follows a real move only.
+  const double moved_m = std::max((after.low_m - before.low_m).norm(), (after.high_m - before.high_m).norm());
+  if (moved_m > 0.25 * before.pitch_m.minCoeff()) setSpace(after);
+  requestRender();
+}
+
+void RoomView::setLive(const std::optional<Pose>& reference_from_sensor) {
+  scene_->setLive(reference_from_sensor);
+  requestRender();
+}
+
+void RoomView::setJig(const std::optional<Pose>& reference_from_sensor) {
+  scene_->setJig(reference_from_sensor);
+  requestRender();
+}
+
+void RoomView::setSelected(std::optional<int> place) {
+  scene_->setSelected(place);
+  requestRender();
+}
+
+void RoomView::setLengthUnit(LengthUnit unit) {
+  scene_->setUnit(unit);
+  requestRender();
+}
+
+void RoomView::setFloor(std::optional<double> floor_z_m) {
+  scene_->setFloor(floor_z_m);
+  setSpace(scene_->space());
+}
+
+void RoomView::restyle(double pixel_ratio) { scene_->setStyle(theme(), pixel_ratio); }
+
+void RoomView::prepareFrame() {
+  scene_->update();
+  scene_->faceCamera();
+  OrbitView::prepareFrame();
+}
+
+void RoomView::showEvent(QShowEvent* event) {
+  OrbitView::showEvent(event);
+  updatePulse();
+}
+
+void RoomView::hideEvent(QHideEvent* event) {
+  OrbitView::hideEvent(event);
+  pulse_->stop();
+}
+
+void RoomView::updatePulse() {
+  const bool wanted = scene_->hasCurrent() && isVisible();
+  if (wanted == pulse_->isActive()) return;
+  if (wanted)
+    pulse_->start();
+  else
+    pulse_->stop();
+}
+
+std::vector<Eigen::Vector3d> RoomView::pickPoints_m() const {
+  std::vector<Eigen::Vector3d> points;
+  for (const PlannedPlace& place : scene_->places()) points.push_back(place.reference_from_sensor.position_m);
+  return points;
+}
+
+void RoomView::pointHovered(std::optional<int> index) {
+  scene_->setHovered(index);
+  requestRender();
+  emit placeHovered(index.value_or(-1));
+}
+
+void RoomView::pointClicked(int index) { emit placeClicked(index); }
+
+}  // namespace fieldtrue
