@@ -56,7 +56,7 @@ Match near(const Pose& seen, const Pose& expected, double tolerance_m, double to
   return {position.ok && orientation.ok, "position: " + position.text + "\norientation: " + orientation.text};
 }
 
-Match near(const Eigen::MatrixXd& seen, const Eigen::MatrixXd& expected, double tolerance) {
+Match nearMatrix(const Eigen::MatrixXd& seen, const Eigen::MatrixXd& expected, double tolerance) {
   std::ostringstream text = stream();
   const bool same_shape = seen.rows() == expected.rows() && seen.cols() == expected.cols();
   const double apart = same_shape && seen.size() > 0 ? (seen - expected).cwiseAbs().maxCoeff() : 0.0;

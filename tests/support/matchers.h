@@ -24,7 +24,16 @@ Match near(double seen, double expected, double tolerance);
 Match near(const Eigen::Quaterniond& seen, const Eigen::Quaterniond& expected, double tolerance_rad);
 Match near(const Pose& seen, const Pose& expected, double tolerance_m, double tolerance_rad);
 /// Every entry within an absolute tolerance.
-Match near(const Eigen::MatrixXd& seen, const Eigen::MatrixXd& expected, double tolerance);
+Match nearMatrix(const Eigen::MatrixXd& seen, const Eigen::MatrixXd& expected, double tolerance);
+/// Expressions: as positions when they are 3-vectors, entry by entry when not.
+template <class Seen, class Expected>
+Match near(const Eigen::MatrixBase<Seen>& seen, const Eigen::MatrixBase<Expected>& expected, double tolerance) {
+  if constexpr (Seen::RowsAtCompileTime == 3 && Seen::ColsAtCompileTime == 1) {
+    return near(Eigen::Vector3d(seen), Eigen::Vector3d(expected), tolerance);
+  } else {
+    return nearMatrix(seen, expected, tolerance);
+  }
+}
 
 /// Bit for bit: no tolerance, zero signs included.
 Match sameBits(double seen, double expected);
