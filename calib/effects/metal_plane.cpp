@@ -46,7 +46,7 @@ Effect metalPlaneEffect() {
   Effect effect;
   effect.id = "metal_plane";
   effect.label = "Metal floor, wall or ceiling";
-  effect.source = "Jackson 1999, Classical Electrodynamics, section 5: method of images";
+  effect.source = "Jackson 1999, Classical Electrodynamics, problem 5.17 (method of images)";
   effect.parameters = {{"toward",
                         "",
                         "vector3",

@@ -13,7 +13,7 @@ namespace fieldtrue {
 /// limit with the tangential field zero on it. With the image at b
 ///   dG = strength G(p - b; C) I.
 /// Edges are not modelled and planes do not mirror each other.
-/// @source Jackson 1999, Classical Electrodynamics, section 5 (images in a permeable half-space); perfect conductor:
+/// @source Jackson 1999, Classical Electrodynamics, problem 5.17 (images in a permeable half-space); perfect conductor:
 /// the same with mu_r -> 0
 Effect metalPlaneEffect();
 

@@ -27,6 +27,12 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
+/// A name without its unit is one slip, however long the unit.
+std::size_t slips(std::string_view name, std::string_view known) {
+  const bool lacks_its_end = !name.empty() && known.starts_with(name);
+  return lacks_its_end ? std::min<std::size_t>(1, known.size() - name.size()) : editDistance(name, known);
+}
+
 bool isFiniteNumber(const nlohmann::json& value) { return value.is_number() && std::isfinite(value.get<double>()); }
 
 bool isNumberList(const nlohmann::json& value, std::size_t count) {
@@ -39,7 +45,7 @@ std::string withUnit(const char* unit) { return *unit == '\0' ? std::string() : 
 
 std::string nearestName(std::string_view name, const std::vector<std::string>& known) {
   const auto nearest = std::min_element(known.begin(), known.end(), [&](const std::string& a, const std::string& b) {
-    return editDistance(name, a) < editDistance(name, b);
+    return slips(name, a) < slips(name, b);
   });
   return nearest == known.end() ? std::string() : *nearest;
 }

@@ -12,7 +12,8 @@
 
 namespace fieldtrue {
 
-/// The known name that takes the fewest single-letter changes (Levenshtein 1966); empty when none is known.
+/// The known name that takes the fewest single-letter changes (Levenshtein 1966), or of which only the end is missing;
+/// empty when none is known.
 std::string nearestName(std::string_view name, const std::vector<std::string>& known);
 
 /// "x is not known; did you mean y? Known: y, z."

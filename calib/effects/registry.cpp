@@ -5,7 +5,7 @@
 //    receives them resolved; it only refuses what makes no sense together.
 // 3. Say in `admits` where a sensor cannot be.
 // 4. Add the row to the table below. Scenes, command line, reports and the contract test
-//    (tests/calib/effects/registry_test.cpp) loop over it.
+//    (tests/calib/effects/effect_registry_test.cpp) loop over it.
 // 5. Test the physics in tests/calib/effects/<id>_test.cpp against a boundary condition, a limit or a published figure.
 
 #include "calib/effects/registry.h"

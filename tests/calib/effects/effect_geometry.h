@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "calib/effects/registry.h"
+#include "calib/field/pose_solver.h"
+
+namespace fieldtrue::testing {
+
+/// The distortion of an effect, or the test's abort when it cannot be made.
+inline std::unique_ptr<CouplingDistortion> made(const std::string& id, const nlohmann::json& parameters) {
+  auto distortion = makeDistortion(id, parameters);
+  if (!distortion) throw std::runtime_error(distortion.error().message);
+  return std::move(*distortion);
+}
+
+/// What a tracker at the origin makes of a sensor with the identity orientation under one distortion, C = 1.
+inline Pose trackedPose(const CouplingDistortion& distortion, const Eigen::Vector3d& p_true_m) {
+  const Eigen::Matrix3d field = dipoleField(p_true_m, 1.0) + distortion.fieldChange(p_true_m, 1.0, 0.0);
+  return solvePose(field, 1.0, p_true_m).value().tracker_from_sensor;
+}
+
+}  // namespace fieldtrue::testing

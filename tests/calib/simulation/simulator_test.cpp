@@ -1,0 +1,222 @@
+#include "calib/simulation/simulator.h"
+
+#include <QTest>
+#include <cmath>
+
+#include "calib/effects/registry.h"
+#include "calib/field/coupling.h"
+#include "calib/field/pose_solver.h"
+#include "tests/support/matchers.h"
+#include "tests/support/random_geometry.h"
+
+using namespace fieldtrue;
+using fieldtrue::testing::holdsAll;
+using fieldtrue::testing::near;
+using fieldtrue::testing::RandomGeometry;
+using fieldtrue::testing::sameBits;
+
+namespace {
+
+Pose at(double x_m, double y_m, double z_m) { return {{x_m, y_m, z_m}, Eigen::Quaterniond::Identity()}; }
+
+TrackerSimulator simulatorOf(const Scene& scene, std::uint64_t seed = 1) {
+  return std::move(TrackerSimulator::make(scene, seed).value());
+}
+
+/// Transverse position error of successive readings of a still sensor on the X axis [m].
+std::vector<double> sidewaysErrors_m(TrackerSimulator& tracker, double range_m, int count) {
+  std::vector<double> errors_m;
+  for (int i = 0; i < count; ++i) {
+    const Sample sample = tracker.measure(at(range_m, 0.0, 0.0), i / tracker.scene().tracker.rate_hz);
+    errors_m.push_back(sample.tracker_from_sensor.position_m.y());
+  }
+  return errors_m;
+}
+
+double rms(const std::vector<double>& values) {
+  double squares = 0.0;
+  for (const double value : values) squares += value * value;
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+double lag1(const std::vector<double>& values) {
+  double products = 0.0;
+  for (std::size_t i = 1; i < values.size(); ++i) products += values[i] * values[i - 1];
+  return products / (rms(values) * rms(values) * static_cast<double>(values.size()));
+}
+
+}  // namespace
+
+class SimulatorTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void reportsTheTruePoseInACleanRoom();
+  void seesTheSceneFromTheTransmitter();
+  void addsItsEffects();
+  void scattersWithTheFourthPowerOfRange();
+  void keepsTheCorrelationOfItsFilter();
+  void forgetsWhenReset();
+  void roundsToItsQuantum();
+  void givesEverySensorItsOwnNoise();
+  void repeatsWithItsSeed();
+  void standsWithinTheAlignmentTolerance();
+  void marksReadingsWithoutAPose_data();
+  void marksReadingsWithoutAPose();
+  void refusesBadScenes();
+};
+
+void SimulatorTest::reportsTheTruePoseInACleanRoom() {
+  const TrackerSimulator tracker = simulatorOf(Scene{});
+  RandomGeometry random(1);
+  for (int i = 0; i < 500; ++i) {
+    const Pose truth = random.poseInShell(0.2, 4.0);
+    const Sample sample = tracker.measureExactly(truth, 1.5);
+    QCOMPARE(sample.status, "");
+    QCOMPARE(sample.time_s, 1.5);
+    FT_VERIFY_MATCH(near(sample.tracker_from_sensor, truth, 1e-9, 1e-9));
+  }
+}
+
+void SimulatorTest::seesTheSceneFromTheTransmitter() {
+  RandomGeometry random(2);
+  Scene scene;
+  scene.reference_from_tracker = random.poseInShell(1.0, 3.0);
+  const Pose tracker_from_sensor = random.poseInShell(0.5, 2.0);
+  const Sample sample = simulatorOf(scene).measureExactly(scene.reference_from_tracker * tracker_from_sensor, 0.0);
+  FT_VERIFY_MATCH(near(sample.tracker_from_sensor, tracker_from_sensor, 1e-9, 1e-9));
+}
+
+// Put together from the parts: the couplings of both effects' fields add.
+void SimulatorTest::addsItsEffects() {
+  const nlohmann::json floor = {{"distance_m", 1.8}};
+  const nlohmann::json body = {{"center_m", {1.0, 0.8, -0.6}}, {"radius_m", 0.15}};
+  Scene scene;
+  scene.effects = {{"metal_plane", floor}, {"compact_metal", body}};
+  const Pose truth{{1.4, 0.2, 0.3}, RandomGeometry(3).rotation()};
+  const Eigen::Vector3d& p_m = truth.position_m;
+  const Eigen::Matrix3d field = dipoleField(p_m, 1.0) +
+                                makeDistortion("metal_plane", floor).value()->fieldChange(p_m, 1.0, 0.0) +
+                                makeDistortion("compact_metal", body).value()->fieldChange(p_m, 1.0, 0.0);
+  const Pose expected = solvePose(couplings(field, truth.orientation), 1.0, p_m)->tracker_from_sensor;
+  const Pose seen = simulatorOf(scene).measureExactly(truth, 0.0).tracker_from_sensor;
+  FT_VERIFY_MATCH(near(seen, expected, 1e-12, 1e-12));
+  QVERIFY((seen.position_m - p_m).norm() > 0.01);
+}
+
+// Transverse SD = sqrt(5)/3 sigma r^4/C; 20,000 readings give it to 0.5 %.
+void SimulatorTest::scattersWithTheFourthPowerOfRange() {
+  Scene scene;
+  scene.tracker.coupling_noise = 1e-5;
+  for (const double range_m : {0.5, 1.0, 2.0, 3.0}) {
+    TrackerSimulator tracker = simulatorOf(scene);
+    const double expected_m = std::sqrt(5.0) / 3.0 * 1e-5 * std::pow(range_m, 4);
+    FT_VERIFY_MATCH(near(rms(sidewaysErrors_m(tracker, range_m, 20000)) / expected_m, 1.0, 0.02));
+  }
+}
+
+void SimulatorTest::keepsTheCorrelationOfItsFilter() {
+  for (const double rho : {0.0, 0.4, 0.8}) {
+    Scene scene;
+    scene.tracker.correlation = rho;
+    TrackerSimulator tracker = simulatorOf(scene);
+    const std::vector<double> errors_m = sidewaysErrors_m(tracker, 1.0, 20000);
+    FT_VERIFY_MATCH(near(lag1(errors_m), rho, 0.03));
+    FT_VERIFY_MATCH(near(rms(errors_m) / (std::sqrt(5.0) / 3.0 * 2e-4), 1.0, 0.04));
+  }
+}
+
+void SimulatorTest::forgetsWhenReset() {
+  Scene scene;
+  scene.tracker.correlation = 0.99;
+  TrackerSimulator tracker = simulatorOf(scene);
+  std::vector<double> errors_m;
+  for (int i = 0; i < 5000; ++i) {
+    errors_m.push_back(sidewaysErrors_m(tracker, 1.0, 1).front());
+    tracker.resetFilter(0);
+  }
+  FT_VERIFY_MATCH(near(lag1(errors_m), 0.0, 0.06));
+}
+
+void SimulatorTest::roundsToItsQuantum() {
+  Scene scene;
+  scene.tracker.quantum_m = 1e-3;
+  TrackerSimulator tracker = simulatorOf(scene);
+  const Pose truth = at(1.51234, -0.40017, 0.30049);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d steps = tracker.measure(truth, i / 120.0).tracker_from_sensor.position_m / 1e-3;
+    FT_VERIFY_MATCH(near((steps.array() - steps.array().round()).matrix().norm(), 0.0, 1e-9));
+  }
+  FT_VERIFY_MATCH(near(tracker.measureExactly(truth, 0.0).tracker_from_sensor.position_m, truth.position_m, 1e-9));
+}
+
+void SimulatorTest::givesEverySensorItsOwnNoise() {
+  TrackerSimulator both = simulatorOf(Scene{});
+  TrackerSimulator alone = simulatorOf(Scene{});
+  double products = 0.0;
+  double squares = 0.0;
+  for (int i = 0; i < 5000; ++i) {
+    const Sample first = both.measure(at(1.0, 0.0, 0.0), i / 120.0, 0);
+    const Sample second = both.measure(at(1.0, 0.0, 0.0), i / 120.0, 1);
+    QCOMPARE(second.sensor, 1);
+    products += first.tracker_from_sensor.position_m.y() * second.tracker_from_sensor.position_m.y();
+    squares += first.tracker_from_sensor.position_m.y() * first.tracker_from_sensor.position_m.y();
+    FT_VERIFY_MATCH(
+        sameBits(first.tracker_from_sensor, alone.measure(at(1.0, 0.0, 0.0), i / 120.0, 0).tracker_from_sensor));
+  }
+  FT_VERIFY_MATCH(near(products / squares, 0.0, 0.06));
+}
+
+void SimulatorTest::repeatsWithItsSeed() {
+  const auto first = [](std::uint64_t seed) {
+    TrackerSimulator tracker = simulatorOf(Scene{}, seed);
+    return tracker.measure(at(1.0, 0.5, 0.0), 0.0).tracker_from_sensor;
+  };
+  FT_VERIFY_MATCH(sameBits(first(3), first(3)));
+  QVERIFY(first(3).position_m != first(4).position_m);
+}
+
+// The transmitter of each seed stands elsewhere, by the tolerance in each axis; 400 seeds give the SD to 2 %.
+void SimulatorTest::standsWithinTheAlignmentTolerance() {
+  Scene scene;
+  scene.rig.alignment_known = true;
+  scene.rig.alignment_tolerance_m = 0.01;
+  scene.rig.alignment_tolerance_rad = 0.0;
+  double squares_m2 = 0.0;
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+    const Sample sample = simulatorOf(scene, seed).measureExactly(at(1.0, 0.0, 0.0), 0.0);
+    squares_m2 += (sample.tracker_from_sensor.position_m - Eigen::Vector3d(1.0, 0.0, 0.0)).squaredNorm() / 1200.0;
+  }
+  FT_VERIFY_MATCH(near(std::sqrt(squares_m2), 0.01, 0.0009));
+}
+
+void SimulatorTest::marksReadingsWithoutAPose_data() {
+  QTest::addColumn<double>("x_m");
+  QTest::addColumn<double>("z_m");
+  QTest::addColumn<QString>("status");
+  QTest::newRow("good") << 1.0 << 0.0 << "";
+  QTest::newRow("too near") << 0.05 << 0.0 << "j";
+  QTest::newRow("in the transmitter") << 0.0 << 0.0 << "j";
+  QTest::newRow("too far") << 20.0 << 0.0 << "k";
+  QTest::newRow("below the floor") << 1.0 << -2.5 << "k";
+}
+
+void SimulatorTest::marksReadingsWithoutAPose() {
+  QFETCH(double, x_m);
+  QFETCH(double, z_m);
+  QFETCH(QString, status);
+  Scene scene;
+  scene.effects = {{"metal_plane", {{"distance_m", 2.0}, {"strength", 0.0}}}};
+  TrackerSimulator tracker = simulatorOf(scene);
+  QCOMPARE(QString::fromStdString(tracker.measure(at(x_m, 0.0, z_m), 0.0).status), status);
+  QCOMPARE(QString::fromStdString(tracker.measureExactly(at(x_m, 0.0, z_m), 0.0).status), status);
+}
+
+void SimulatorTest::refusesBadScenes() {
+  Scene scene;
+  scene.name = "attic";
+  scene.effects = {{"metal_plane", {}}, {"metal_roof", {}}};
+  FT_VERIFY_MATCH(holdsAll(TrackerSimulator::make(scene, 1).error().message, {"attic", "effect 2", "metal_roof"}));
+}
+
+QTEST_GUILESS_MAIN(SimulatorTest)
+#include "simulator_test.moc"
