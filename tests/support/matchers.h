@@ -25,14 +25,11 @@ Match near(const Eigen::Quaterniond& seen, const Eigen::Quaterniond& expected, d
 Match near(const Pose& seen, const Pose& expected, double tolerance_m, double tolerance_rad);
 /// Every entry within an absolute tolerance.
 Match nearMatrix(const Eigen::MatrixXd& seen, const Eigen::MatrixXd& expected, double tolerance);
-/// Expressions: as positions when they are 3-vectors, entry by entry when not.
+/// Matrices, entry by entry.
 template <class Seen, class Expected>
-Match near(const Eigen::MatrixBase<Seen>& seen, const Eigen::MatrixBase<Expected>& expected, double tolerance) {
-  if constexpr (Seen::RowsAtCompileTime == 3 && Seen::ColsAtCompileTime == 1) {
-    return near(Eigen::Vector3d(seen), Eigen::Vector3d(expected), tolerance);
-  } else {
-    return nearMatrix(seen, expected, tolerance);
-  }
+requires(Seen::SizeAtCompileTime != 3) Match
+    near(const Eigen::MatrixBase<Seen>& seen, const Eigen::MatrixBase<Expected>& expected, double tolerance) {
+  return nearMatrix(seen, expected, tolerance);
 }
 
 /// Bit for bit: no tolerance, zero signs included.
