@@ -1,4 +1,6 @@
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <vector>
 
 #include "calib/core/statistics.h"
 #include "calib/correctors/corrector.h"
@@ -21,15 +23,62 @@ Result<void> checkRows(std::span<const Node> nodes) {
   return {};
 }
 
-/// The constant rotation between holder and sensor that the tracked orientations show once the frames are aligned.
+/// Truth and reading of one row's orientation, both in the tracker frame.
+struct OrientationPair {
+  Eigen::Quaterniond tracker_from_mount;   ///< What the rig says.
+  Eigen::Quaterniond tracker_from_sensor;  ///< What the tracker said.
+};
+
+/// One step towards the mounting while the tracker's own mean rotation error is free too: turned in its holder to
+/// several orientations, a sensor tells the two apart, and a mean error must not pass for mounting. Where the
+/// orientations do not tell them apart (all alike, or all turned about one axis), what cannot be told counts as
+/// mounting.
+/// @param q_error mean error rotation, tracker frame; improved
+/// @param sensor_from_mount improved
+void improveMounting(const std::vector<OrientationPair>& pairs, Eigen::Quaterniond& q_error,
+                     Eigen::Quaterniond& sensor_from_mount) {
+  // Residual r_i = A_i e + m to first order, e the change of the error (tracker frame), m that of the mounting (its
+  // frame).
+  constexpr double kToldApart = 0.01;  // sin^2 of 6 degrees between orientations.
+  Eigen::Matrix3d mean_a = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d mean_r = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_a_r = Eigen::Vector3d::Zero();
+  const double weight = 1.0 / static_cast<double>(pairs.size());
+  for (const OrientationPair& pair : pairs) {
+    const Eigen::Quaterniond predicted = q_error * pair.tracker_from_sensor * sensor_from_mount;
+    const Eigen::Matrix3d A = predicted.conjugate().toRotationMatrix();
+    const Eigen::Vector3d r = rotationVector_rad(predicted.conjugate() * pair.tracker_from_mount);
+    mean_a += weight * A;
+    mean_r += weight * r;
+    mean_a_r += weight * (A.transpose() * r);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> reduced(Eigen::Matrix3d::Identity() -
+                                                               mean_a.transpose() * mean_a);
+  const Eigen::Vector3d right_side = mean_a_r - mean_a.transpose() * mean_r;
+  Eigen::Vector3d e = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k)
+    if (reduced.eigenvalues()[k] > kToldApart)
+      e += reduced.eigenvectors().col(k) * (reduced.eigenvectors().col(k).dot(right_side) / reduced.eigenvalues()[k]);
+  q_error = (rotationFromVector(e) * q_error).normalized();
+  sensor_from_mount = (sensor_from_mount * rotationFromVector(mean_r - mean_a * e)).normalized();
+}
+
+/// The constant rotation between holder and sensor that the orientations show once the frames are aligned.
 Eigen::Quaterniond fitMounting(std::span<const Node> nodes, const Eigen::Quaterniond& reference_from_tracker) {
+  std::vector<OrientationPair> pairs;
   std::vector<Eigen::Quaterniond> sensor_from_mount;
   for (const Node& node : nodes) {
     if (!node.has_orientation) continue;
-    const Eigen::Quaterniond reference_from_sensor = reference_from_tracker * node.tracker_from_sensor.orientation;
-    sensor_from_mount.push_back(reference_from_sensor.conjugate() * node.reference_from_sensor.orientation);
+    pairs.push_back({reference_from_tracker.conjugate() * node.reference_from_sensor.orientation,
+                     node.tracker_from_sensor.orientation});
+    sensor_from_mount.push_back(pairs.back().tracker_from_sensor.conjugate() * pairs.back().tracker_from_mount);
   }
-  return sensor_from_mount.empty() ? Eigen::Quaterniond::Identity() : canonical(meanRotation(sensor_from_mount));
+  if (pairs.empty()) return Eigen::Quaterniond::Identity();
+  constexpr int kSteps = 6;  // Quadratic convergence from the mean; the third step already moves less than 1e-9 rad.
+  Eigen::Quaterniond mounting = meanRotation(sensor_from_mount);
+  Eigen::Quaterniond q_error = Eigen::Quaterniond::Identity();
+  for (int step = 0; step < kSteps; ++step) improveMounting(pairs, q_error, mounting);
+  return canonical(mounting);
 }
 
 }  // namespace
