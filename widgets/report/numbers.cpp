@@ -34,6 +34,11 @@ std::string significantText(double value, int digits) {
   return decimalText(rounded_value, std::clamp(digits - 1 - exponent, 0, 400));
 }
 
+std::string errorFigure(double value) {
+  const bool tiny = value > 0.0 && value < 0.001;
+  return tiny ? "<0.001" : significantText(value);
+}
+
 std::string durationText(double seconds) {
   if (seconds < 1e-6) return significantText(seconds * 1e9) + " ns";
   if (seconds < 1e-3) return significantText(seconds * 1e6) + " us";

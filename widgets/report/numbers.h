@@ -9,6 +9,9 @@ namespace fieldtrue {
 /// @return "n/a" for NaN and infinity
 std::string significantText(double value, int digits = 3);
 
+/// An error in its usual unit (mm, degrees): three significant digits, and "<0.001" instead of rounding noise.
+std::string errorFigure(double value);
+
 /// A number with a fixed count of decimals; "n/a" for NaN and infinity.
 std::string decimalText(double value, int decimals);
 

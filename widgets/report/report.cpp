@@ -24,10 +24,10 @@ std::string alignText(AlignMode align) {
 /// "RMS 41.2 mm before, 3.20 mm after (90 % interval 2.80 to 3.60 mm), on 100 places the fit did not see."
 std::string leadText(const Comparison& comparison) {
   const ErrorStats& before = comparison.before_position_mm;
-  std::string text = "Position RMS " + significantText(before.rms) + " mm before";
+  std::string text = "Position RMS " + errorFigure(before.rms) + " mm before";
   if (const MethodScore* best = bestPosition(comparison)) {
-    text += ", " + significantText(best->stats.rms) + " mm after " + positionLabel(best->method) + " (90 % interval " +
-            significantText(best->stats.rms_low90) + " to " + significantText(best->stats.rms_high90) + " mm)";
+    text += ", " + errorFigure(best->stats.rms) + " mm after " + positionLabel(best->method) + " (90 % interval " +
+            errorFigure(best->stats.rms_low90) + " to " + errorFigure(best->stats.rms_high90) + " mm)";
   }
   return text + ", on " + std::to_string(comparison.places.size()) + " places the fit did not see.";
 }
@@ -103,8 +103,8 @@ void writeMeasured(HtmlWriter& html, const ReportInput& input) {
   const MeasurementSummary summary = measurementSummary(input.table);
   html.element("h2", "What was measured");
   FactList facts(html);
-  facts.add("Places", std::to_string(comparison.n_places) + ", of which " +
-                          std::to_string(comparison.validation_places) + " for validation");
+  facts.add("Places", std::to_string(comparison.n_places) + ", of which " + std::to_string(comparison.places.size()) +
+                          " were scored by fits that did not see them");
   facts.add("Rows", std::to_string(summary.n_rows) + ", " + std::to_string(summary.n_skipped_rows) + " skipped");
   facts.add("Sensors", std::to_string(summary.n_sensors));
   facts.add("Samples", std::to_string(summary.n_used) + " used, " + std::to_string(summary.n_rejected) + " rejected");

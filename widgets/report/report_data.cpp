@@ -9,19 +9,13 @@
 #include "calib/core/file_io.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/registry.h"
+#include "widgets/report/numbers.h"
 
 namespace fieldtrue {
 namespace {
 
 constexpr double kMmPerM = 1000.0;
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-
-const MethodScore* findScore(const std::vector<MethodScore>& scores, const std::string& id) {
-  if (id == "none") return nullptr;
-  const auto found = std::find_if(scores.begin(), scores.end(),
-                                  [&](const MethodScore& score) { return score.method == id && !score.skipped; });
-  return found == scores.end() ? nullptr : &*found;
-}
 
 std::optional<double> sd_mm(const Node& node) {
   if (!node.covariance_m2) return std::nullopt;
@@ -67,11 +61,11 @@ PlaceSummary summarise(int node, const std::vector<const Node*>& rows) {
 }  // namespace
 
 const MethodScore* bestPosition(const Comparison& comparison) {
-  return findScore(comparison.position, comparison.best_position);
+  return comparison.best_position_row ? &comparison.position.at(*comparison.best_position_row) : nullptr;
 }
 
 const MethodScore* bestOrientation(const Comparison& comparison) {
-  return findScore(comparison.orientation, comparison.best_orientation);
+  return comparison.best_orientation_row ? &comparison.orientation.at(*comparison.best_orientation_row) : nullptr;
 }
 
 std::vector<PlaceSummary> placeSummaries(const ReportInput& input) {
@@ -87,6 +81,7 @@ std::vector<PlaceSummary> placeSummaries(const ReportInput& input) {
     PlaceSummary place = summarise(comparison.places[i], rows_of[comparison.places[i]]);
     place.before_mm = comparison.before_place_mm[i];
     place.before_m = comparison.before_residual_m[i];
+    if (!comparison.before_place_deg.empty()) place.before_deg = comparison.before_place_deg[i];
     place.after_mm = best != nullptr ? best->place_errors[i] : place.before_mm;
     place.after_m = best != nullptr ? best->residual_m[i] : place.before_m;
     places.push_back(std::move(place));
@@ -136,6 +131,16 @@ std::string settingsText(const Settings& settings) {
     if (const auto* choice = std::get_if<std::string>(&value)) text += *choice;
   }
   return text;
+}
+
+std::string floorText(const Comparison& comparison) {
+  std::string text;
+  if (comparison.floor_position_mm > 0.0) text = significantText(comparison.floor_position_mm) + " mm";
+  if (comparison.floor_orientation_deg > 0.0) {
+    text += (text.empty() ? "" : ", ") + significantText(comparison.floor_orientation_deg) + " deg";
+  }
+  if (text.empty()) return "not known: the table states neither noise nor tolerance";
+  return text + " (from " + comparison.floor_from + ")";
 }
 
 std::string positionLabel(const std::string& id) {

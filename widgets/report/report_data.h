@@ -22,7 +22,8 @@ struct PlaceSummary {
   double after_mm = 0.0;                               ///< With the best position method.
   Eigen::Vector3d before_m = Eigen::Vector3d::Zero();  ///< Tracked minus true, reference frame.
   Eigen::Vector3d after_m = Eigen::Vector3d::Zero();
-  std::optional<double> sd_mm;  ///< 3-D SD of a single sample, RMS over the place's rows.
+  std::optional<double> before_deg;  ///< Orientation error.
+  std::optional<double> sd_mm;       ///< 3-D SD of a single sample, RMS over the place's rows.
   int n_used = 0;
   int n_rejected = 0;
 };
@@ -51,6 +52,9 @@ MeasurementSummary measurementSummary(const CalibrationTable& table);
 
 /// "degree=3, lambda=auto"; empty without settings.
 std::string settingsText(const Settings& settings);
+
+/// "0.31 mm, 0.02 deg (from samples and jig tolerance)", or that it is not known.
+std::string floorText(const Comparison& comparison);
 
 /// The label of a method as menus show it; the id itself when no registry has it.
 std::string positionLabel(const std::string& id);

@@ -50,6 +50,7 @@ ErrorField errorField(const std::vector<PlaceSummary>& places, const std::string
     arrow.error_m = after ? place.after_m : place.before_m;
     arrow.node = place.node;
     arrow.validation = place.validation;
+    if (!after) arrow.angle_deg = place.before_deg;
     arrow.name = QString::fromStdString(place.name);
     field.arrows.push_back(std::move(arrow));
   }

@@ -22,12 +22,12 @@ void writeHead(HtmlWriter& html, std::initializer_list<const char*> columns) {
 void number(HtmlWriter& html, const std::string& text) { html.element("td", text, {{"class", "number"}}); }
 
 void writeStats(HtmlWriter& html, const ErrorStats& stats) {
-  number(html, significantText(stats.mean));
-  number(html, significantText(stats.median));
-  number(html, significantText(stats.rms));
-  number(html, significantText(stats.rms_low90) + " to " + significantText(stats.rms_high90));
-  number(html, significantText(stats.p95));
-  number(html, significantText(stats.max));
+  number(html, errorFigure(stats.mean));
+  number(html, errorFigure(stats.median));
+  number(html, errorFigure(stats.rms));
+  number(html, errorFigure(stats.rms_low90) + " to " + errorFigure(stats.rms_high90));
+  number(html, errorFigure(stats.p95));
+  number(html, errorFigure(stats.max));
 }
 
 /// The scores of one kind of method as a table.
@@ -35,7 +35,7 @@ struct ScoreTable {
   const char* unit;
   const std::vector<MethodScore>& scores;
   const ErrorStats& before;
-  const std::string& best;
+  const MethodScore* best;  ///< None when nothing beats the input.
   std::string (*label)(const std::string& id);
   bool with_common_places;  ///< Whether the RMS over the places that all methods cover is a column.
 
@@ -66,7 +66,7 @@ void writeScore(HtmlWriter& html, const ScoreTable& table, const MethodScore& sc
     html.close();
     return;
   }
-  const bool best = score.method == table.best;
+  const bool best = &score == table.best;
   const bool worse = score.stats.rms > table.before.rms;
   html.open("tr", {{"class", best ? "best" : worse ? "worse" : "plain"}});
   writeName(html, table.label(score.method), settingsText(score.settings),
@@ -75,8 +75,8 @@ void writeScore(HtmlWriter& html, const ScoreTable& table, const MethodScore& sc
                     : "");
   writeStats(html, score.stats);
   number(html, std::to_string(score.n_uncovered));
-  if (table.with_common_places) number(html, significantText(score.rms_common_mm));
-  number(html, significantText(score.in_sample_rms));
+  if (table.with_common_places) number(html, errorFigure(score.rms_common_mm));
+  number(html, errorFigure(score.in_sample_rms));
   number(html, durationText(score.fit_s));
   number(html, durationText(score.eval_ns * 1e-9));
   html.close();
@@ -114,9 +114,9 @@ void writePlaces(HtmlWriter& html, std::span<const PlaceSummary> places) {
     writeName(html, place.name, {}, place.validation ? "validation" : "");
     number(html, std::to_string(place.node));
     for (int axis = 0; axis < 3; ++axis) number(html, decimalText(place.p_true_m[axis], 3));
-    number(html, significantText(place.before_mm));
-    number(html, significantText(place.after_mm));
-    number(html, place.sd_mm ? significantText(*place.sd_mm) : "not known");
+    number(html, errorFigure(place.before_mm));
+    number(html, errorFigure(place.after_mm));
+    number(html, place.sd_mm ? errorFigure(*place.sd_mm) : "not known");
     number(html, std::to_string(place.n_used));
     number(html, std::to_string(place.n_rejected));
     html.close();
@@ -130,13 +130,13 @@ void writePlaces(HtmlWriter& html, std::span<const PlaceSummary> places) {
 
 void writePositionTable(HtmlWriter& html, const Comparison& comparison) {
   writeScoreTable(
-      html, {"mm", comparison.position, comparison.before_position_mm, comparison.best_position, positionLabel, true});
+      html, {"mm", comparison.position, comparison.before_position_mm, bestPosition(comparison), positionLabel, true});
 }
 
 void writeOrientationTable(HtmlWriter& html, const Comparison& comparison) {
   if (!comparison.before_orientation_deg) return;
   writeScoreTable(html, {"degrees", comparison.orientation, *comparison.before_orientation_deg,
-                         comparison.best_orientation, orientationLabel, false});
+                         bestOrientation(comparison), orientationLabel, false});
 }
 
 void writePlaceTables(HtmlWriter& html, std::vector<PlaceSummary> places) {

@@ -1,0 +1,322 @@
+#include <unistd.h>
+
+#include <QCoreApplication>
+#include <QFile>
+#include <QFileInfo>
+#include <QSocketNotifier>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "acquisition/devices/registry.h"
+#include "acquisition/session/acquisition_controller.h"
+#include "acquisition/session/plan.h"
+#include "app/cli.h"
+#include "app/cli_signals.h"
+#include "app/cli_values.h"
+#include "widgets/report/numbers.h"
+
+/// acquire: records a plan with a tracker, place by place, into a session file.
+namespace fieldtrue::cli {
+namespace {
+
+constexpr int kTakesBeforeSkipping = 3;
+
+struct AcquireOptions {
+  std::string device;
+  std::string scene;
+  std::string plan;
+  std::string session;
+  int samples_per_node = 60;
+  bool automatic = false;
+};
+
+std::string placeText(const PlannedPlace& place) {
+  const Eigen::Vector3d& p_m = place.reference_from_sensor.position_m;
+  return placeName(place) + "  (" + decimalText(p_m.x(), 2) + " m, " + decimalText(p_m.y(), 2) + " m, " +
+         decimalText(p_m.z(), 2) + " m)";
+}
+
+double sd_mm(const Node& node) { return node.covariance_m2 ? 1000.0 * std::sqrt(node.covariance_m2->trace()) : NAN; }
+
+bool holdsNothing(const QString& session_path) {
+  const auto session = SessionStore::open(session_path);
+  return session && session->nodeTable().nodes.empty();
+}
+
+/// What the tracker does now, on a terminal's last line.
+class LiveLine {
+ public:
+  LiveLine() : terminal_(isatty(STDERR_FILENO) != 0) {}
+  LiveLine(const LiveLine&) = delete;
+  LiveLine& operator=(const LiveLine&) = delete;
+  ~LiveLine() { clear(); }
+
+  void show(const AcquisitionStatus& status) {
+    if (!terminal_) return;
+    std::string text;
+    if (status.take == TakeState::kCollecting) {
+      text = std::to_string(status.collected) + "/" + std::to_string(status.wanted) + "  ";
+    }
+    text += status.reason.toStdString();
+    if (text == shown_) return;
+    shown_ = text;
+    std::cerr << "\r\033[K" << text << std::flush;
+  }
+
+  void clear() {
+    if (!shown_.empty()) std::cerr << "\r\033[K" << std::flush;
+    shown_.clear();
+  }
+
+ private:
+  bool terminal_;
+  std::string shown_;
+};
+
+/// One acquisition on the event loop: prints what happens, reads what the operator types, and knows when it is over.
+class Acquisition {
+ public:
+  Acquisition(const AcquireOptions& options, const CommonOptions& common)
+      : options_(options), lines_(common.json ? std::cerr : std::cout), controller_({}, nullptr) {
+    connectSignals();
+  }
+
+  Outcome run(const QString& plan_json) {
+    const EndRequest end_request([this] { end("stopped"); });
+    controller_.openSession(QString::fromStdString(options_.session), plan_json);
+    if (failure_) return tl::unexpected(*failure_);
+    if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
+    controller_.setSamplesPerNode(options_.samples_per_node);
+    controller_.setAutomatic(options_.automatic);
+    controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
+    if (!options_.automatic) listenToOperator();
+    if (!over_) QCoreApplication::exec();
+    controller_.disconnectDevice();
+    controller_.closeSession();
+    live_line_.clear();
+    if (!failure_) return answer();
+    if (!plan_json.isEmpty()) removeIfEmpty();
+    return tl::unexpected(*failure_);
+  }
+
+  /// The plan that was asked for; a session that is resumed must have been made with it.
+  void expectPlan(nlohmann::json plan) { expected_plan_ = std::move(plan); }
+
+ private:
+  void connectSignals() {
+    const auto connect = [this](auto signal, auto slot) {
+      QObject::connect(&controller_, signal, &context_, [this, slot](auto&&... values) { (this->*slot)(values...); });
+    };
+    connect(&AcquisitionController::statusChanged, &Acquisition::onStatus);
+    connect(&AcquisitionController::nodeStored, &Acquisition::onStored);
+    connect(&AcquisitionController::takeFailed, &Acquisition::onTakeFailed);
+    connect(&AcquisitionController::sessionOpened, &Acquisition::onOpened);
+    connect(&AcquisitionController::failed, &Acquisition::onFailed);
+    connect(&AcquisitionController::finished, &Acquisition::onFinished);
+  }
+
+  void onOpened(const QString&, const QString&, const QString& plan_json) { session_plan_ = plan_json.toStdString(); }
+
+  std::string otherPlan() const {
+    if (!expected_plan_) return {};
+    if (nlohmann::json::parse(session_plan_, nullptr, false) == *expected_plan_) return {};
+    return options_.session +
+           " was recorded with another plan; leave --plan out to resume it, or name a new session file";
+  }
+
+  void onStatus(const AcquisitionStatus& status) {
+    const auto before = status_.current;
+    status_ = status;
+    if (status.device == DeviceState::kFailed) {
+      fail(status.device_text.toStdString());
+      return;
+    }
+    if (status.device != DeviceState::kRunning) return;
+    if (!told_start_) tellStart();
+    live_line_.show(status);
+    if (options_.automatic || !status.current || status.take == TakeState::kCollecting) return;
+    if (before != status.current || !prompted_) prompt();
+  }
+
+  void tellStart() {
+    told_start_ = true;
+    const std::size_t n_there = status_.n_done + status_.n_skipped;
+    if (n_there > 0) {
+      lines_ << "Resuming: " << status_.n_done << " of " << status_.places.size() << " done, " << status_.n_skipped
+             << " skipped" << std::endl;
+    }
+    if (!status_.current) onFinished();
+  }
+
+  void prompt() {
+    prompted_ = true;
+    live_line_.clear();
+    lines_ << "Next: " << placeText(status_.places.at(*status_.current))
+           << "   Enter takes, s skips, u takes back, q quits" << std::endl;
+  }
+
+  void onStored(int place, const Node& node, const QString& suspicious) {
+    const auto index = static_cast<std::size_t>(place);
+    const AcquisitionStatus now = controller_.status();
+    failed_takes_.erase(index);
+    live_line_.clear();
+    lines_ << placeText(now.places.at(index)) << "  done " << now.n_done << " of " << now.places.size() << ", SD "
+           << significantText(sd_mm(node)) << " mm";
+    if (node.n_rejected > 0) lines_ << ", " << node.n_rejected << " rejected";
+    if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
+    lines_ << std::endl;
+  }
+
+  void onTakeFailed(const QString& reason) {
+    const AcquisitionStatus now = controller_.status();
+    live_line_.clear();
+    std::cerr << "Not taken: " << reason.toStdString() << std::endl;
+    prompted_ = false;
+    if (!options_.automatic || !now.current || ++failed_takes_[*now.current] < kTakesBeforeSkipping) return;
+    std::cerr << placeText(now.places.at(*now.current)) << "  skipped after " << kTakesBeforeSkipping
+              << " takes without success" << std::endl;
+    failed_takes_.erase(*now.current);
+    controller_.skip();
+  }
+
+  void onFailed(const QString& message) { fail(message.toStdString()); }
+
+  void onFinished() { end("finished"); }
+
+  void fail(const std::string& message) {
+    if (!failure_) failure_ = Failure{kNotPossible, message};
+    end("failed");
+  }
+
+  void end(const std::string& how) {
+    if (over_) return;
+    over_ = true;
+    how_ = how;
+    QCoreApplication::quit();
+  }
+
+  void listenToOperator() {
+    input_ = std::make_unique<QSocketNotifier>(STDIN_FILENO, QSocketNotifier::Read);
+    QObject::connect(input_.get(), &QSocketNotifier::activated, &context_, [this] { readInput(); });
+  }
+
+  void readInput() {
+    std::array<char, 256> bytes{};
+    const ssize_t n = ::read(STDIN_FILENO, bytes.data(), bytes.size());
+    if (n <= 0) {
+      input_->setEnabled(false);
+      end("stopped");
+      return;
+    }
+    typed_.append(bytes.data(), static_cast<std::size_t>(n));
+    for (auto line_end = typed_.find('\n'); line_end != std::string::npos && !over_; line_end = typed_.find('\n')) {
+      const std::string command = typed_.substr(0, line_end);
+      typed_.erase(0, line_end + 1);
+      obey(command);
+    }
+  }
+
+  void obey(const std::string& command) {
+    prompted_ = false;
+    if (command.empty()) return controller_.take();
+    if (command == "s") return controller_.skip();
+    if (command == "u") return controller_.undo();
+    if (command == "q") return end("stopped");
+    lines_ << "'" << command << "' is not known: Enter takes, s skips, u takes back, q quits" << std::endl;
+  }
+
+  /// A session that was made for a tracker that never answered would only be in the way.
+  void removeIfEmpty() const {
+    const QString path = QString::fromStdString(options_.session);
+    if (holdsNothing(path)) QFile::remove(path);
+  }
+
+  /// Tells what the file holds, not what was seen on the way.
+  Outcome answer() const {
+    const auto session = SessionStore::open(QString::fromStdString(options_.session));
+    if (!session) return notPossible(session.error());
+    const std::vector<PlaceState> states = session->states();
+    const auto count = [&states](PlaceState state) { return std::count(states.begin(), states.end(), state); };
+    const auto n_skipped = count(PlaceState::kSkipped);
+    const auto n_suspicious = count(PlaceState::kSuspicious);
+    const auto n_done = count(PlaceState::kDone) + n_suspicious;
+    Answer answer;
+    answer.json = {{"session", options_.session}, {"ended", how_},
+                   {"places", states.size()},     {"done", n_done},
+                   {"skipped", n_skipped},        {"suspicious", n_suspicious}};
+    answer.text = (how_ == "finished" ? "Finished: " : "Stopped: ") + std::to_string(n_done) + " of " +
+                  std::to_string(states.size()) + " places done, " + std::to_string(n_skipped) + " skipped, all in " +
+                  options_.session + "\n";
+    if (how_ != "finished") answer.text += "The same command resumes it.\n";
+    return answer;
+  }
+
+  AcquireOptions options_;
+  std::ostream& lines_;
+  QObject context_;
+  AcquisitionController controller_;
+  AcquisitionStatus status_;
+  std::unique_ptr<QSocketNotifier> input_;
+  std::string typed_;
+  std::string session_plan_;
+  std::optional<nlohmann::json> expected_plan_;
+  std::map<std::size_t, int> failed_takes_;
+  LiveLine live_line_;
+  std::optional<Failure> failure_;
+  std::string how_;
+  bool told_start_ = false;
+  bool prompted_ = false;
+  bool over_ = false;
+};
+
+Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
+  const auto scene = readSceneArgument(options.scene);
+  if (!scene) return tl::unexpected(scene.error());
+  // Made only to see that its text can be read, before a session file is made; it is not started.
+  if (const auto device = makeDevice(options.device, *scene); !device) return wrongUsage(device.error());
+  const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
+  if (!resumes && options.plan.empty()) {
+    return wrongUsage(options.session + " does not exist yet; a new session needs --plan");
+  }
+  QString create_plan_json;
+  std::optional<nlohmann::json> plan_json;
+  if (!options.plan.empty()) {
+    const auto plan = readPlanArgument(options.plan);
+    if (!plan) return tl::unexpected(plan.error());
+    plan_json = toJson(*plan);
+    if (!resumes) create_plan_json = QString::fromStdString(plan_json->dump());
+  }
+  Acquisition acquisition(options, common);
+  if (resumes && plan_json) acquisition.expectPlan(*plan_json);
+  return acquisition.run(create_plan_json);
+}
+
+}  // namespace
+
+void addAcquireCommand(CommandLine& line) {
+  auto [command, options] = line.add("acquire", "Record a plan with a tracker into a session file", runAcquire);
+  command
+      ->add_option("--device", options->device,
+                   "simulated, fastrak:/dev/ttyUSB0@115200, fastrak:tcp:HOST:PORT; see fieldtrue-cli devices")
+      ->type_name("DEVICE")
+      ->required();
+  command->add_option("--scene", options->scene, "Scene of the simulated tracker (*.scene.json); default a clean room")
+      ->type_name("FILE");
+  command->add_option("--plan", options->plan, "grid:... or a *.plan.json; not needed to resume a session")
+      ->type_name("PLAN");
+  command->add_option("--samples-per-node", options->samples_per_node, "Good samples at each place (default 60)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000));
+  command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
+  command->add_option("--session", options->session, "Session file (*.fieldtrue); made new, or resumed if it exists")
+      ->type_name("FILE")
+      ->required();
+}
+
+}  // namespace fieldtrue::cli

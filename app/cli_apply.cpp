@@ -1,0 +1,295 @@
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/cli.h"
+#include "calib/core/file_io.h"
+#include "calib/correctors/corrector.h"
+
+/// apply: corrects the poses of a table of any length, row by row.
+namespace fieldtrue::cli {
+namespace {
+
+constexpr std::size_t kBatch = 4096;
+constexpr std::array<const char*, 9> kAppended = {"x_corrected_m", "y_corrected_m", "z_corrected_m",
+                                                  "qw_corrected",  "qx_corrected",  "qy_corrected",
+                                                  "qz_corrected",  "uncertainty_m", "covered"};
+
+/// The fields of one line; commas inside double quotes do not separate.
+std::vector<std::string_view> splitFields(std::string_view line) {
+  std::vector<std::string_view> fields;
+  std::size_t start = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i <= line.size(); ++i) {
+    if (i < line.size() && line[i] == '"') quoted = !quoted;
+    if (i < line.size() && (quoted || line[i] != ',')) continue;
+    fields.push_back(line.substr(start, i - start));
+    start = i + 1;
+  }
+  return fields;
+}
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\"";
+  const auto first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+/// Where the columns that matter stand.
+struct Columns {
+  std::size_t count = 0;
+  std::array<std::size_t, 3> position{};
+  std::optional<std::array<std::size_t, 4>> orientation;  ///< w x y z.
+  std::optional<std::size_t> status;
+};
+
+/// A row waiting for its batch.
+struct PendingRow {
+  std::string text;
+  std::optional<std::size_t> pose;  ///< Index into the batch's poses; none for a row that the tracker marked as lost.
+};
+
+class TableCorrector {
+ public:
+  TableCorrector(const Corrector& corrector, std::istream& in, std::string name)
+      : corrector_(corrector), in_(in), name_(std::move(name)) {}
+
+  /// Copies the table with the corrected columns appended.
+  Result<void> run(std::ostream& out) {
+    while (nextLine()) {
+      if (line_.empty() || line_.front() == '#') {
+        // Between rows the order of rows and remarks is kept by emptying the batch first.
+        flush(out);
+        out << line_ << '\n';
+        continue;
+      }
+      const Result<void> taken = columns_ ? takeRow() : takeHeader(out);
+      if (!taken) return taken;
+      if (rows_.size() == kBatch) flush(out);
+    }
+    if (in_.bad()) return fail(ErrorCode::kIo, name_ + " cannot be read to its end");
+    if (!columns_) return fail(ErrorCode::kBadInput, name_ + " has no header row; columns x_m, y_m, z_m are needed");
+    flush(out);
+    return {};
+  }
+
+  std::size_t n_rows() const { return n_rows_; }
+  std::size_t n_outside() const { return n_outside_; }
+  std::size_t n_lost() const { return n_lost_; }
+
+ private:
+  bool nextLine() {
+    if (!std::getline(in_, line_)) return false;
+    ++line_number_;
+    if (line_number_ == 1 && line_.starts_with("\xEF\xBB\xBF")) line_.erase(0, 3);
+    if (!line_.empty() && line_.back() == '\r') line_.pop_back();
+    return true;
+  }
+
+  tl::unexpected<Error> bad(const std::string& what) const {
+    return fail(ErrorCode::kBadInput, name_ + " line " + std::to_string(line_number_) + what);
+  }
+
+  Result<void> takeHeader(std::ostream& out) {
+    std::vector<std::string> names;
+    for (const std::string_view field : splitFields(line_)) names.emplace_back(trimmed(field));
+    for (const std::string& name : names) {
+      if (std::count(names.begin(), names.end(), name) > 1) return bad(": column " + name + " stands there twice");
+    }
+    for (const char* appended : kAppended) {
+      if (find(names, appended)) return bad(": column " + std::string(appended) + " is there already; remove it first");
+    }
+    Columns columns;
+    columns.count = names.size();
+    constexpr std::array kPosition = {"x_m", "y_m", "z_m"};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto index = find(names, kPosition[axis]);
+      if (!index) return bad(": column " + std::string(kPosition[axis]) + " is missing");
+      columns.position[axis] = *index;
+    }
+    const auto orientation = findOrientation(names);
+    if (!orientation) return tl::unexpected(orientation.error());
+    columns.orientation = *orientation;
+    columns.status = find(names, "status");
+    columns_ = columns;
+    names_ = std::move(names);
+    out << line_;
+    for (const char* appended : kAppended) out << ',' << appended;
+    out << '\n';
+    return {};
+  }
+
+  static std::optional<std::size_t> find(const std::vector<std::string>& names, std::string_view name) {
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (names[i] == name) return i;
+    }
+    return std::nullopt;
+  }
+
+  Result<std::optional<std::array<std::size_t, 4>>> findOrientation(const std::vector<std::string>& names) const {
+    constexpr std::array kOrientation = {"qw", "qx", "qy", "qz"};
+    std::array<std::size_t, 4> indices{};
+    std::string missing;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto index = find(names, kOrientation[i]);
+      if (index) indices[i] = *index;
+      if (!index) missing += (missing.empty() ? "" : ", ") + std::string(kOrientation[i]);
+    }
+    if (missing.empty()) return std::optional(indices);
+    if (missing == "qw, qx, qy, qz") return std::optional<std::array<std::size_t, 4>>();
+    return bad(": an orientation needs qw, qx, qy and qz; missing: " + missing);
+  }
+
+  Result<double> number(const std::vector<std::string_view>& fields, std::size_t column) const {
+    std::string_view text = trimmed(fields[column]);
+    if (text.starts_with('+')) text.remove_prefix(1);
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
+    return bad(", column " + names_[column] + ": '" + std::string(text) + "' is not a finite number");
+  }
+
+  Result<Pose> pose(const std::vector<std::string_view>& fields) const {
+    Pose pose;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto value = number(fields, columns_->position[axis]);
+      if (!value) return tl::unexpected(value.error());
+      pose.position_m[static_cast<Eigen::Index>(axis)] = *value;
+    }
+    if (!columns_->orientation) return pose;
+    std::array<double, 4> q{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto value = number(fields, (*columns_->orientation)[i]);
+      if (!value) return tl::unexpected(value.error());
+      q[i] = *value;
+    }
+    const Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
+    if (!(orientation.norm() > 1e-6)) return bad(", columns qw to qz: the quaternion is zero");
+    pose.orientation = orientation.normalized();
+    return pose;
+  }
+
+  Result<void> takeRow() {
+    const std::vector<std::string_view> fields = splitFields(line_);
+    if (fields.size() != columns_->count) {
+      return bad(" has " + std::to_string(fields.size()) + " fields, the header has " +
+                 std::to_string(columns_->count) + "; is the file cut off?");
+    }
+    const bool marked = columns_->status && !trimmed(fields[*columns_->status]).empty();
+    const auto read = pose(fields);
+    // A reading the tracker itself marked may hold anything; it is kept, and corrected only when it is a pose.
+    if (!read && !marked) return tl::unexpected(read.error());
+    PendingRow row{line_, std::nullopt};
+    if (read) {
+      row.pose = poses_.size();
+      poses_.push_back(*read);
+    }
+    rows_.push_back(std::move(row));
+    return {};
+  }
+
+  void flush(std::ostream& out) {
+    std::vector<Pose> corrected(poses_.size());
+    corrector_.correct(poses_, corrected);
+    for (const PendingRow& row : rows_) {
+      out << row.text;
+      if (row.pose) {
+        writeCorrected(out, poses_[*row.pose].position_m, corrected[*row.pose]);
+      } else {
+        out << ",,,,,,,,,0";
+        ++n_lost_;
+      }
+      out << '\n';
+    }
+    n_rows_ += rows_.size();
+    rows_.clear();
+    poses_.clear();
+  }
+
+  void writeCorrected(std::ostream& out, const Eigen::Vector3d& p_tracked_m, const Pose& corrected) {
+    for (const double value : corrected.position_m) out << ',' << formatNumber(value);
+    if (columns_->orientation) {
+      const Eigen::Quaterniond q = canonical(corrected.orientation);
+      for (const double value : {q.w(), q.x(), q.y(), q.z()}) out << ',' << formatNumber(value);
+    } else {
+      out << ",,,,";
+    }
+    out << ',';
+    if (const auto uncertainty_m = corrector_.uncertainty_m(p_tracked_m)) out << formatNumber(*uncertainty_m);
+    const bool covered = corrector_.covers(p_tracked_m);
+    if (!covered) ++n_outside_;
+    out << ',' << (covered ? 1 : 0);
+  }
+
+  const Corrector& corrector_;
+  std::istream& in_;
+  std::string name_;
+  std::string line_;
+  std::size_t line_number_ = 0;
+  std::optional<Columns> columns_;
+  std::vector<std::string> names_;
+  std::vector<PendingRow> rows_;
+  std::vector<Pose> poses_;
+  std::size_t n_rows_ = 0;
+  std::size_t n_outside_ = 0;
+  std::size_t n_lost_ = 0;
+};
+
+struct ApplyOptions {
+  std::string calibration;
+  std::string in;
+  std::string out;
+};
+
+Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
+  const auto corrector = Corrector::load(options.calibration);
+  if (!corrector) return notPossible(corrector.error());
+  if (std::filesystem::is_directory(options.in)) return notPossible(options.in + " is a folder, not a table");
+  std::ifstream in(options.in, std::ios::binary);
+  if (!in) {
+    const auto reason = readFile(options.in);
+    return notPossible(reason ? options.in + " cannot be opened" : reason.error().message);
+  }
+  TableCorrector table(*corrector, in, options.in);
+  std::optional<Error> in_error;
+  const auto written = writeFileAtomically(options.out, [&](std::ostream& out) {
+    const auto corrected = table.run(out);
+    if (corrected) return;
+    in_error = corrected.error();
+    out.setstate(std::ios::failbit);
+  });
+  if (in_error) return notPossible(*in_error);
+  if (!written) return notPossible(written.error());
+  Answer answer;
+  answer.json = {
+      {"file", options.out}, {"rows", table.n_rows()}, {"outside", table.n_outside()}, {"lost", table.n_lost()}};
+  answer.text = std::to_string(table.n_rows()) + " rows written to " + options.out + "; " +
+                std::to_string(table.n_outside()) + " outside the calibrated region (covered = 0), " +
+                std::to_string(table.n_lost()) + " without a pose\n";
+  return answer;
+}
+
+}  // namespace
+
+void addApplyCommand(CommandLine& line) {
+  auto [command, options] = line.add("apply", "Correct the poses of a node or sample table", runApply);
+  command->add_option("--calibration", options->calibration, "Calibration (*.ftcal.json)")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--in", options->in, "Table with columns x_m, y_m, z_m and, if there, qw, qx, qy, qz")
+      ->type_name("CSV")
+      ->required();
+  command->add_option("--out", options->out, "The same table with the corrected columns appended")
+      ->type_name("CSV")
+      ->required();
+}
+
+}  // namespace fieldtrue::cli

@@ -1,0 +1,222 @@
+#include <cmath>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "acquisition/session/session_store.h"
+#include "app/cli.h"
+#include "app/cli_values.h"
+#include "calib/core/table_io.h"
+#include "calib/correctors/corrector.h"
+#include "calib/exporters/registry.h"
+#include "calib/importers/registry.h"
+#include "calib/simulation/simulator.h"
+
+/// simulate, tables, import, export: commands that make files from other files.
+namespace fieldtrue::cli {
+namespace {
+
+struct TableCounts {
+  std::size_t places = 0;
+  std::size_t rows = 0;
+  std::size_t samples = 0;
+};
+
+TableCounts count(const CalibrationTable& table) {
+  std::set<int> places;
+  TableCounts counts;
+  for (const Node& node : table.nodes) {
+    places.insert(node.node);
+    counts.samples += static_cast<std::size_t>(node.n_used + node.n_rejected);
+  }
+  counts.places = places.size();
+  counts.rows = table.nodes.size();
+  return counts;
+}
+
+/// Where tables go; an empty path is not written.
+struct TablePaths {
+  std::string nodes;
+  std::string samples;
+};
+
+/// Writes what there is and tells so.
+Outcome writeTables(const TablePaths& paths, const CalibrationTable* table, const SampleTable* samples,
+                    const std::vector<std::string>& notes) {
+  Answer answer;
+  answer.json["notes"] = notes;
+  for (const std::string& note : notes) answer.text += note + "\n";
+  if (!paths.samples.empty() && samples != nullptr) {
+    const auto written = writeSampleTable(std::filesystem::path(paths.samples), *samples);
+    if (!written) return notPossible(written.error());
+    answer.json["samples"] = {{"file", paths.samples}, {"rows", samples->rows.size()}};
+    answer.text += std::to_string(samples->rows.size()) + " samples written to " + paths.samples + "\n";
+  }
+  if (!paths.nodes.empty() && table != nullptr) {
+    const auto written = writeNodeTable(std::filesystem::path(paths.nodes), *table);
+    if (!written) return notPossible(written.error());
+    const TableCounts counts = count(*table);
+    answer.json["nodes"] = {{"file", paths.nodes}, {"places", counts.places}, {"rows", counts.rows}};
+    answer.text += std::to_string(counts.places) + " places (" + std::to_string(counts.rows) + " rows, " +
+                   std::to_string(counts.samples) + " samples) written to " + paths.nodes + "\n";
+  }
+  return answer;
+}
+
+struct SimulateOptions {
+  std::string scene;
+  std::string plan;
+  std::uint64_t seed = 1;
+  int samples_per_node = 60;
+  TablePaths out;
+};
+
+Outcome runSimulate(const SimulateOptions& options, const CommonOptions& common) {
+  const auto plan = readPlanArgument(options.plan);
+  if (!plan) return tl::unexpected(plan.error());
+  const auto scene = readSceneArgument(options.scene);
+  if (!scene) return tl::unexpected(scene.error());
+  SimulationOptions simulation_options;
+  simulation_options.seed = options.seed;
+  simulation_options.samples_per_node = options.samples_per_node;
+  const auto simulation = simulate(*scene, places(*plan), simulation_options, runControl(common, "simulating"));
+  if (!simulation) return notPossible(simulation.error());
+  return writeTables(options.out, &simulation->table, &simulation->samples, {});
+}
+
+void addSimulate(CommandLine& line) {
+  auto [command, options] = line.add("simulate", "Record a plan in a simulated room", runSimulate);
+  command->add_option("--scene", options->scene, "Scene file (*.scene.json); default a clean room")->type_name("FILE");
+  command
+      ->add_option("--plan", options->plan,
+                   "grid:NXxNYxNZ@PX[xPYxPZ][:origin=x,y,z][:order=serpentine|random][:seed=n][:orientations=k]"
+                   "[:reseat=m] in metres, or a *.plan.json")
+      ->type_name("PLAN")
+      ->required();
+  command->add_option("--seed", options->seed, "Seed of noise and placing (default 1)")->type_name("N");
+  command->add_option("--samples-per-node", options->samples_per_node, "Samples at each place (default 60)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000));
+  command->add_option("--nodes", options->out.nodes, "Node table to write")->type_name("FILE")->required();
+  command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
+}
+
+struct TablesOptions {
+  std::string session;
+  TablePaths out;
+};
+
+Outcome runTables(const TablesOptions& options, const CommonOptions&) {
+  const auto session = SessionStore::open(QString::fromStdString(options.session));
+  if (!session) return notPossible(session.error());
+  const CalibrationTable table = session->nodeTable();
+  if (table.nodes.empty()) {
+    return notPossible(options.session + " holds no recorded place yet; record at least one with acquire");
+  }
+  if (options.out.samples.empty()) return writeTables(options.out, &table, nullptr, {});
+  const SampleTable samples = session->sampleTable();
+  return writeTables(options.out, &table, &samples, {});
+}
+
+void addTables(CommandLine& line) {
+  auto [command, options] = line.add("tables", "Write a session's node and sample tables", runTables);
+  command->add_option("--session", options->session, "Session file (*.fieldtrue)")->type_name("FILE")->required();
+  command->add_option("--nodes", options->out.nodes, "Node table to write")->type_name("FILE")->required();
+  command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
+}
+
+struct ImportOptions {
+  std::string format;
+  std::string in;
+  std::string truth;
+  TablePaths out;
+};
+
+/// The chosen importer and its settings, or what is wrong with `--format`.
+Read<std::pair<const Importer*, Settings>> readFormat(const std::string& text) {
+  const auto format = parseMethodText(text);
+  if (!format) return wrongUsage(format.error());
+  const auto importer = findImporter(format->id);
+  if (!importer) return wrongUsage(importer.error());
+  auto settings = resolveSettings(format->id, (*importer)->settings, format->given);
+  if (!settings) return wrongUsage(settings.error());
+  return std::pair{*importer, std::move(*settings)};
+}
+
+Outcome runImport(const ImportOptions& options, const CommonOptions&) {
+  const auto format = readFormat(options.format);
+  if (!format) return tl::unexpected(format.error());
+  const auto& [importer, settings] = *format;
+  if (importer->needs_truth && options.truth.empty()) {
+    return wrongUsage("format " + importer->id + " holds no true positions; name the file that does with --truth");
+  }
+  if (options.out.nodes.empty() && options.out.samples.empty()) {
+    return wrongUsage("nothing to write; name a file with --nodes or --samples");
+  }
+  std::optional<std::filesystem::path> truth;
+  if (!options.truth.empty()) truth = options.truth;
+  const auto imported = importer->read(options.in, truth, settings);
+  if (!imported) return notPossible(imported.error());
+  if (!options.out.nodes.empty() && !imported->table) {
+    return notPossible(options.in +
+                       " holds no true positions, so there is no node table; write its samples with --samples");
+  }
+  if (!options.out.samples.empty() && !imported->samples) {
+    return notPossible(options.in + " holds means only, so there is no sample table; leave --samples out");
+  }
+  return writeTables(options.out, imported->table ? &*imported->table : nullptr,
+                     imported->samples ? &*imported->samples : nullptr, imported->notes);
+}
+
+void addImport(CommandLine& line) {
+  auto [command, options] = line.add("import", "Read another program's files", runImport);
+  command
+      ->add_option("--format", options->format,
+                   "Format, with settings as in columns:key=value,...; see fieldtrue-cli formats")
+      ->type_name("ID")
+      ->required();
+  command->add_option("--in", options->in, "File to read")->type_name("FILE")->required();
+  command->add_option("--truth", options->truth, "File with the true positions, where the format needs one")
+      ->type_name("FILE");
+  command->add_option("--nodes", options->out.nodes, "Node table to write")->type_name("FILE");
+  command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
+}
+
+struct ExportOptions {
+  std::string calibration;
+  std::string format;
+  std::string out;
+};
+
+Outcome runExport(const ExportOptions& options, const CommonOptions&) {
+  const auto exporter = findExporter(options.format);
+  if (!exporter) return wrongUsage(exporter.error());
+  const auto corrector = Corrector::load(options.calibration);
+  if (!corrector) return notPossible(corrector.error());
+  const auto written = (*exporter)->write(*corrector, options.out);
+  if (!written) return notPossible(written.error());
+  Answer answer;
+  answer.json = {{"file", options.out}, {"format", (*exporter)->id}};
+  answer.text = (*exporter)->label + " written to " + options.out + "\n";
+  return answer;
+}
+
+void addExport(CommandLine& line) {
+  auto [command, options] = line.add("export", "Write a calibration for another program", runExport);
+  command->add_option("--calibration", options->calibration, "Calibration (*.ftcal.json)")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--format", options->format, "Format; see fieldtrue-cli formats")->type_name("ID")->required();
+  command->add_option("--out", options->out, "File to write")->type_name("PATH")->required();
+}
+
+}  // namespace
+
+void addDataCommands(CommandLine& line) {
+  addSimulate(line);
+  addTables(line);
+  addImport(line);
+  addExport(line);
+}
+
+}  // namespace fieldtrue::cli

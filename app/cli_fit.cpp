@@ -1,0 +1,201 @@
+#include <QDateTime>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "acquisition/session/session_store.h"
+#include "app/cli.h"
+#include "app/cli_text.h"
+#include "app/cli_values.h"
+#include "calib/correctors/corrector.h"
+#include "calib/evaluation/comparison.h"
+#include "widgets/report/report.h"
+
+/// fit, compare, report: what is done with a table of nodes.
+namespace fieldtrue::cli {
+namespace {
+
+constexpr double kMmPerM = 1000.0;
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+struct FitOptions {
+  std::string nodes;
+  std::string position;
+  std::string orientation = "none";
+  std::string align;
+  std::string out;
+};
+
+/// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
+std::vector<Node> fitRows(const CalibrationTable& table) {
+  std::vector<Node> rows;
+  for (const Node& node : table.nodes) {
+    if (node.role == NodeRole::kFit) rows.push_back(node);
+  }
+  return rows;
+}
+
+Answer fitAnswer(const FitOptions& options, const Corrector& corrector, AlignMode align, std::size_t n_unused) {
+  const FitReport& report = corrector.report();
+  const CorrectorChoice& choice = corrector.choice();
+  Answer answer;
+  answer.json = {
+      {"schema", "fieldtrue.fit/1"},
+      {"software", std::string("Fieldtrue ") + FIELDTRUE_VERSION},
+      {"file", options.out},
+      {"align", toText(align)},
+      {"position", {{"method", choice.position_id}, {"settings", toJson(choice.position_settings)}}},
+      {"orientation", {{"method", choice.orientation_id}, {"settings", toJson(choice.orientation_settings)}}},
+      {"n_nodes", report.n_nodes},
+      {"n_not_used", n_unused},
+      {"in_sample",
+       {{"rms_before_mm", report.rms_before_mm},
+        {"rms_mm", kMmPerM * report.rms_m},
+        {"max_mm", kMmPerM * report.max_m},
+        {"orientation_rms_deg", report.orientation_rms_rad ? nlohmann::json(kDegPerRad * *report.orientation_rms_rad)
+                                                           : nlohmann::json(nullptr)}}},
+      {"notes", report.notes}};
+  answer.text = fitText(corrector, align, n_unused) + "Written to " + options.out + "\n";
+  return answer;
+}
+
+Outcome runFit(const FitOptions& options, const CommonOptions& common) {
+  const auto choice = parseCorrectorChoice(options.position, options.orientation);
+  if (!choice) return wrongUsage(choice.error());
+  const auto table = readNodesArgument(options.nodes);
+  if (!table) return tl::unexpected(table.error());
+  const auto align = readAlignArgument(options.align, defaultAlignMode(table->metadata));
+  if (!align) return tl::unexpected(align.error());
+  const std::vector<Node> rows = fitRows(*table);
+  const auto corrector = Corrector::fit(rows, table->metadata, *choice, *align, runControl(common, "fitting"));
+  if (!corrector) return notPossible(corrector.error());
+  const auto saved = corrector->save(options.out);
+  if (!saved) return notPossible(saved.error());
+  return fitAnswer(options, *corrector, *align, table->nodes.size() - rows.size());
+}
+
+void addFit(CommandLine& line) {
+  auto [command, options] = line.add("fit", "Fit a calibration and print its in-sample figures", runFit);
+  command->add_option("--nodes", options->nodes, "Node table; rows of role fit are used")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--position", options->position, "Position method, e.g. polynomial:degree=3")
+      ->type_name("METHOD")
+      ->required();
+  command->add_option("--orientation", options->orientation, "Orientation method (default none)")->type_name("METHOD");
+  command
+      ->add_option("--align", options->align,
+                   "none or rigid; default rigid unless the table says the alignment is known")
+      ->type_name("MODE");
+  command->add_option("--out", options->out, "Calibration to write (*.ftcal.json)")->type_name("FILE")->required();
+}
+
+struct CompareOptions {
+  std::string nodes;
+  std::string html;
+  ComparisonArguments comparison;
+};
+
+ReportInput reportInput(CalibrationTable table, Comparison comparison, const std::string& source, std::uint64_t seed) {
+  ReportInput input;
+  input.table = std::move(table);
+  input.comparison = std::move(comparison);
+  input.source = source;
+  input.seed = seed;
+  input.made_at = QDateTime::currentDateTime().toString(Qt::ISODate).toStdString();
+  return input;
+}
+
+Outcome runCompare(const CompareOptions& options, const CommonOptions& common) {
+  const auto arguments = readComparisonArguments(options.comparison);
+  if (!arguments) return tl::unexpected(arguments.error());
+  const auto table = readNodesArgument(options.nodes);
+  if (!table) return tl::unexpected(table.error());
+  const auto comparison = compareMethods(*table, *arguments, runControl(common, "comparing"));
+  if (!comparison) return notPossible(comparison.error());
+  Answer answer{comparisonText(*comparison), toJson(*comparison)};
+  if (!options.html.empty()) {
+    const auto written =
+        writeHtmlReport(reportInput(*table, *comparison, options.nodes, options.comparison.seed), options.html);
+    if (!written) return notPossible(written.error());
+  }
+  return answer;
+}
+
+void addCompare(CommandLine& line) {
+  auto [command, options] = line.add("compare", "Score the methods on places their fits did not see", runCompare);
+  command->add_option("--nodes", options->nodes, "Node table")->type_name("FILE")->required();
+  addComparisonOptions(*command, options->comparison);
+  command->add_option("--html", options->html, "Report to write beside the answer")->type_name("FILE");
+}
+
+struct ReportOptions {
+  std::string nodes;
+  std::string session;
+  std::string html;
+  ComparisonArguments comparison;
+};
+
+/// A report's input without its comparison, from a session or a node table.
+Read<ReportInput> readReportInput(const ReportOptions& options) {
+  ReportInput input;
+  if (options.session.empty()) {
+    auto table = readNodesArgument(options.nodes);
+    if (!table) return tl::unexpected(table.error());
+    input.table = std::move(*table);
+    input.source = options.nodes;
+    return input;
+  }
+  const auto session = SessionStore::open(QString::fromStdString(options.session));
+  if (!session) return notPossible(session.error());
+  input.table = session->nodeTable();
+  input.source = options.session;
+  input.places = session->places();
+  input.states = session->states();
+  if (session->plan().explicit_places.empty()) input.plan = toJson(session->plan()).dump();
+  if (input.table.nodes.empty()) {
+    return notPossible(options.session + " holds no recorded place yet; record at least four with acquire");
+  }
+  return input;
+}
+
+Outcome runReport(const ReportOptions& options, const CommonOptions& common) {
+  if (options.nodes.empty() == options.session.empty()) {
+    return wrongUsage("name what to report on: --session FILE or --nodes FILE, one of the two");
+  }
+  const auto arguments = readComparisonArguments(options.comparison);
+  if (!arguments) return tl::unexpected(arguments.error());
+  auto input = readReportInput(options);
+  if (!input) return tl::unexpected(input.error());
+  const auto comparison = compareMethods(input->table, *arguments, runControl(common, "comparing"));
+  if (!comparison) return notPossible(comparison.error());
+  ReportInput whole = reportInput(std::move(input->table), *comparison, input->source, options.comparison.seed);
+  whole.plan = input->plan;
+  whole.places = input->places;
+  whole.states = input->states;
+  const auto written = writeHtmlReport(whole, options.html);
+  if (!written) return notPossible(written.error());
+  Answer answer;
+  answer.json = {{"file", options.html}, {"verdict", comparison->verdict.text}};
+  answer.text = comparison->verdict.text + "\nReport written to " + options.html + "\n";
+  return answer;
+}
+
+void addReport(CommandLine& line) {
+  auto [command, options] = line.add("report", "Write one HTML page about a calibration", runReport);
+  command->add_option("--session", options->session, "Session file (*.fieldtrue)")->type_name("FILE");
+  command->add_option("--nodes", options->nodes, "Node table, instead of a session")->type_name("FILE");
+  addComparisonOptions(*command, options->comparison);
+  command->add_option("--html", options->html, "Page to write")->type_name("FILE")->required();
+}
+
+}  // namespace
+
+void addFitCommands(CommandLine& line) {
+  addFit(line);
+  addCompare(line);
+  addReport(line);
+}
+
+}  // namespace fieldtrue::cli

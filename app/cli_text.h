@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/correctors/corrector.h"
+#include "calib/evaluation/comparison.h"
+
+/// What people read on the terminal.
+namespace fieldtrue::cli {
+
+/// A table with the first column left-aligned and the others right-aligned, two blanks between columns.
+/// A row of one cell is printed as it is.
+std::string alignedColumns(const std::vector<std::vector<std::string>>& rows);
+
+/// In-sample figures of a fit.
+std::string fitText(const Corrector& corrector, AlignMode align, std::size_t n_unused);
+
+/// The methods' held-out errors, the verdict last.
+std::string comparisonText(const Comparison& comparison);
+
+}  // namespace fieldtrue::cli

@@ -1,0 +1,139 @@
+#include "app/cli_values.h"
+
+#include <iostream>
+#include <sstream>
+#include <string_view>
+
+#include "calib/core/table_io.h"
+#include "calib/correctors/registry.h"
+
+namespace fieldtrue::cli {
+namespace {
+
+/// The text as a method of one registry, with its settings checked.
+template <class Row>
+Result<MethodText> readMethod(const MethodText& text, Result<const Row*> row) {
+  if (!row) return tl::unexpected(row.error());
+  auto settings = resolveSettings(text.id, (*row)->settings, text.given);
+  if (!settings) return tl::unexpected(settings.error());
+  return text;
+}
+
+template <class Rows>
+void appendIds(std::string& list, const Rows& rows) {
+  for (const auto& row : rows) list += (list.empty() ? "" : ", ") + row.id;
+}
+
+std::string unknownMethod(const std::string& id) {
+  std::string position, orientation;
+  appendIds(position, positionMethods());
+  appendIds(orientation, orientationMethods());
+  return "unknown method '" + id + "'; known for position: " + position + "; for orientation: " + orientation;
+}
+
+Read<void> addMethod(const std::string& text, ComparisonOptions& options) {
+  const auto parsed = parseMethodText(text);
+  if (!parsed) return wrongUsage(parsed.error());
+  const auto position_row = findPositionMethod(parsed->id);
+  const auto orientation_row = findOrientationMethod(parsed->id);
+  if (!position_row && !orientation_row) return wrongUsage(unknownMethod(parsed->id));
+  const auto position = readMethod<PositionMethod>(*parsed, position_row);
+  const auto orientation = readMethod<OrientationMethod>(*parsed, orientation_row);
+  if (!position && !orientation) return wrongUsage(position_row ? position.error() : orientation.error());
+  if (position) options.position_methods.push_back(*position);
+  if (orientation) options.orientation_methods.push_back(*orientation);
+  return {};
+}
+
+}  // namespace
+
+Read<Plan> readPlanArgument(const std::string& text_or_path) {
+  auto plan = readPlan(text_or_path);
+  if (plan) return *plan;
+  if (text_or_path.starts_with("grid:")) return wrongUsage(plan.error());
+  return notPossible(plan.error());
+}
+
+Read<Scene> readSceneArgument(const std::string& path) {
+  if (path.empty()) return Scene{};
+  auto scene = readScene(path);
+  if (!scene) return notPossible(scene.error());
+  return *scene;
+}
+
+Read<CalibrationTable> readNodesArgument(const std::string& path) {
+  auto reading = readNodeTable(std::filesystem::path(path));
+  if (!reading) return notPossible(reading.error());
+  remark(reading->notes);
+  return std::move(reading->table);
+}
+
+Read<AlignMode> readAlignArgument(const std::string& text, AlignMode fallback) {
+  if (text.empty()) return fallback;
+  if (text == "none") return AlignMode::kNone;
+  if (text == "rigid") return AlignMode::kRigid;
+  return wrongUsage("--align is '" + text + "'; it must be none or rigid");
+}
+
+std::string toText(AlignMode align) { return align == AlignMode::kRigid ? "rigid" : "none"; }
+
+void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
+  command
+      .add_option("--methods", arguments.methods,
+                  "all, or a list like rigid,polynomial:degree=3,hmq; names of position and orientation methods")
+      ->type_name("LIST");
+  command
+      .add_option("--validate", arguments.validate,
+                  "role, loo, kfold:K or block:8; default role where validation rows exist, else loo")
+      ->type_name("SCHEME");
+  command
+      .add_option("--align", arguments.align,
+                  "none or rigid; default rigid unless the table says the alignment is known")
+      ->type_name("MODE");
+  command.add_option("--seed", arguments.seed, "Seed of folds and bootstrap (default 1)")->type_name("N");
+}
+
+Read<ComparisonOptions> readComparisonArguments(const ComparisonArguments& arguments) {
+  ComparisonOptions options;
+  options.seed = arguments.seed;
+  if (!arguments.validate.empty()) {
+    const auto validation = parseValidation(arguments.validate);
+    if (!validation) return wrongUsage(validation.error());
+    options.validation = *validation;
+  }
+  if (!arguments.align.empty()) {
+    const auto align = readAlignArgument(arguments.align, AlignMode::kRigid);
+    if (!align) return tl::unexpected(align.error());
+    options.align = *align;
+  }
+  if (arguments.methods == "all") return options;
+  for (const std::string& text : splitMethods(arguments.methods)) {
+    const auto added = addMethod(text, options);
+    if (!added) return tl::unexpected(added.error());
+  }
+  // An empty list means all methods to compareMethods; whoever names only the other kind wants none of this one.
+  if (options.position_methods.empty()) options.position_methods.push_back({"none", {}});
+  if (options.orientation_methods.empty()) options.orientation_methods.push_back({"none", {}});
+  return options;
+}
+
+std::vector<std::string> splitMethods(const std::string& text) {
+  std::vector<std::string> methods;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const bool continues = part.find('=') != std::string::npos && part.find(':') == std::string::npos;
+    if (continues && !methods.empty()) {
+      methods.back() += "," + part;
+    } else {
+      methods.push_back(part);
+    }
+  }
+  if (text.empty() || text.back() == ',') methods.emplace_back();
+  return methods;
+}
+
+void remark(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) std::cerr << "note: " << note << '\n';
+}
+
+}  // namespace fieldtrue::cli
