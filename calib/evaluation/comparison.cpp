@@ -24,6 +24,7 @@ struct Job {
   std::vector<Candidate> candidates;
   AlignMode align = AlignMode::kRigid;
   bool has_orientation = false;
+  int dimension = 3;  ///< Of the true positions of all fitted rows.
 };
 
 /// Scores of the rows of one fold, in the fold's order.
@@ -74,7 +75,9 @@ FoldResult runFold(const Job& job, const Fold& fold, const std::vector<MethodSco
   }
   result.before_position = scoreRows(scored, *alignment, alignedPositionScore);
   if (job.has_orientation) result.before_orientation = scoreRows(scored, *alignment, alignedOrientationScore);
-  const FitData data = makeFitData(fitted, *alignment);
+  FitData data = makeFitData(fitted, *alignment);
+  // Places that span a volume are not fitted in a plane only because the few of this fold lie in one.
+  if (data.dimension == 2) data.dimension = job.dimension;
   for (std::size_t i = 0; i < job.candidates.size(); ++i) {
     if (control.stop.stop_requested()) {
       result.error = Error{ErrorCode::kCancelled, "The comparison was stopped on request"};
@@ -157,11 +160,13 @@ double evaluationTime_ns(const FittedCandidate& fitted, std::span<const Node> no
 }
 
 /// Fits every candidate once on all rows it may see: whether it can be used, how long it takes, how well it fits.
-Result<std::vector<MethodScore>> fitInSample(const Job& job, Comparison& comparison, const RunControl& control) {
+/// @param job its dimension is set here
+Result<std::vector<MethodScore>> fitInSample(Job& job, Comparison& comparison, const RunControl& control) {
   const std::vector<Node> fitted = rowsOf(job, job.all_fitted);
   const auto alignment = alignmentOf(job, fitted);
   if (!alignment) return tl::unexpected(alignment.error());
   const FitData data = makeFitData(fitted, *alignment);
+  job.dimension = data.dimension;
   if (data.dimension == 2)
     comparison.notes.push_back("The places lie in one plane: methods are fitted in it, and nothing is claimed off it.");
   const std::vector<int> places = placesOf(fitted);
@@ -293,7 +298,7 @@ Result<Job> prepare(const CalibrationTable& table, const ComparisonOptions& opti
 Result<Comparison> compareMethods(const CalibrationTable& table, const ComparisonOptions& options,
                                   const RunControl& control) {
   Comparison comparison;
-  const auto job = prepare(table, options, comparison);
+  auto job = prepare(table, options, comparison);
   if (!job) return tl::unexpected(job.error());
   auto scores = fitInSample(*job, comparison, control);
   if (!scores) return tl::unexpected(scores.error());

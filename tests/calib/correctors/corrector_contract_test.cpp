@@ -121,7 +121,7 @@ bool isOneSentence(const std::string& message) {
 }  // namespace
 
 /// The contract of every row of both registries.
-class RegistryTest : public QObject {
+class CorrectorContractTest : public QObject {
   Q_OBJECT
  private:
   void addPositionRows() {
@@ -339,5 +339,5 @@ class RegistryTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(RegistryTest)
-#include "registry_test.moc"
+QTEST_GUILESS_MAIN(CorrectorContractTest)
+#include "corrector_contract_test.moc"

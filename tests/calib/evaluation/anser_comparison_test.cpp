@@ -1,0 +1,174 @@
+#include <Eigen/Dense>
+#include <QTest>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "calib/correctors/corrector.h"
+#include "calib/evaluation/comparison.h"
+#include "calib/importers/registry.h"
+#include "tests/support/matchers.h"
+#include "tests/support/real_data.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+CalibrationTable readCondition(const std::string& condition) {
+  const Importer& importer = *findImporter("anser").value();
+  const Settings settings = resolveSettings("anser", importer.settings, {{"condition", condition}}).value();
+  return importer.read(*realData("anser_duplo/nodes.csv"), std::nullopt, settings).value().table.value();
+}
+
+double rms(const std::vector<double>& values) {
+  return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0) /
+                   static_cast<double>(values.size()));
+}
+
+double gain(const std::vector<double>& before, const std::vector<double>& after) {
+  return 1.0 - rms(after) / rms(before);
+}
+
+/// 5 % quantile of the gain over resampled places, by sorting, with a generator of its own.
+double lowGain(const std::vector<double>& before, const std::vector<double>& after) {
+  std::mt19937 generator(99);
+  std::uniform_int_distribution<std::size_t> index(0, before.size() - 1);
+  std::vector<double> gains(4000);
+  for (double& value : gains) {
+    std::vector<double> b;
+    std::vector<double> a;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      const std::size_t drawn = index(generator);
+      b.push_back(before[drawn]);
+      a.push_back(after[drawn]);
+    }
+    value = gain(b, a);
+  }
+  std::sort(gains.begin(), gains.end());
+  return gains[200];
+}
+
+/// The rule of application, computed by itself from held-out errors. None when chance decides: an interval's end so
+/// near zero that another seed may fall on the other side.
+std::optional<bool> ruleSaysApply(const std::vector<double>& before, const std::vector<double>& after) {
+  std::vector<double> lowest_before;
+  std::vector<double> lowest_after;
+  double lowest = HUGE_VAL;
+  for (std::size_t out = 0; out < before.size(); ++out) {
+    std::vector<double> b = before;
+    std::vector<double> a = after;
+    b.erase(b.begin() + static_cast<std::ptrdiff_t>(out));
+    a.erase(a.begin() + static_cast<std::ptrdiff_t>(out));
+    if (gain(b, a) >= lowest) continue;
+    lowest = gain(b, a);
+    lowest_before = b;
+    lowest_after = a;
+  }
+  const double low_with = lowGain(before, after);
+  const double low_without = lowGain(lowest_before, lowest_after);
+  if (gain(before, after) < 0.10 || lowest < 0.10) return false;
+  if (std::abs(low_with) < 0.01 || std::abs(low_without) < 0.01) return std::nullopt;
+  return low_with > 0.0 && low_without > 0.0;
+}
+
+}  // namespace
+
+/// Six real recordings of 41 hand-placed points on a flat board (Anser EMT, data/README.md).
+class AnserComparisonTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void conditions_data() {
+    QTest::addColumn<QByteArray>("condition");
+    QTest::addColumn<double>("in_sample_mm");
+    QTest::addColumn<double>("leave_one_out_mm");
+    QTest::newRow("standard") << QByteArray("standard_data_grid") << 2.26 << 2.34;
+    QTest::newRow("interpolate") << QByteArray("interpolate_data_grid") << 2.08 << 2.16;
+    QTest::newRow("probe_calibrate") << QByteArray("interpolate_data_grid_probe_calibrate") << 2.40 << 2.50;
+    QTest::newRow("finer_points") << QByteArray("finer_mesh_points") << 4.53 << 4.72;
+    QTest::newRow("finer_3axis") << QByteArray("finer_mesh_3axis") << 2.46 << 2.57;
+    QTest::newRow("steel_shield") << QByteArray("steel_shield") << 5.21 << 5.39;
+  }
+  void conditions() {
+    FT_REQUIRE_REAL_DATA();
+    QFETCH(QByteArray, condition);
+    QFETCH(double, in_sample_mm);
+    QFETCH(double, leave_one_out_mm);
+    const CalibrationTable table = readCondition(condition.toStdString());
+    QCOMPARE(table.nodes.size(), std::size_t{41});
+    const auto corrector =
+        Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice("none", "none").value(), AlignMode::kRigid);
+    FT_VERIFY_OK(corrector);
+    FT_VERIFY_MATCH(near(corrector->report().rms_before_mm, in_sample_mm, 0.01));
+    FT_VERIFY_MATCH(near(1000.0 * corrector->report().rms_m, in_sample_mm, 0.01));
+
+    const auto comparison = compareMethods(table, {});
+    FT_VERIFY_OK(comparison);
+    QCOMPARE(comparison->align, AlignMode::kRigid);
+    FT_VERIFY_MATCH(near(comparison->before_position_mm.rms, leave_one_out_mm, 0.01));
+    QVERIFY(comparison->position.front().method == "none");
+    FT_VERIFY_MATCH(near(comparison->position.front().stats.rms, leave_one_out_mm, 0.01));
+    FT_VERIFY_MATCH(near(comparison->position.front().in_sample_rms, in_sample_mm, 0.01));
+    // A rigid fit after the rigid alignment has nothing left to do.
+    FT_VERIFY_MATCH(near(comparison->position[1].stats.rms, comparison->before_position_mm.rms, 1e-6));
+    QCOMPARE(comparison->validation_places, 41);
+
+    const auto best = comparison->best_position_row;
+    if (best) {
+      const MethodScore& score = comparison->position[*best];
+      for (const MethodScore& other : comparison->position)
+        QVERIFY(other.skipped || other.stats.rms >= score.stats.rms - 1e-6);
+      const std::optional<bool> expected = ruleSaysApply(comparison->before_place_mm, score.place_errors);
+      if (expected) QCOMPARE(comparison->verdict.apply_position, *expected);
+    } else {
+      QVERIFY(!comparison->verdict.apply_position);
+    }
+    qInfo("%s", comparison->verdict.text.c_str());
+  }
+
+  void theBoardIsSeenToBeFlat() {
+    FT_REQUIRE_REAL_DATA();
+    const CalibrationTable table = readCondition("steel_shield");
+    const auto comparison = compareMethods(table, {});
+    FT_VERIFY_OK(comparison);
+    FT_VERIFY_MATCH(holdsAll(comparison->notes.front(), {"one plane", "nothing is claimed off it"}));
+    for (const MethodScore& score : comparison->position) {
+      if (score.method == "none" || score.skipped) continue;
+      QVERIFY(!score.notes.empty());
+      FT_VERIFY_MATCH(holdsAll(score.notes.front(), {"one plane"}));
+    }
+    for (const std::string method : {"affine", "polynomial:degree=2", "hmq"}) {
+      const auto corrector =
+          Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice(method, "none").value(), AlignMode::kRigid);
+      FT_VERIFY_OK(corrector);
+      const Eigen::Vector3d p_m = table.nodes[12].tracker_from_sensor.position_m;
+      QVERIFY(corrector->covers(p_m));
+      // The board is level in the tracker frame to a few degrees: 50 mm above and below nothing was measured.
+      QVERIFY(!corrector->covers(p_m + Eigen::Vector3d(0, 0, 0.05)));
+      QVERIFY(!corrector->covers(p_m - Eigen::Vector3d(0, 0, 0.05)));
+    }
+  }
+
+  void aPlanarPolynomialGainsLittle() {
+    FT_REQUIRE_REAL_DATA();
+    // data/README.md: second degree in the plane gains at most 12 % and worsens three of the six; one more is within 1
+    // %.
+    int n_worse = 0;
+    for (const char* condition :
+         {"standard_data_grid", "interpolate_data_grid", "interpolate_data_grid_probe_calibrate", "finer_mesh_points",
+          "finer_mesh_3axis", "steel_shield"}) {
+      ComparisonOptions options;
+      options.position_methods = {{"polynomial", {{"degree", "2"}}}};
+      const auto comparison = compareMethods(readCondition(condition), options);
+      FT_VERIFY_OK(comparison);
+      const double gained = gain(comparison->before_place_mm, comparison->position.front().place_errors);
+      QVERIFY2(gained < 0.125, condition);
+      n_worse += gained < 0.0;
+    }
+    QVERIFY(n_worse == 3 || n_worse == 4);
+  }
+};
+
+QTEST_GUILESS_MAIN(AnserComparisonTest)
+#include "anser_comparison_test.moc"

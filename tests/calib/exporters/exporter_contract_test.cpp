@@ -1,0 +1,86 @@
+#include <QTemporaryDir>
+#include <QTest>
+#include <set>
+
+#include "calib/core/file_io.h"
+#include "calib/exporters/registry.h"
+#include "tests/support/matchers.h"
+#include "tests/support/synthetic.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+/// Calibrations of every kind of table an exporter may meet.
+std::vector<Corrector> calibrations() {
+  SyntheticOptions full;
+  full.smooth_distortion_m = 0.02;
+  full.orientation_error_rad = 0.1;
+  SyntheticOptions position_only = full;
+  position_only.has_orientation = false;
+  SyntheticOptions flat = position_only;
+  flat.counts = {6, 6, 1};
+  std::vector<Corrector> made;
+  for (const auto& [options, position, orientation] :
+       {std::tuple{full, "hmq", "polynomial_quaternion"}, std::tuple{position_only, "polynomial", "none"},
+        std::tuple{flat, "affine", "none"}, std::tuple{full, "none", "none"}}) {
+    const CalibrationTable table = syntheticTable(options);
+    made.push_back(Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice(position, orientation).value(),
+                                  AlignMode::kRigid)
+                       .value());
+  }
+  return made;
+}
+
+}  // namespace
+
+/// The contract of every row of the exporter registry.
+class ExporterContractTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void rowsAreComplete() {
+    std::set<std::string> ids;
+    for (const Exporter& exporter : exporters()) {
+      QVERIFY(!exporter.label.empty() && exporter.extension.starts_with('.') && !exporter.reads_it.empty() &&
+              exporter.write);
+      QVERIFY2(ids.insert(exporter.id).second, exporter.id.c_str());
+      QVERIFY(findExporter(exporter.id).value() == &exporter);
+    }
+    const auto unknown = findExporter("punched_cards");
+    QVERIFY(!unknown && unknown.error().code == ErrorCode::kBadInput);
+    FT_VERIFY_MATCH(holdsAll(unknown.error().message, {"punched_cards", "csv", "ftcal"}));
+  }
+
+  void writesTheSameBytesTwice_data() {
+    QTest::addColumn<QString>("id");
+    for (const Exporter& exporter : exporters())
+      QTest::newRow(exporter.id.c_str()) << QString::fromStdString(exporter.id);
+  }
+  void writesTheSameBytesTwice() {
+    QFETCH(QString, id);
+    const Exporter& exporter = *findExporter(id.toStdString()).value();
+    QTemporaryDir folder;
+    const std::filesystem::path base = folder.path().toStdString();
+    for (const Corrector& corrector : calibrations()) {
+      FT_VERIFY_OK(exporter.write(corrector, base / ("first" + exporter.extension)));
+      FT_VERIFY_OK(exporter.write(corrector, base / ("second" + exporter.extension)));
+      const std::string first = readFile(base / ("first" + exporter.extension)).value();
+      QVERIFY(first.size() > 1000);
+      QVERIFY(first == readFile(base / ("second" + exporter.extension)).value());
+      QVERIFY(first.find("nan") == std::string::npos && first.find("inf,") == std::string::npos);
+      FT_VERIFY_MATCH(holdsAll(first, {"Fieldtrue"}));
+    }
+  }
+
+  void aFolderThatIsNotThereIsSaid_data() { writesTheSameBytesTwice_data(); }
+  void aFolderThatIsNotThereIsSaid() {
+    QFETCH(QString, id);
+    const auto written = findExporter(id.toStdString()).value()->write(calibrations().front(), "/nowhere/at/all.out");
+    QVERIFY(!written && written.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(holdsAll(written.error().message, {"/nowhere/at/all.out"}));
+  }
+};
+
+QTEST_GUILESS_MAIN(ExporterContractTest)
+#include "exporter_contract_test.moc"
