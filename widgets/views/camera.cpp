@@ -14,7 +14,7 @@ constexpr double kPerspective_rad = 28.0 * kPi / 180.0;
 constexpr double kNearlyParallel_rad = 5.0 * kPi / 180.0;
 constexpr double kOperatorTurn_rad = 24.0 * kPi / 180.0;
 constexpr double kOperatorElevation_rad = 22.0 * kPi / 180.0;
-constexpr double kRoomForText = 1.16;  ///< Tick labels stand outside the box.
+constexpr double kLeastFree = 0.6;  ///< Half pictures kept for the scene in a view too small for its legends.
 
 struct Directions {
   Eigen::Vector3d toward_camera, up, right;
@@ -36,26 +36,43 @@ double operatorAzimuth_rad(const SceneSpace& space) {
   return across.norm() < 0.05 * space.diagonal_m() ? 0.0 : std::atan2(across.y(), across.x());
 }
 
-double heightToShow_m(const CameraPose& pose, const SceneSpace& space, double aspect) {
+Eigen::Vector3d corner(const SceneSpace& space, int number) {
+  return {(number & 1 ? space.high_m : space.low_m).x(), (number & 2 ? space.high_m : space.low_m).y(),
+          (number & 4 ? space.high_m : space.low_m).z()};
+}
+
+/// Where the corners of a space fall in half pictures from the focus, for a camera at a distance.
+Eigen::AlignedBox2d seen(const CameraPose& pose, const SceneSpace& space, double aspect, double distance_m) {
   const Directions d = directions(pose);
   const double slope = std::tan(0.5 * pose.view_angle_rad);
-  double distance = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d at((corner & 1 ? space.high_m : space.low_m).x(),
-                             (corner & 2 ? space.high_m : space.low_m).y(),
-                             (corner & 4 ? space.high_m : space.low_m).z());
-    const Eigen::Vector3d from_focus = at - pose.focus_m;
-    const double sideways = std::max(std::abs(from_focus.dot(d.up)), std::abs(from_focus.dot(d.right)) / aspect);
-    distance = std::max(distance, from_focus.dot(d.toward_camera) + sideways * kRoomForText / slope);
+  Eigen::AlignedBox2d box;
+  for (int number = 0; number < 8; ++number) {
+    const Eigen::Vector3d from_focus = corner(space, number) - pose.focus_m;
+    const double depth = std::max(distance_m - from_focus.dot(d.toward_camera), 0.05 * distance_m);
+    box.extend(Eigen::Vector2d(from_focus.dot(d.right) / aspect, from_focus.dot(d.up)) / (depth * slope));
   }
-  return 2.0 * distance * slope;
+  return box;
+}
+
+void fit(CameraPose& pose, const SceneSpace& space, const ViewFrame& frame) {
+  constexpr int kSteps = 12;  // the size on screen is nearly proportional to 1 / distance: converges in a few
+  const double aspect = frame.width / frame.height;
+  const Eigen::Vector2d free(std::max(2.0 * (1.0 - (frame.left + frame.right) / frame.width), kLeastFree),
+                             std::max(2.0 * (1.0 - (frame.top + frame.bottom) / frame.height), kLeastFree));
+  double distance_m = space.diagonal_m() / std::tan(0.5 * pose.view_angle_rad);
+  for (int step = 0; step < kSteps; ++step)
+    distance_m *= seen(pose, space, aspect, distance_m).sizes().cwiseQuotient(free).maxCoeff();
+  pose.view_height_m = 2.0 * distance_m * std::tan(0.5 * pose.view_angle_rad);
+  const Eigen::Vector2d free_center((frame.left - frame.right) / frame.width,
+                                    (frame.bottom - frame.top) / frame.height);
+  pose.window_center = seen(pose, space, aspect, distance_m).center() - free_center;
 }
 
 double shortTurn_rad(double from, double to) { return std::remainder(to - from, 2.0 * kPi); }
 
 }  // namespace
 
-CameraPose presetPose(CameraPreset preset, const SceneSpace& space, double aspect) {
+CameraPose presetPose(CameraPreset preset, const SceneSpace& space, const ViewFrame& frame) {
   CameraPose pose;
   pose.focus_m = space.center_m();
   pose.view_angle_rad = kNearlyParallel_rad;
@@ -79,7 +96,7 @@ CameraPose presetPose(CameraPreset preset, const SceneSpace& space, double aspec
       pose.elevation_rad = 0.5 * kPi;
       break;
   }
-  pose.view_height_m = heightToShow_m(pose, space, aspect);
+  fit(pose, space, frame);
   return pose;
 }
 
@@ -90,6 +107,7 @@ CameraPose interpolate(const CameraPose& a, const CameraPose& b, double t) {
   between.elevation_rad = a.elevation_rad + t * (b.elevation_rad - a.elevation_rad);
   between.view_height_m = a.view_height_m * std::pow(b.view_height_m / a.view_height_m, t);
   between.view_angle_rad = a.view_angle_rad + t * (b.view_angle_rad - a.view_angle_rad);
+  between.window_center = a.window_center + t * (b.window_center - a.window_center);
   return between;
 }
 
@@ -100,6 +118,7 @@ void apply(const CameraPose& pose, vtkCamera* camera) {
   camera->SetFocalPoint(pose.focus_m.data());
   camera->SetPosition(position.data());
   camera->SetViewUp(d.up.data());
+  camera->SetWindowCenter(pose.window_center.x(), pose.window_center.y());
   camera->SetViewAngle(pose.view_angle_rad * 180.0 / kPi);
 }
 
@@ -116,6 +135,7 @@ CameraPose poseOf(vtkCamera* camera) {
   pose.azimuth_rad = std::atan2(horizontal.y(), horizontal.x());
   pose.view_angle_rad = camera->GetViewAngle() * kPi / 180.0;
   pose.view_height_m = 2.0 * offset.norm() * std::tan(0.5 * pose.view_angle_rad);
+  pose.window_center = Eigen::Vector2d(camera->GetWindowCenter());
   return pose;
 }
 

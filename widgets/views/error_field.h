@@ -17,7 +17,7 @@ struct FieldArrow {
   std::optional<double> angle_deg;  ///< Orientation error.
   bool validation = false;
   std::optional<Eigen::Vector3d>
-      rotation_axis;  ///< Of the orientation error, reference frame, any length; none: the arc faces the viewer.
+      rotation_axis;  ///< Of the orientation error, reference frame, any length; drawn as a needle through the arc.
   QString name;       ///< What hover calls the place; empty: "place 17".
 };
 

@@ -16,10 +16,10 @@ namespace fieldtrue {
 namespace {
 
 constexpr double kShaftRadius = 0.022;  ///< Of the pitch, as all of these.
-constexpr double kEdgeWidth = 0.007;
 constexpr double kPlaceRadius = 0.035;
-constexpr double kArcInner = 0.13;
-constexpr double kArcOuter = 0.21;
+constexpr double kArcInner = 0.17;
+constexpr double kArcOuter = 0.27;
+constexpr double kNeedleRadius = 0.008;
 constexpr double kLargestArc_rad = 1.9 * std::numbers::pi;
 constexpr double kRad = std::numbers::pi / 180.0;
 constexpr double kArcStep_rad = 10.0 * kRad;
@@ -105,6 +105,8 @@ double FieldScene::angleScaleMax_deg() const {
   return largest > 0.0 ? largest : 1.0;
 }
 
+QMargins FieldScene::legendMargins() { return {64, 44, 116, 52}; }
+
 void FieldScene::update() {
   if (changed_) {
     renderer_->SetBackground(rgb(theme_->background).data());
@@ -126,7 +128,7 @@ void FieldScene::updateArrows() {
       arrows.push_back({arrow.from_m, arrow.from_m + magnification_ * arrow.error_m,
                         magnitudeColor(length_mm(arrow) / scale_max_mm_)});
   const double pitch = space_.pitch_m.minCoeff();
-  arrows_.setEdge(theme_->dark ? theme_->background : theme_->text, kEdgeWidth * pitch);
+  arrows_.setEdge(theme_->dark ? theme_->text_muted : theme_->text);
   arrows_.setArrows(arrows, kShaftRadius * pitch);
 }
 
@@ -155,16 +157,15 @@ void FieldScene::updateArcs(const Eigen::Matrix3d& world_from_view) {
     const double maximum_deg = angleScaleMax_deg();
     for (const FieldArrow& arrow : field_.arrows) {
       if (!arrow.angle_deg || !std::isfinite(*arrow.angle_deg)) continue;
-      Eigen::Vector3d u = world_from_view.col(0), v = world_from_view.col(1);
-      if (arrow.rotation_axis && arrow.rotation_axis->norm() > 0.0) {
-        const auto uv = across(arrow.rotation_axis->normalized());
-        u = uv[0];
-        v = uv[1];
-      }
       const double angle_rad = std::min(kLargestArc_rad, magnification_ * *arrow.angle_deg * kRad);
       const int steps = std::max(1, static_cast<int>(std::ceil(angle_rad / kArcStep_rad)));
       mesh.setColor(magnitudeColor(*arrow.angle_deg / maximum_deg));
-      mesh.addSector(arrow.from_m, u, v, kArcInner * pitch, kArcOuter * pitch, 0.0, angle_rad, steps);
+      mesh.addSector(arrow.from_m, world_from_view.col(0), world_from_view.col(1), kArcInner * pitch, kArcOuter * pitch,
+                     0.0, angle_rad, steps);
+      if (!arrow.rotation_axis || !(arrow.rotation_axis->norm() > 0.0)) continue;
+      const Eigen::Vector3d half = kArcOuter * pitch * arrow.rotation_axis->normalized();
+      mesh.setColor(theme_->text_muted);
+      mesh.addCylinder(arrow.from_m - half, arrow.from_m + half, kNeedleRadius * pitch, 6);
     }
   }
   setShape(arcs_, mesh.polyData());

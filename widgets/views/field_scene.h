@@ -1,5 +1,6 @@
 #pragma once
 
+#include <QMargins>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -28,6 +29,9 @@ class FieldScene {
   const ErrorField& field() const { return field_; }
   /// What hover says of an arrow, one line each: its name, its position error, its orientation error.
   std::vector<std::string> describe(std::size_t index) const;
+
+  /// What axis labels and legends take of the picture at each side [logical pixels].
+  static QMargins legendMargins();
 
   void update();
   /// Turns marks and arcs to the camera of the moment.

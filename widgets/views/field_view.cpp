@@ -54,6 +54,8 @@ void FieldView::prepareFrame() {
   OrbitView::prepareFrame();
 }
 
+QMargins FieldView::legendMargins() const { return FieldScene::legendMargins(); }
+
 std::vector<Eigen::Vector3d> FieldView::pickPoints_m() const {
   std::vector<Eigen::Vector3d> points;
   points.reserve(scene_->field().arrows.size());

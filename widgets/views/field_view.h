@@ -37,6 +37,7 @@ class FieldView : public OrbitView {
  protected:
   void restyle(double pixel_ratio) override;
   void prepareFrame() override;
+  QMargins legendMargins() const override;
   std::vector<Eigen::Vector3d> pickPoints_m() const override;
   void pointHovered(std::optional<int> index) override;
   void pointClicked(int index) override;

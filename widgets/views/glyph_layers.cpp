@@ -20,13 +20,15 @@ namespace fieldtrue {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kEdgeSize = 1.28;   ///< Of the edge's shape, against the mark's.
-constexpr double kEdgeBehind = 0.2;  ///< Radii.
-constexpr double kFullLength = 9.0;  ///< Shaft radii from which an arrow has its full thickness.
-constexpr double kHeadLength = 6.0;  ///< Shaft radii.
-constexpr double kHeadRadius = 2.7;  ///< Shaft radii.
-constexpr double kHeadShare = 0.62;  ///< Of a short arrow.
-constexpr int kSides = 10;
+constexpr double kEdgeSize = 1.28;        ///< Of the edge's shape, against the mark's.
+constexpr double kEdgeBehind = 0.2;       ///< Radii.
+constexpr double kFullLength = 9.0;       ///< Shaft radii from which an arrow has its full thickness.
+constexpr double kHeadLength = 6.0;       ///< Shaft radii.
+constexpr double kHeadRadius = 2.7;       ///< Shaft radii.
+constexpr double kHeadShare = 0.62;       ///< Of a short arrow.
+constexpr double kEdgeShare = 0.3;        ///< Of the shaft's radius.
+constexpr std::size_t kMostEdged = 2000;  ///< With more the edges hide the colours and cost half of the time.
+constexpr int kSides = 8;
 
 void addPolygonRing(Mesh& mesh, double inner, double outer, int corners, double first_rad) {
   mesh.addSector(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), inner, outer, first_rad,
@@ -40,12 +42,23 @@ void addBar(Mesh& mesh, double angle_rad, double half_length, double half_width)
   mesh.addTriangle(at(-1, -1), at(1, 1), at(-1, 1), Eigen::Vector3d::UnitZ());
 }
 
+/// An octahedron's faces, each divided in four and blown up to the unit ball.
+void addBall(Mesh& mesh) {
+  for (int octant = 0; octant < 8; ++octant) {
+    const Eigen::Vector3d x((octant & 1) ? 1 : -1, 0, 0), y(0, (octant & 2) ? 1 : -1, 0),
+        z(0, 0, (octant & 4) ? 1 : -1);
+    const Eigen::Vector3d xy = (x + y).normalized(), yz = (y + z).normalized(), zx = (z + x).normalized();
+    const std::array<std::array<Eigen::Vector3d, 3>, 4> faces = {{{x, xy, zx}, {y, yz, xy}, {z, zx, yz}, {xy, yz, zx}}};
+    for (const auto& [a, b, c] : faces) mesh.addTriangle(a, b, c, (a + b + c).normalized());
+  }
+}
+
 vtkSmartPointer<vtkPolyData> shapeOf(Symbol symbol) {
   constexpr double kQuarter = kPi / 4.0;
   Mesh mesh;
   switch (symbol) {
     case Symbol::kDot:
-      addPolygonRing(mesh, 0.0, 1.0, 10, 0.0);
+      addBall(mesh);
       break;
     case Symbol::kFilledCircle:
       addPolygonRing(mesh, 0.0, 1.0, 32, 0.0);
@@ -93,14 +106,16 @@ vtkSmartPointer<vtkPolyData> unitShaft() {
 
 vtkSmartPointer<vtkPolyData> unitHead() {
   Mesh mesh;
-  mesh.addCone(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), 1.0, kSides + 4);
+  mesh.addCone(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), 1.0, kSides);
   return mesh.polyData();
 }
 
 }  // namespace
 
 MarkLayer::MarkLayer(vtkRenderer* renderer, Symbol symbol)
-    : points_(vtkSmartPointer<vtkPolyData>::New()), fill_(makeGlyphs(renderer, shapeOf(symbol))) {
+    : points_(vtkSmartPointer<vtkPolyData>::New()),
+      fill_(makeGlyphs(renderer, shapeOf(symbol))),
+      round_(symbol == Symbol::kDot) {
   if (isFilled(symbol)) edge_ = makeGlyphs(renderer, shapeOf(symbol));
 }
 
@@ -142,7 +157,7 @@ void MarkLayer::setEdge(const QColor& color) {
 }
 
 void MarkLayer::face(const Eigen::Matrix3d& world_from_view) {
-  const Eigen::Matrix3d placing = radius_m_ * world_from_view;
+  const Eigen::Matrix3d placing = radius_m_ * (round_ ? Eigen::Matrix3d::Identity() : world_from_view);
   if (placing == placed_) return;
   placed_ = placing;
   for (const Glyphs& glyphs : {fill_, edge_}) {
@@ -166,11 +181,9 @@ ArrowLayer::ArrowLayer(vtkRenderer* renderer)
       shaft_edge_(makeGlyphs(renderer, unitShaft(), true)),
       head_edge_(makeGlyphs(renderer, unitHead(), true)) {}
 
-ArrowLayer::Glyphs ArrowLayer::makeGlyphs(vtkRenderer* renderer, vtkPolyData* shape, bool edge) {
-  Glyphs glyphs;
-  glyphs.points = vtkSmartPointer<vtkPolyData>::New();
+vtkSmartPointer<vtkActor> ArrowLayer::makeGlyphs(vtkRenderer* renderer, vtkPolyData* shape, bool edge) {
   vtkNew<vtkGlyph3DMapper> mapper;
-  mapper->SetInputData(glyphs.points);
+  mapper->SetInputData(vtkNew<vtkPolyData>());
   mapper->SetSourceData(shape);
   mapper->SetOrientationModeToDirection();
   mapper->SetOrientationArray("direction");
@@ -183,18 +196,18 @@ ArrowLayer::Glyphs ArrowLayer::makeGlyphs(vtkRenderer* renderer, vtkPolyData* sh
     mapper->SelectColorArray("color");
     mapper->SetColorModeToDirectScalars();
   }
-  glyphs.actor = vtkSmartPointer<vtkActor>::New();
-  glyphs.actor->SetMapper(mapper);
-  glyphs.actor->GetProperty()->LightingOff();
+  auto actor = vtkSmartPointer<vtkActor>::New();
+  actor->SetMapper(mapper);
+  actor->GetProperty()->LightingOff();
   // The edge is the far side of a slightly larger arrow: seen only where it looks out behind the arrow.
-  if (edge) glyphs.actor->GetProperty()->FrontfaceCullingOn();
-  glyphs.actor->VisibilityOff();
-  renderer->AddActor(glyphs.actor);
-  return glyphs;
+  if (edge) actor->GetProperty()->FrontfaceCullingOn();
+  actor->VisibilityOff();
+  renderer->AddActor(actor);
+  return actor;
 }
 
-void ArrowLayer::place(const Glyphs& glyphs, std::span<const Arrow> arrows, double shaft_radius_m, bool head,
-                       double grow_m) {
+void ArrowLayer::place(vtkActor* glyphs, std::span<const Arrow> arrows, double shaft_radius_m, bool head,
+                       double edge_share) {
   vtkNew<vtkPoints> points;
   vtkNew<vtkFloatArray> directions, scales;
   vtkNew<vtkUnsignedCharArray> colors;
@@ -209,6 +222,7 @@ void ArrowLayer::place(const Glyphs& glyphs, std::span<const Arrow> arrows, doub
     if (!(length > 0.0)) continue;
     const Eigen::Vector3d along = (arrow.to_m - arrow.from_m) / length;
     const double radius = shaft_radius_m * std::min(1.0, length / (kFullLength * shaft_radius_m));
+    const double grow_m = edge_share * radius;
     const double head_length = std::min(kHeadShare * length, kHeadLength * radius);
     // A cone grown evenly reaches further at its tip than a cylinder does at its end.
     const double start = (head ? length - head_length : 0.0) - grow_m;
@@ -225,20 +239,20 @@ void ArrowLayer::place(const Glyphs& glyphs, std::span<const Arrow> arrows, doub
   for (vtkDataArray* array :
        {static_cast<vtkDataArray*>(directions), static_cast<vtkDataArray*>(scales), static_cast<vtkDataArray*>(colors)})
     data->GetPointData()->AddArray(array);
-  static_cast<vtkGlyph3DMapper*>(glyphs.actor->GetMapper())->SetInputData(data);
-  glyphs.actor->SetVisibility(points->GetNumberOfPoints() > 0);
+  static_cast<vtkGlyph3DMapper*>(glyphs->GetMapper())->SetInputData(data);
+  glyphs->SetVisibility(points->GetNumberOfPoints() > 0);
 }
 
 void ArrowLayer::setArrows(std::span<const Arrow> arrows, double shaft_radius_m) {
   place(shaft_, arrows, shaft_radius_m, false, 0.0);
   place(head_, arrows, shaft_radius_m, true, 0.0);
-  place(shaft_edge_, arrows, shaft_radius_m, false, edge_m_);
-  place(head_edge_, arrows, shaft_radius_m, true, edge_m_);
+  const std::span<const Arrow> edged = arrows.size() <= kMostEdged ? arrows : std::span<const Arrow>();
+  place(shaft_edge_, edged, shaft_radius_m, false, kEdgeShare);
+  place(head_edge_, edged, shaft_radius_m, true, kEdgeShare);
 }
 
-void ArrowLayer::setEdge(const QColor& color, double width_m) {
-  edge_m_ = width_m;
-  for (const Glyphs& glyphs : {shaft_edge_, head_edge_}) glyphs.actor->GetProperty()->SetColor(rgb(color).data());
+void ArrowLayer::setEdge(const QColor& color) {
+  for (vtkActor* glyphs : {shaft_edge_.Get(), head_edge_.Get()}) glyphs->GetProperty()->SetColor(rgb(color).data());
 }
 
 }  // namespace fieldtrue

@@ -16,6 +16,7 @@ class vtkRenderer;
 namespace fieldtrue {
 
 /// Flat marks that always face the camera, so that each keeps its shape from every side.
+/// A kDot is a small ball and needs no turning.
 enum class Symbol { kDot, kCircle, kThickCircle, kFilledCircle, kSquare, kFilledSquare, kDiamond, kCross };
 
 /// One symbol drawn at many points.
@@ -40,11 +41,12 @@ class MarkLayer {
 
   vtkSmartPointer<vtkPolyData> points_;
   Glyphs fill_, edge_;
+  bool round_ = false;
   double radius_m_ = 0.01;
   Eigen::Matrix3d placed_ = Eigen::Matrix3d::Zero();
 };
 
-/// Arrows of even thickness with a thin dark edge, up to many thousands.
+/// Arrows of even thickness, up to many thousands; up to two thousand have a thin edge.
 class ArrowLayer {
  public:
   struct Arrow {
@@ -55,18 +57,14 @@ class ArrowLayer {
   explicit ArrowLayer(vtkRenderer* renderer);
   /// @param shaft_radius_m of arrows long enough for it; short ones are thinner
   void setArrows(std::span<const Arrow> arrows, double shaft_radius_m);
-  void setEdge(const QColor& color, double width_m);
+  void setEdge(const QColor& color);
 
  private:
-  struct Glyphs {
-    vtkSmartPointer<vtkPolyData> points;
-    vtkSmartPointer<vtkActor> actor;
-  };
-  Glyphs makeGlyphs(vtkRenderer* renderer, vtkPolyData* shape, bool edge);
-  void place(const Glyphs& glyphs, std::span<const Arrow> arrows, double shaft_radius_m, bool head, double grow_m);
+  static vtkSmartPointer<vtkActor> makeGlyphs(vtkRenderer* renderer, vtkPolyData* shape, bool edge);
+  static void place(vtkActor* glyphs, std::span<const Arrow> arrows, double shaft_radius_m, bool head,
+                    double edge_share);
 
-  Glyphs shaft_, head_, shaft_edge_, head_edge_;
-  double edge_m_ = 0.0;
+  vtkSmartPointer<vtkActor> shaft_, head_, shaft_edge_, head_edge_;
 };
 
 }  // namespace fieldtrue

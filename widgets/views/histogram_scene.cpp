@@ -21,6 +21,7 @@
 #include "calib/core/error.h"
 #include "widgets/views/mesh.h"
 #include "widgets/views/overlay.h"
+#include "widgets/views/scene_font.h"
 
 namespace fieldtrue {
 namespace {
@@ -43,10 +44,8 @@ std::array<unsigned char, 3> bytes(const QColor& color) {
 }
 
 void setText(vtkTextProperty* text, const QColor& color, bool bold = false) {
-  text->SetFontFamilyToArial();
+  setFont(text, bold);
   text->SetFontSize(kTextSize);
-  text->SetBold(bold);
-  text->SetItalic(false);
   text->SetColor(rgb(color).data());
 }
 

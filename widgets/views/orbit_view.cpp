@@ -37,7 +37,6 @@ OrbitView::OrbitView(QWidget* parent) : VtkHost(parent) {
           [this](const QVariant& t) { apply(interpolate(ease_from_, ease_to_, t.toDouble()), camera_); });
   camera_ = vtkSmartPointer<vtkCamera>::New();
   observeCamera(camera_);
-  fitPreset();
 }
 
 OrbitView::~OrbitView() { camera_->RemoveObserver(camera_observer_); }
@@ -46,7 +45,7 @@ void OrbitView::setCamera(Camera preset) {
   preset_ = preset;
   placed_by_user_ = false;
   ease_from_ = cameraPose();
-  ease_to_ = presetPose(preset, space_, aspect());
+  ease_to_ = presetPose(preset, space_, frame());
   easing_->stop();
   if (isVisible())
     easing_->start();
@@ -88,11 +87,16 @@ void OrbitView::cameraModified() {
   if (cameraPose() != drawn_) requestRender();
 }
 
-double OrbitView::aspect() const { return height() > 0 ? static_cast<double>(width()) / height() : 1.0; }
+ViewFrame OrbitView::frame() const {
+  const QMargins margins = legendMargins();
+  return {static_cast<double>(std::max(1, width())), static_cast<double>(std::max(1, height())),
+          static_cast<double>(margins.left()),       static_cast<double>(margins.right()),
+          static_cast<double>(margins.top()),        static_cast<double>(margins.bottom())};
+}
 
 void OrbitView::fitPreset() {
   if (placed_by_user_ || follows_) return;
-  ease_to_ = presetPose(preset_, space_, aspect());
+  ease_to_ = presetPose(preset_, space_, frame());
   if (easing_->state() != QAbstractAnimation::Running) apply(ease_to_, camera_);
 }
 

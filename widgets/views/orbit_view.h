@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <QMargins>
 #include <QPoint>
 #include <optional>
 
@@ -45,6 +46,9 @@ class OrbitView : public VtkHost {
   void setSpace(const SceneSpace& space);
   const SceneSpace& space() const { return space_; }
 
+  /// What legends and labels take of the view at each side [logical pixels].
+  virtual QMargins legendMargins() const = 0;
+
   /// Points that can be hovered and clicked, by index.
   virtual std::vector<Eigen::Vector3d> pickPoints_m() const = 0;
   virtual void pointHovered(std::optional<int> index) = 0;
@@ -54,7 +58,7 @@ class OrbitView : public VtkHost {
   std::optional<int> pointAt(const QPointF& position) const;
   void observeCamera(vtkSmartPointer<vtkCamera> camera);
   void cameraModified();
-  double aspect() const;
+  ViewFrame frame() const;
   void fitPreset();
   void setHovered(std::optional<int> index);
   void turn(double azimuth_rad, double elevation_rad);

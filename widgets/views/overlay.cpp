@@ -18,6 +18,7 @@
 #include <limits>
 
 #include "widgets/views/projection.h"
+#include "widgets/views/scene_font.h"
 
 namespace fieldtrue {
 namespace {
@@ -28,8 +29,13 @@ constexpr double kMargin_px = 12.0;
 constexpr double kLine_px = 18.0;
 constexpr double kBarWidth_px = 14.0;
 constexpr double kBarHeight_px = 190.0;
+constexpr double kLeastBarHeight_px = 40.0;
+constexpr double kAboveBar_px = 38.0;
+constexpr double kBelowBar_px = 34.0;
 constexpr double kScaleWidth_px = 92.0;
 constexpr int kMostTicks = 7;
+constexpr double kLabelGap_px = 10.0;
+constexpr double kUpright = 0.9;
 
 enum class Align { kLeft, kCenter, kRight };
 
@@ -101,9 +107,8 @@ class Pencil {
 
   void setText(const QColor& color, int size, bool bold, Align align) const {
     vtkTextProperty* property = painter_->GetTextProp();
-    property->SetFontFamilyToArial();
+    setFont(property, bold);
     property->SetFontSize(size);
-    property->SetBold(bold);
     property->SetColor(color.redF(), color.greenF(), color.blueF());
     property->SetOpacity(1.0);
     property->SetVerticalJustificationToCentered();
@@ -118,14 +123,11 @@ class Pencil {
   Eigen::Vector2d size_px_;
 };
 
-void drawScale(const Pencil& pencil, const ScaleLegend& legend, double right_px) {
+void drawScale(const Pencil& pencil, const ScaleLegend& legend, double bottom, double height) {
   const Theme& theme = pencil.theme();
-  const double height = std::min(kBarHeight_px, pencil.size_px().y() - 130.0);
-  if (height < 40.0) return;
-  const double left = right_px - kScaleWidth_px;
-  const double bottom = 0.5 * (pencil.size_px().y() - height);
+  const double left = pencil.size_px().x() - kMargin_px - kScaleWidth_px;
   pencil.fill(theme.surface, 0.88);
-  pencil.rectangle(left - 8.0, bottom - 34.0, kScaleWidth_px + 8.0, height + 72.0);
+  pencil.rectangle(left - 8.0, bottom - kBelowBar_px, kScaleWidth_px + 8.0, height + kBelowBar_px + kAboveBar_px);
   constexpr int kSteps = 96;
   for (int step = 0; step < kSteps; ++step) {
     pencil.fill(magnitudeColor((step + 0.5) / kSteps));
@@ -142,6 +144,20 @@ void drawScale(const Pencil& pencil, const ScaleLegend& legend, double right_px)
   }
   pencil.text({left, bottom + height + 22.0}, legend.title, theme.text, Align::kLeft, kTextSize, true);
   pencil.text({left, bottom - 20.0}, legend.note, theme.text);
+}
+
+/// The scales one above the other at the right, centred.
+void drawScales(const Pencil& pencil, const std::vector<ScaleLegend>& scales) {
+  if (scales.empty()) return;
+  const double count = static_cast<double>(scales.size());
+  const double text = kBelowBar_px + kAboveBar_px;
+  const double height = std::min(kBarHeight_px, (pencil.size_px().y() - 2.0 * kMargin_px) / count - text);
+  if (height < kLeastBarHeight_px) return;
+  double bottom = 0.5 * (pencil.size_px().y() + count * (height + text)) - height - kAboveBar_px;
+  for (const ScaleLegend& scale : scales) {
+    drawScale(pencil, scale, bottom, height);
+    bottom -= height + text;
+  }
 }
 
 std::vector<Eigen::Vector2d> corners(const Eigen::Vector2d& at, double radius, double first_rad) {
@@ -240,6 +256,22 @@ std::optional<std::array<Eigen::Vector3d, 2>> clearEdge(const Pencil& pencil, co
   return best;
 }
 
+/// All with the same decimals: as few as tell the ticks to half a hundredth of the pitch.
+std::vector<std::string> tickTexts(const std::vector<double>& ticks_m, double pitch_m, LengthUnit unit) {
+  int decimals = 0;
+  const auto tells = [&](double tick_m) {
+    const double value = tick_m / metresPer(unit), scale = std::pow(10.0, decimals);
+    return std::abs(std::round(value * scale) / scale - value) < 0.005 * pitch_m / metresPer(unit);
+  };
+  while (decimals < 3 && !std::all_of(ticks_m.begin(), ticks_m.end(), tells)) ++decimals;
+  std::vector<std::string> texts;
+  for (const double tick_m : ticks_m) {
+    const double value = tick_m / metresPer(unit);
+    texts.push_back(std::abs(value) < 1e-9 ? "0" : QString::number(value, 'f', decimals).toStdString());
+  }
+  return texts;
+}
+
 void drawAxis(const Pencil& pencil, const SceneSpace& space, LengthUnit unit, int axis) {
   const auto edge = clearEdge(pencil, space, axis);
   const auto center = pencil.place(space.center_m());
@@ -256,20 +288,29 @@ void drawAxis(const Pencil& pencil, const SceneSpace& space, LengthUnit unit, in
   const int last = static_cast<int>(std::floor((space.high_m[axis] - origin) / pitch + 1e-6));
   const double room = (*end - *start).norm() / 34.0;
   const int every = std::max(1, static_cast<int>(std::ceil((last - first + 1) / std::min<double>(kMostTicks, room))));
+  std::vector<double> ticks_m;
+  for (int k = first; k <= last; ++k)
+    // The corner on the floor belongs to the labels of the horizontal axes.
+    if (k % every == 0 && (axis != 2 || origin + k * pitch > space.low_m.z() + 0.3 * pitch))
+      ticks_m.push_back(origin + k * pitch);
+  const std::vector<std::string> texts = tickTexts(ticks_m, pitch, unit);
   double widest = 0.0;
-  for (int k = first; k <= last; ++k) {
-    if (k % every != 0) continue;
+  for (std::size_t k = 0; k < ticks_m.size(); ++k) {
     Eigen::Vector3d at = (*edge)[0];
-    at[axis] = origin + k * pitch;
+    at[axis] = ticks_m[k];
     const auto px = pencil.place(at);
     if (!px) continue;
-    const std::string text = shortNumber(at[axis] / metresPer(unit));
+    const std::string& text = texts[k];
     widest = std::max(widest, pencil.textWidth_px(text, kTextSize));
-    pencil.text(*px + 10.0 * outward, text, pencil.theme().text_muted, align);
+    pencil.text(*px + kLabelGap_px * outward, text, pencil.theme().text_muted, align);
   }
-  const double clear = 16.0 + std::abs(outward.x()) * widest + std::abs(outward.y()) * kLine_px;
   const std::string name = std::string(1, "xyz"[axis]) + " (" + unitSymbol(unit).toStdString() + ")";
-  pencil.text(0.5 * (*start + *end) + clear * outward, name, pencil.theme().text, align, kTextSize, true);
+  const bool upright = std::abs(outward.x()) > kUpright;
+  const double clear =
+      upright ? kLabelGap_px : 16.0 + std::abs(outward.x()) * widest + std::abs(outward.y()) * kLine_px;
+  // Beside an upright axis there is no room for the name: it stands at the upper end.
+  const Eigen::Vector2d at = upright ? Eigen::Vector2d(start->y() > end->y() ? *start : *end) : 0.5 * (*start + *end);
+  pencil.text(at + clear * outward, name, pencil.theme().text, align, kTextSize, true);
 }
 
 }  // namespace
@@ -285,11 +326,7 @@ bool Overlay::Paint(vtkContext2D* painter) {
   for (const SceneLabel& label : content.labels)
     if (const auto at = pencil.place(label.at_m))
       pencil.text(*at, label.text, label.color, Align::kCenter, kTextSize, true);
-  double right = pencil.size_px().x() - kMargin_px;
-  for (const ScaleLegend& scale : content.scales) {
-    drawScale(pencil, scale, right);
-    right -= kScaleWidth_px + 16.0;
-  }
+  drawScales(pencil, content.scales);
   drawSymbols(pencil, content.symbols);
   if (!content.title.empty())
     pencil.text({kMargin_px + 4.0, pencil.size_px().y() - 22.0}, content.title, content.theme->text, Align::kLeft,

@@ -34,8 +34,14 @@ QImage draw(QSize size, const std::function<std::shared_ptr<void>(vtkRenderer*)>
 template <class Scene>
 void aim(Scene& scene, vtkRenderer* renderer, QSize size) {
   scene.update();
-  const double aspect = static_cast<double>(size.width()) / size.height();
-  apply(presetPose(CameraPreset::kOperator, scene.space(), aspect), renderer->GetActiveCamera());
+  const QMarginsF margins = QMarginsF(Scene::legendMargins()) * ratioFor(size);
+  const ViewFrame frame{static_cast<double>(size.width()),
+                        static_cast<double>(size.height()),
+                        margins.left(),
+                        margins.right(),
+                        margins.top(),
+                        margins.bottom()};
+  apply(presetPose(CameraPreset::kOperator, scene.space(), frame), renderer->GetActiveCamera());
   scene.faceCamera();
   renderer->ResetCameraClippingRange();
 }

@@ -164,7 +164,7 @@ void SensorPart::build(const SceneSpace& space, const Theme& theme, double ratio
   const vtkSmartPointer<vtkPolyData> trail = lines.polyData();
   trail->GetPointData()->SetScalars(colors);
   setShape(trail_, trail);
-  trail_->GetProperty()->SetLineWidth(static_cast<float>(2.0 * ratio));
+  trail_->GetProperty()->SetLineWidth(static_cast<float>(3.0 * ratio));
 }
 
 PathPart::PathPart(vtkRenderer* renderer) : actor_(addFlatActor(renderer)) {}

@@ -14,6 +14,8 @@
 namespace fieldtrue {
 namespace {
 
+constexpr double kNextSize = 2.3;  ///< Of a mark's radius; the pulse grows to twice that.
+
 /// Of several visits to one place the one that says most is drawn; later in this list wins.
 int importance(PlaceState state) {
   switch (state) {
@@ -136,6 +138,8 @@ void RoomScene::updateSpace() {
   space_ = spaceAround(points, reference_from_tracker_, floor_z_m_);
 }
 
+QMargins RoomScene::legendMargins() { return {64, 24, 48, 52}; }
+
 void RoomScene::update() {
   if (room_changed_) updateRoom();
   if (marks_changed_ || room_changed_) {
@@ -161,7 +165,7 @@ void RoomScene::updateRoom() {
       {kNextCore, theme_->accent},
       {kHalo, theme_->text},
   };
-  const std::map<Layer, double> sizes = {{kNext, 1.7}, {kNextCore, 0.7}, {kHalo, 2.2}};
+  const std::map<Layer, double> sizes = {{kNext, kNextSize}, {kNextCore, 0.9}, {kHalo, 2.0}};
   for (auto& [layer, mark] : marks_) {
     if (colors.contains(layer)) mark.setColor(colors.at(layer));
     mark.setEdge(theme_->background);
@@ -242,7 +246,7 @@ void RoomScene::updateOverlay() {
 void RoomScene::faceCamera() {
   const Eigen::Matrix3d world_from_view = worldFromView(renderer_);
   MarkLayer& pulse = marks_.at(kPulse);
-  pulse.setRadius(space_.mark_radius_m * (1.7 + 1.6 * pulse_));
+  pulse.setRadius(space_.mark_radius_m * kNextSize * (1.0 + pulse_));
   pulse.setColor(theme_->accent, 1.0 - pulse_);
   for (auto& [layer, mark] : marks_) mark.face(world_from_view);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <QMargins>
 #include <map>
 #include <memory>
 #include <optional>
@@ -31,6 +32,9 @@ class RoomScene {
   const SceneSpace& space() const { return space_; }
   const std::vector<PlannedPlace>& places() const { return places_; }
   bool hasCurrent() const { return current_.has_value(); }
+
+  /// What axis labels and legends take of the picture at each side [logical pixels].
+  static QMargins legendMargins();
 
   void update();
   /// Turns the marks to the camera of the moment.

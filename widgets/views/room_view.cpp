@@ -99,6 +99,8 @@ void RoomView::updatePulse() {
     pulse_->stop();
 }
 
+QMargins RoomView::legendMargins() const { return RoomScene::legendMargins(); }
+
 std::vector<Eigen::Vector3d> RoomView::pickPoints_m() const {
   std::vector<Eigen::Vector3d> points;
   for (const PlannedPlace& place : scene_->places()) points.push_back(place.reference_from_sensor.position_m);

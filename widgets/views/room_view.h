@@ -45,6 +45,7 @@ class RoomView : public OrbitView {
   void prepareFrame() override;
   void showEvent(QShowEvent* event) override;
   void hideEvent(QHideEvent* event) override;
+  QMargins legendMargins() const override;
   std::vector<Eigen::Vector3d> pickPoints_m() const override;
   void pointHovered(std::optional<int> index) override;
   void pointClicked(int index) override;
