@@ -35,38 +35,65 @@ std::vector<double> alongAxis(Readings values, int axis) {
   return result;
 }
 
+Eigen::Vector3d medianOf(Readings values) {
+  Eigen::Vector3d median;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> ordered = alongAxis(values, axis);
+    const auto centre = ordered.begin() + static_cast<std::ptrdiff_t>(ordered.size() / 2);
+    std::nth_element(ordered.begin(), centre, ordered.end());
+    median[axis] = *centre;
+  }
+  return median;
+}
+
+std::vector<Eigen::Vector3d> differences(Readings values, std::size_t lag) {
+  std::vector<Eigen::Vector3d> result;
+  for (std::size_t i = lag; i < values.size(); ++i) result.push_back(values[i] - values[i - lag]);
+  return result;
+}
+
 /// Half the mean squared difference of readings `lag` apart: variance * (1 - correlation at that lag). The median
 /// difference is taken out first, so that a steady drift does not pass for correlated noise.
 double halfSquaredDifference(Readings values, std::size_t lag) {
   if (values.size() <= lag) return 0.0;
-  std::vector<Eigen::Vector3d> differences;
-  for (std::size_t i = lag; i < values.size(); ++i) differences.push_back(values[i] - values[i - lag]);
-  Eigen::Vector3d drift;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> ordered = alongAxis(differences, axis);
-    const auto centre = ordered.begin() + static_cast<std::ptrdiff_t>(ordered.size() / 2);
-    std::nth_element(ordered.begin(), centre, ordered.end());
-    drift[axis] = *centre;
-  }
+  const std::vector<Eigen::Vector3d> all = differences(values, lag);
+  const Eigen::Vector3d drift = medianOf(all);
   std::vector<double> squares;
-  for (const Eigen::Vector3d& difference : differences) squares.push_back((difference - drift).squaredNorm());
+  for (const Eigen::Vector3d& difference : all) squares.push_back((difference - drift).squaredNorm());
   return 0.5 * trimmedMeanSquare(std::move(squares));
 }
 
-/// Upper estimate of the lag-1 correlation. With D the half squared difference at a lag, D2/D1 = 1 + r and
-/// D4/D1 = (1 + r)(1 + r^2) for a first-order process; the larger answer plus one standard error is taken.
-double upperCorrelation(Readings values, double half_square_lag1) {
-  if (half_square_lag1 <= 0.0) return 0.0;
-  const double from_lag2 = halfSquaredDifference(values, 2) / half_square_lag1 - 1.0;
-  const double ratio4 = halfSquaredDifference(values, 4) / half_square_lag1;
+/// Half the mean squared difference of successive differences: variance * (1 - r)(3 - r), and next to nothing for the
+/// smooth path of a hand.
+double halfSquaredBend(Readings values) {
+  if (values.size() < 3) return 0.0;
+  std::vector<double> squares;
+  for (const Eigen::Vector3d& bend : differences(differences(values, 1), 1)) squares.push_back(bend.squaredNorm());
+  return 0.5 * trimmedMeanSquare(std::move(squares));
+}
+
+struct Noise {
+  double correlation = 0.0;
+  double variance = 0.0;
+};
+
+/// What close neighbours tell of the noise. With D the half squared difference at a lag, D4/D1 = (1 + r)(1 + r^2) for a
+/// first-order process; 1.5 standard errors are added to r, for too small a limit costs more than too wide a one.
+Noise noiseFromNeighbours(Readings values) {
+  Noise noise;
+  const double lag1 = halfSquaredDifference(values, 1);
+  if (lag1 <= 0.0) return noise;
+  const double ratio = halfSquaredDifference(values, 4) / lag1;
   double low = 0.0, high = kMaxCorrelation;
   for (int step = 0; step < 30; ++step) {
     const double r = 0.5 * (low + high);
-    ((1 + r) * (1 + r * r) < ratio4 ? low : high) = r;
+    ((1 + r) * (1 + r * r) < ratio ? low : high) = r;
   }
-  const double estimate = std::clamp(std::max(from_lag2, low), 0.0, kMaxCorrelation);
-  const double error = (1.0 - 0.7 * estimate * estimate) / std::sqrt(static_cast<double>(values.size()));
-  return std::min(estimate + error, kMaxCorrelation);
+  const double error = (1.0 - 0.7 * low * low) / std::sqrt(static_cast<double>(values.size()));
+  noise.correlation = std::min(low + 1.5 * error, kMaxCorrelation);
+  const double innovation = std::min(lag1, halfSquaredBend(values) / (3.0 - noise.correlation));
+  noise.variance = innovation / (1.0 - noise.correlation);
+  return noise;
 }
 
 Eigen::Vector3d centreOf(Readings values) {
@@ -92,11 +119,6 @@ double covarianceOfMeans(double r, double n, double m) {
   return r * (1 - std::pow(r, n)) * (1 - std::pow(r, m)) / ((1 - r) * (1 - r) * n * m);
 }
 
-struct Noise {
-  double correlation = 0.0;
-  double variance_from_neighbours = 0.0;
-};
-
 Shift shiftAt(Readings values, std::size_t split, const Noise& noise, double sigmas) {
   const Eigen::Vector3d before = centreOf(values.first(split));
   const Eigen::Vector3d after = centreOf(values.subspan(split));
@@ -107,8 +129,7 @@ Shift shiftAt(Readings values, std::size_t split, const Noise& noise, double sig
   const auto n = static_cast<double>(split), m = static_cast<double>(values.size() - split);
   const double mean_n = varianceOfMean(noise.correlation, n), mean_m = varianceOfMean(noise.correlation, m);
   const double share_within = std::max(1.0 - (n * mean_n + m * mean_m) / (n + m), 0.02);
-  const double variance =
-      std::min(trimmedMeanSquare(std::move(squares)) / share_within, noise.variance_from_neighbours);
+  const double variance = std::min(trimmedMeanSquare(std::move(squares)) / share_within, noise.variance);
   const double of_difference = mean_n + mean_m - 2.0 * covarianceOfMeans(noise.correlation, n, m);
   const double widened = sigmas * (1.0 + kFewReadings / (n + m));
   return {(after - before).norm(), widened * std::sqrt(std::max(variance * of_difference, 0.0))};
@@ -120,10 +141,7 @@ Shift largestShift(Readings values, int block, double floor, double sigmas) {
   FT_CHECK(block >= 1 && floor > 0.0);
   const auto size = static_cast<std::size_t>(block);
   const Readings whole_blocks = values.first(values.size() / size * size);
-  const double half_square_lag1 = halfSquaredDifference(whole_blocks, 1);
-  Noise noise;
-  noise.correlation = upperCorrelation(whole_blocks, half_square_lag1);
-  noise.variance_from_neighbours = half_square_lag1 / (1.0 - noise.correlation);
+  const Noise noise = noiseFromNeighbours(whole_blocks);
   Shift worst{0.0, floor};
   for (std::size_t split = size; split < whole_blocks.size(); split += size) {
     Shift shift = shiftAt(whole_blocks, split, noise, sigmas);

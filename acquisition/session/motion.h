@@ -16,8 +16,9 @@ struct Shift {
 ///
 /// Centres are mid-means (the outer fifths of each axis left out), so that single wild readings are no motion. The
 /// limit adapts to the measured noise and its autocorrelation, modelled as first-order autoregressive with a
-/// correlation of at most 0.95. The noise is measured twice, from the differences of close neighbours (blind to drift)
-/// and from the scatter about the two centres (blind to a step), and the smaller is used.
+/// correlation of at most 0.95. The noise is measured twice, from the differences of close neighbours (blind to drift
+/// and to the smooth path of a hand) and from the scatter about the two centres (blind to a step), and the smaller is
+/// used.
 /// @param values readings at equal steps of time
 /// @param block readings in a block, at least 1; fewer than two whole blocks show no shift
 /// @param floor a shift up to this is never motion, same unit as the readings

@@ -78,13 +78,14 @@ TakeState NodeSampler::add(const Sample& sample) {
 
 std::optional<std::string> NodeSampler::motion() const {
   std::vector<Eigen::Vector3d> positions_m, turns_rad;
-  const Eigen::Quaterniond* first = nullptr;
+  std::optional<Eigen::Quaterniond> first;
   for (const Sample& sample : samples_) {
     if (!isGood(sample)) continue;
     const Pose& pose = sample.tracker_from_sensor;
-    if (!first) first = &pose.orientation;
+    const Eigen::Quaterniond orientation = pose.orientation.normalized();
+    if (!first) first = orientation;
     positions_m.push_back(pose.position_m);
-    turns_rad.push_back(rotationVector_rad(pose.orientation * first->conjugate()));
+    turns_rad.push_back(rotationVector_rad(orientation * first->conjugate()));
   }
   const Shift shift = largestShift(positions_m, options_.block, options_.still_floor_m, options_.still_sigmas);
   if (shift.moved()) return "moved " + millimetres(shift.size);

@@ -45,7 +45,9 @@ void appendVisit(std::vector<PlannedPlace>& all, const std::vector<PlannedPlace>
   const Eigen::Quaterniond turn = planOrientation(visit / plan.reseat);
   for (PlannedPlace place : walk) {
     place.visit += visit;
-    place.reference_from_sensor.orientation = canonical(place.reference_from_sensor.orientation * turn);
+    if (visit >= plan.reseat) {
+      place.reference_from_sensor.orientation = canonical(place.reference_from_sensor.orientation * turn);
+    }
     all.push_back(place);
   }
 }

@@ -76,7 +76,9 @@ Result<void> readNodeOrientation(const JsonObject& node, PlannedPlace& place) {
   }
   const Eigen::Quaterniond quaternion(q[0], q[1], q[2], q[3]);
   if (quaternion.norm() < 1e-6) return node.expected("qw", "part of a quaternion that is not zero");
-  place.reference_from_sensor.orientation = canonical(quaternion);
+  // One that is unit already keeps its bits, so that a plan written and read again is the same plan.
+  const bool unit = std::abs(quaternion.squaredNorm() - 1.0) < 1e-14 && q[0] >= 0.0;
+  place.reference_from_sensor.orientation = unit ? quaternion : canonical(quaternion);
   return {};
 }
 

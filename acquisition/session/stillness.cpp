@@ -50,8 +50,9 @@ std::string movingReason(double speed_m_s) {
 }  // namespace
 
 bool isGood(const Sample& sample) {
-  return sample.status.empty() && sample.tracker_from_sensor.position_m.allFinite() &&
-         sample.tracker_from_sensor.orientation.coeffs().allFinite();
+  const Pose& pose = sample.tracker_from_sensor;
+  return sample.status.empty() && pose.position_m.allFinite() && pose.orientation.coeffs().allFinite() &&
+         pose.orientation.norm() > 1e-6 && !isMissingMark(pose.position_m.cwiseAbs().maxCoeff());
 }
 
 StillnessDetector::StillnessDetector(double window_s, double floor_m) : window_s_(window_s), floor_m_(floor_m) {

@@ -1,0 +1,528 @@
+#include "acquisition/session/acquisition_controller.h"
+
+#include <signal.h>
+#include <sys/resource.h>
+
+#include <QElapsedTimer>
+#include <QTemporaryDir>
+#include <QTest>
+#include <QThread>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "tests/support/matchers.h"
+
+using namespace fieldtrue;
+
+namespace {
+
+constexpr double kRate_hz = 120.0;
+
+/// A tracker whose every reading is the test's: the jig is carried, set down and unplugged by calls.
+class FakeTracker : public TrackerDevice {
+ public:
+  Pose reference_from_tracker{{0.1, -0.2, 0.05}, rotationFromVector({0.0, 0.0, 0.3})};
+  Pose true_pose{{-1.0, -1.0, -1.0}, Eigen::Quaterniond::Identity()};
+  std::vector<Pose> guided;
+  QString tracker_name = QStringLiteral("fake");
+
+  void start() override { emit stateChanged(DeviceState::kRunning, "running"); }
+  void stop() override {}
+  void guideTo(const Pose& pose) override { guided.push_back(pose); }
+  TableMetadata describe() const override {
+    TableMetadata metadata;
+    metadata.tracker = tracker_name.toStdString();
+    metadata.rate_hz = kRate_hz;
+    return metadata;
+  }
+
+  void restartClock() { n_ = 0; }
+  void send(const Pose& pose, const std::string& status = {}) {
+    Sample sample;
+    sample.time_s = static_cast<double>(n_++) / kRate_hz;
+    sample.tracker_from_sensor = inverse(reference_from_tracker) * pose;
+    // Bounded noise: nothing of it is ever an outlier.
+    for (double& x : sample.tracker_from_sensor.position_m) x += uniform_(random_);
+    sample.status = status;
+    emit samplesReceived({sample});
+  }
+  void stand(double seconds, const std::string& status = {}) {
+    for (int n = 0; n < seconds * kRate_hz; ++n) send(true_pose, status);
+  }
+  void carryTo(const Pose& place, double seconds = 0.8) {
+    const Pose from = true_pose;
+    const int steps = static_cast<int>(seconds * kRate_hz);
+    for (int n = 1; n <= steps; ++n) {
+      const double s = n / double(steps);
+      true_pose = {from.position_m + s * (place.position_m - from.position_m), place.orientation};
+      send(true_pose);
+    }
+  }
+  void lose() { emit stateChanged(DeviceState::kFailed, "The cable was pulled."); }
+  void comeBack() {
+    restartClock();
+    emit stateChanged(DeviceState::kRunning, "running");
+  }
+
+ private:
+  std::uint64_t n_ = 0;
+  std::mt19937_64 random_{5};
+  std::uniform_real_distribution<double> uniform_{-1e-4, 1e-4};
+};
+
+Plan planOf(std::array<int, 3> counts) {
+  Plan plan;
+  plan.counts = counts;
+  plan.pitch_m = {0.3, 0.3, 0.3};
+  return plan;
+}
+
+/// One controller with its fake tracker and everything it said.
+struct Bench {
+  explicit Bench(const QString& path, const Plan& plan = planOf({3, 3, 2}), bool create = true) {
+    QObject::connect(&controller, &AcquisitionController::nodeStored,
+                     [this](int place, const Node& node, const QString& suspicious) {
+                       stored.push_back(place);
+                       nodes.push_back(node);
+                       suspicions << suspicious;
+                     });
+    QObject::connect(&controller, &AcquisitionController::takeFailed,
+                     [this](const QString& text) { take_failures << text; });
+    QObject::connect(&controller, &AcquisitionController::failed, [this](const QString& text) { failures << text; });
+    QObject::connect(&controller, &AcquisitionController::finished, [this] { ++n_finished; });
+    QObject::connect(&controller, &AcquisitionController::sessionOpened,
+                     [this](const QString&, const QString& page, const QString& plan_json) {
+                       opened_page = page;
+                       opened_plan = plan_json;
+                     });
+    QObject::connect(&controller, &AcquisitionController::tablesReady,
+                     [this](const CalibrationTable& nodes_now, const SampleTable& samples_now) {
+                       table = nodes_now;
+                       samples = samples_now;
+                     });
+    auto device = std::make_unique<FakeTracker>();
+    tracker = device.get();
+    controller.adoptDevice(std::move(device));
+    controller.openSession(path, create ? QString::fromStdString(toJson(plan).dump()) : QString());
+  }
+  Pose placePose(std::size_t place) const { return controller.status().places.at(place).reference_from_sensor; }
+  /// Carries the jig to the current place and takes it as an operator does with the space bar.
+  void takeHere() {
+    tracker->carryTo(placePose(*controller.status().current));
+    controller.take();
+    tracker->stand(0.51);
+  }
+  void readTables() { controller.requestTables(); }
+
+  AcquisitionController controller;
+  FakeTracker* tracker = nullptr;
+  std::vector<int> stored;
+  std::vector<Node> nodes;
+  QStringList suspicions, take_failures, failures;
+  int n_finished = 0;
+  QString opened_page, opened_plan;
+  CalibrationTable table;
+  SampleTable samples;
+};
+
+}  // namespace
+
+class AcquisitionControllerTest : public QObject {
+  Q_OBJECT
+
+  QTemporaryDir folder_;
+  int n_files_ = 0;
+  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
+
+ private slots:
+  void wholePlanByHand() { wholePlan(false); }
+  void wholePlanAutomatically() { wholePlan(true); }
+
+  void tablesEqualAnIndependentAverage() {
+    Bench bench(newPath(), planOf({2, 2, 2}));
+    while (bench.n_finished == 0) bench.takeHere();
+    bench.readTables();
+    QCOMPARE(bench.table.nodes.size(), std::size_t{8});
+    for (const Node& node : bench.table.nodes) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      int n = 0;
+      for (const SampleRow& row : bench.samples.rows) {
+        if (row.node != node.node) continue;
+        sum += row.sample.tracker_from_sensor.position_m;
+        ++n;
+      }
+      QCOMPARE(n, 60);
+      QCOMPARE(node.n_used, 60);
+      FT_VERIFY_MATCH(testing::near(node.tracker_from_sensor.position_m, sum / n, 1e-12));
+      const Pose expected = inverse(bench.tracker->reference_from_tracker) * node.reference_from_sensor;
+      FT_VERIFY_MATCH(testing::near(node.tracker_from_sensor, expected, 1e-4, 1e-6));
+    }
+  }
+
+  void aStandIsNeverTakenTwice() {
+    Bench bench(newPath());
+    bench.controller.setAutomatic(true);
+    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->stand(20.0);
+    QCOMPARE(bench.stored, std::vector<int>{0});
+    QCOMPARE(bench.controller.status().reason, QString("move the sensor here; or press space"));
+    bench.tracker->true_pose.position_m.x() += 0.003;
+    bench.tracker->stand(5.0);
+    QCOMPARE(bench.stored, std::vector<int>{0});
+    const Pose lifted{bench.tracker->true_pose.position_m + Eigen::Vector3d(0, 0, 0.03),
+                      Eigen::Quaterniond::Identity()};
+    bench.tracker->carryTo(lifted, 0.3);
+    bench.tracker->carryTo(bench.placePose(1));
+    bench.tracker->stand(3.0);
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
+  }
+
+  void aSensorFoundStandingWaits() {
+    Bench bench(newPath());
+    bench.tracker->true_pose = bench.placePose(0);
+    bench.controller.setAutomatic(true);
+    bench.tracker->stand(2.5);
+    QVERIFY(bench.stored.empty());
+    bench.tracker->stand(2.0);
+    QCOMPARE(bench.stored, std::vector<int>{0});
+  }
+
+  void knownFrameTakesOnlyNearThePlace() {
+    Bench bench(newPath(), planOf({2, 2, 3}));
+    bench.controller.setAutomatic(true);
+    for (int i = 0; i < 6; ++i) {
+      bench.tracker->carryTo(bench.placePose(*bench.controller.status().current));
+      bench.tracker->stand(2.0);
+    }
+    QCOMPARE(bench.stored.size(), std::size_t{6});
+    const AcquisitionStatus status = bench.controller.status();
+    QVERIFY(status.reference_known);
+    FT_VERIFY_MATCH(testing::near(status.reference_from_tracker, bench.tracker->reference_from_tracker, 1e-3, 1e-2));
+    Pose wrong = bench.placePose(*status.current);
+    wrong.position_m += Eigen::Vector3d(0.25, 0.0, 0.0);
+    bench.tracker->carryTo(wrong);
+    bench.tracker->stand(10.0);
+    QCOMPARE(bench.stored.size(), std::size_t{6});
+    QCOMPARE(bench.controller.status().reason, QString("still, but 0.25 m away: move it here; or press space"));
+    bench.tracker->carryTo(bench.placePose(*status.current));
+    bench.tracker->stand(1.2);
+    QCOMPARE(bench.stored.size(), std::size_t{7});
+  }
+
+  void retakeSkipUndoRedo() {
+    Bench bench(newPath());
+    for (int i = 0; i < 3; ++i) bench.takeHere();
+    bench.controller.skip();
+    auto status = bench.controller.status();
+    QVERIFY(status.states[3] == PlaceState::kSkipped && status.current == 4u && status.n_skipped == 1);
+
+    bench.controller.goTo(1);
+    status = bench.controller.status();
+    QVERIFY(status.current == 1u && status.current_is_retake);
+    bench.takeHere();
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1, 2, 1}));
+    QVERIFY(bench.controller.status().current == 4u);
+
+    bench.controller.undo();
+    status = bench.controller.status();
+    QVERIFY2(status.current == 1u && status.states[1] == PlaceState::kDone, "the take before is back");
+    bench.controller.undo();
+    QVERIFY(bench.controller.status().current == 3u && bench.controller.status().states[3] == PlaceState::kPlanned);
+    bench.controller.undo();
+    status = bench.controller.status();
+    QVERIFY(status.current == 2u && status.states[2] == PlaceState::kPlanned && status.n_done == 2 && status.can_redo);
+    for (int i = 0; i < 3; ++i) bench.controller.redo();
+    status = bench.controller.status();
+    QVERIFY(status.n_done == 3 && status.n_skipped == 1 && status.current == 4u && !status.can_redo);
+    for (int i = 0; i < 5; ++i) bench.controller.undo();
+    QVERIFY(!bench.controller.status().can_undo && bench.controller.status().n_done == 0);
+    bench.controller.undo();
+    QVERIFY(bench.failures.isEmpty() && bench.take_failures.isEmpty());
+    QVERIFY2((bench.tracker->guided.back().position_m - bench.placePose(0).position_m).norm() == 0.0,
+             "the device hears of every change of place");
+  }
+
+  void goToAndBack() {
+    Bench bench(newPath());
+    bench.takeHere();
+    bench.controller.goTo(5);
+    QVERIFY(bench.controller.status().current == 5u);
+    bench.controller.goTo(-1);
+    QVERIFY(bench.controller.status().current == 1u);
+    bench.controller.goTo(1000);
+    QVERIFY(bench.controller.status().current == 1u);
+  }
+
+  void deviceLostInMidNodeAndBack() {
+    Bench bench(newPath());
+    bench.takeHere();
+    bench.tracker->carryTo(bench.placePose(1));
+    bench.controller.take();
+    bench.tracker->stand(0.25);
+    QCOMPARE(bench.controller.status().collected, 30);
+    bench.tracker->lose();
+    QCOMPARE(bench.take_failures.size(), 1);
+    QVERIFY2(bench.take_failures[0].contains("The cable was pulled."), qPrintable(bench.take_failures[0]));
+    QVERIFY(bench.take_failures[0].startsWith("B1, pipe 1: "));
+    auto status = bench.controller.status();
+    QVERIFY(status.attention && status.take == TakeState::kFailed && status.current == 1u && status.n_done == 1);
+    bench.readTables();
+    QCOMPARE(bench.samples.rows.size(), std::size_t{60});
+    bench.controller.take();
+    QCOMPARE(bench.take_failures.size(), 2);
+    QVERIFY(bench.take_failures[1].contains("not connected"));
+
+    const std::size_t n_guided = bench.tracker->guided.size();
+    bench.tracker->comeBack();
+    QCOMPARE(bench.tracker->guided.size(), n_guided + 1);
+    bench.controller.take();
+    bench.tracker->stand(0.51);
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
+    QVERIFY2(*bench.nodes[1].t_start_s > *bench.nodes[0].t_end_s,
+             "the session's clock goes on when the tracker's does not");
+    QVERIFY(bench.failures.isEmpty());
+  }
+
+  void deviceLostBetweenTakesIsSaidOnce() {
+    Bench bench(newPath());
+    bench.tracker->lose();
+    bench.tracker->lose();
+    QCOMPARE(bench.failures, QStringList{"The cable was pulled."});
+    QVERIFY(bench.take_failures.isEmpty());
+  }
+
+  void movedTakeStartsOverAndIsSuspicious() {
+    Bench bench(newPath());
+    bench.tracker->carryTo(bench.placePose(0));
+    bench.controller.take();
+    bench.tracker->stand(0.25);
+    bench.tracker->true_pose.position_m.z() += 0.005;
+    bench.tracker->stand(0.1);
+    QVERIFY(bench.controller.status().reason.startsWith("retaking: moved "));
+    QVERIFY(bench.controller.status().attention);
+    bench.tracker->stand(1.0);
+    QCOMPARE(bench.stored, std::vector<int>{0});
+    QCOMPARE(bench.suspicions, QStringList{"moved once while sampling"});
+    QVERIFY(bench.controller.status().states[0] == PlaceState::kSuspicious);
+    QCOMPARE(bench.nodes[0].n_used, 60);
+  }
+
+  void noSignalFailsInWords() {
+    Bench bench(newPath());
+    bench.controller.setAutomatic(true);
+    bench.tracker->stand(1.0, "k");
+    QCOMPARE(bench.controller.status().reason, QString("no signal: the tracker reports error k"));
+    QVERIFY(bench.controller.status().attention);
+    bench.tracker->stand(30.0, "k");
+    QCOMPARE(bench.take_failures, QStringList{"A1, pipe 1: no signal: the tracker reports error k"});
+  }
+
+  void cancelledTakeStoresNothing() {
+    Bench bench(newPath());
+    bench.tracker->carryTo(bench.placePose(0));
+    bench.controller.take();
+    bench.tracker->stand(0.3);
+    bench.controller.cancelTake();
+    QVERIFY(bench.controller.status().take == TakeState::kIdle);
+    bench.tracker->stand(2.0);
+    QVERIFY(bench.stored.empty() && bench.take_failures.isEmpty());
+  }
+
+  void fullDiskIsToldAndNothingIsLost() {
+    const QString path = newPath();
+    Bench bench(path);
+    bench.takeHere();
+    signal(SIGXFSZ, SIG_IGN);
+    rlimit before{};
+    getrlimit(RLIMIT_FSIZE, &before);
+    const rlimit none{4096, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &none);
+    bench.takeHere();
+    setrlimit(RLIMIT_FSIZE, &before);
+    QCOMPARE(bench.stored, std::vector<int>{0});
+    QCOMPARE(bench.take_failures.size(), 1);
+    QVERIFY2(bench.take_failures[0].startsWith("B1, pipe 1: not stored: "), qPrintable(bench.take_failures[0]));
+    QVERIFY(bench.controller.status().current == 1u);
+    bench.controller.take();
+    bench.tracker->stand(0.51);
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
+  }
+
+  void reopeningResumes() {
+    const QString path = newPath();
+    std::vector<Node> before;
+    {
+      Bench bench(path);
+      for (int i = 0; i < 4; ++i) bench.takeHere();
+      bench.controller.skip();
+      bench.controller.setSessionState("page", "compare");
+      bench.controller.storeFit("hmq", "{}");
+      bench.readTables();
+      before = bench.table.nodes;
+    }
+    Bench bench(path, {}, false);
+    QVERIFY2(bench.failures.isEmpty(), qPrintable(bench.failures.join(' ')));
+    QCOMPARE(bench.opened_page, QString("compare"));
+    QVERIFY(nlohmann::json::parse(bench.opened_plan.toStdString()) == toJson(planOf({3, 3, 2})));
+    const auto status = bench.controller.status();
+    QVERIFY(status.current == 5u && status.n_done == 4 && status.n_skipped == 1 && status.can_undo);
+    QCOMPARE(status.session_path, path);
+    bench.takeHere();
+    bench.readTables();
+    QCOMPARE(bench.table.nodes.size(), std::size_t{5});
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      FT_VERIFY_MATCH(testing::sameBits(bench.table.nodes[i].tracker_from_sensor, before[i].tracker_from_sensor));
+    }
+    QVERIFY(*bench.table.nodes[4].t_start_s > *bench.table.nodes[3].t_end_s);
+  }
+
+  void metadataComesFromTheDevice() {
+    Bench bench(newPath());
+    bench.readTables();
+    QVERIFY(bench.table.metadata.tracker == "fake" && bench.table.metadata.rate_hz == kRate_hz);
+    QVERIFY(bench.table.metadata.rig == "wooden jig");
+    QCOMPARE(QString::fromStdString(*bench.table.metadata.date), QDate::currentDate().toString(Qt::ISODate));
+  }
+
+  void badSessionsAreToldAndTheOpenOneStays() {
+    const QString path = newPath();
+    Bench bench(path);
+    bench.controller.openSession(folder_.filePath("none.fieldtrue"), {});
+    QCOMPARE(bench.failures.size(), 1);
+    QVERIFY(bench.failures[0].contains("no such session file"));
+    bench.controller.openSession(newPath(), "{\"grid\": \"5x5@1\"}");
+    QCOMPARE(bench.failures.size(), 2);
+    QVERIFY(bench.failures[1].contains("expected NXxNYxNZ"));
+    QCOMPARE(bench.controller.status().session_path, path);
+    bench.controller.openSession(path, {});
+    QCOMPARE(bench.failures.size(), 2);
+    bench.controller.connectDevice("nosuch:thing", {});
+    QCOMPARE(bench.failures.size(), 3);
+    bench.controller.connectDevice("simulated", folder_.filePath("none.scene.json"));
+    QCOMPARE(bench.failures.size(), 4);
+  }
+
+  void takingWithoutASessionIsToldKindly() {
+    AcquisitionController controller;
+    QStringList told;
+    connect(&controller, &AcquisitionController::takeFailed, this, [&](const QString& text) { told << text; });
+    controller.take();
+    QVERIFY(told.size() == 1 && told[0].startsWith("There is no session"));
+    controller.skip();
+    controller.undo();
+    controller.redo();
+    controller.goTo(3);
+    controller.requestTables();
+    controller.closeSession();
+    controller.disconnectDevice();
+  }
+
+  void statusComesAtMostThirtyTimesASecond() {
+    Bench bench(newPath());
+    int n_status = 0;
+    connect(&bench.controller, &AcquisitionController::statusChanged, this, [&] { ++n_status; });
+    QElapsedTimer timer;
+    timer.start();
+    while (timer.elapsed() < 1000) {
+      bench.tracker->stand(0.02);
+      QCoreApplication::processEvents();
+    }
+    const double seconds = static_cast<double>(timer.elapsed()) / 1000.0;
+    QVERIFY2(n_status >= 5 && n_status <= 30.0 * seconds + 1,
+             qPrintable(QString("%1 in %2 s").arg(n_status).arg(seconds)));
+  }
+
+  void samplesPerNodeIsASetting() {
+    Bench bench(newPath());
+    bench.controller.setSamplesPerNode(25);
+    bench.takeHere();
+    QCOMPARE(bench.nodes.at(0).n_used, 25);
+    bench.controller.setSamplesPerNode(0);
+    QCOMPARE(bench.failures.size(), 1);
+  }
+
+  /// The simulated tracker, in a worker thread as in the window: emulated Fastrak, virtual operator, automatic mode.
+  void simulatedTrackerRecordsAPlanByItself() {
+    qRegisterMetaType<AcquisitionStatus>();
+    qRegisterMetaType<Node>();
+    qRegisterMetaType<CalibrationTable>();
+    qRegisterMetaType<SampleTable>();
+    QThread thread;
+    auto* controller = new AcquisitionController;
+    controller->moveToThread(&thread);
+    connect(&thread, &QThread::finished, controller, &QObject::deleteLater);
+    std::vector<Node> nodes;
+    QStringList troubles;
+    bool finished = false;
+    SampleTable samples;
+    connect(controller, &AcquisitionController::nodeStored, this,
+            [&](int, const Node& node) { nodes.push_back(node); });
+    connect(controller, &AcquisitionController::failed, this, [&](const QString& text) { troubles << text; });
+    connect(controller, &AcquisitionController::takeFailed, this, [&](const QString& text) { troubles << text; });
+    connect(controller, &AcquisitionController::finished, this, [&] { finished = true; });
+    connect(controller, &AcquisitionController::tablesReady, this,
+            [&](const CalibrationTable&, const SampleTable& all) { samples = all; });
+    thread.start();
+    const QString path = newPath();
+    const QString plan = "grid:2x2x2@0.2:reseat=2";
+    QMetaObject::invokeMethod(controller, [=] {
+      controller->openSession(path, plan);
+      controller->setAutomatic(true);
+      controller->connectDevice("simulated:speed=10,seed=1", {});
+    });
+    QTRY_VERIFY2_WITH_TIMEOUT(finished, qPrintable(troubles.join('\n')), 120000);
+    QMetaObject::invokeMethod(controller, [=] {
+      controller->requestTables();
+      controller->disconnectDevice();
+      controller->closeSession();
+    });
+    QTRY_COMPARE_WITH_TIMEOUT(samples.rows.size(), std::size_t(16 * 60), 10000);
+    thread.quit();
+    QVERIFY(thread.wait());
+    QVERIFY2(troubles.isEmpty(), qPrintable(troubles.join('\n')));
+    QCOMPARE(nodes.size(), std::size_t{16});
+    for (const Node& node : nodes) {
+      // A clean room: what is left is the tracker's noise and the Fastrak's resolution, well below a centimetre here.
+      FT_VERIFY_MATCH(testing::near(node.tracker_from_sensor.position_m, node.reference_from_sensor.position_m, 0.01));
+    }
+  }
+
+ private:
+  void wholePlan(bool automatic) {
+    Bench bench(newPath());
+    bench.controller.setAutomatic(automatic);
+    std::vector<int> expected;
+    for (int place = 0; place < 18; ++place) {
+      expected.push_back(place);
+      QVERIFY(bench.controller.status().current == std::size_t(place));
+      const Pose& asked = bench.tracker->guided.back();
+      FT_VERIFY_MATCH(testing::sameBits(asked, bench.placePose(std::size_t(place))));
+      if (automatic) {
+        bench.tracker->carryTo(asked);
+        bench.tracker->stand(2.5);
+      } else {
+        bench.takeHere();
+      }
+    }
+    QCOMPARE(bench.stored, expected);
+    QCOMPARE(bench.n_finished, 1);
+    QVERIFY(!bench.controller.status().current);
+    QCOMPARE(bench.controller.status().n_done, std::size_t{18});
+    QVERIFY2(bench.failures.isEmpty() && bench.take_failures.isEmpty(), qPrintable(bench.take_failures.join(' ')));
+    bench.readTables();
+    QCOMPARE(bench.table.nodes.size(), std::size_t{18});
+    QCOMPARE(bench.samples.rows.size(), std::size_t{18 * 60});
+    for (const Node& node : bench.nodes) {
+      QCOMPARE(node.n_used, 60);
+      const Pose expected_pose = inverse(bench.tracker->reference_from_tracker) * node.reference_from_sensor;
+      FT_VERIFY_MATCH(testing::near(node.tracker_from_sensor.position_m, expected_pose.position_m, 1e-4));
+    }
+    if (automatic) {
+      bench.tracker->stand(5.0);
+      QCOMPARE(bench.stored.size(), std::size_t{18});
+    }
+  }
+};
+
+QTEST_GUILESS_MAIN(AcquisitionControllerTest)
+#include "acquisition_controller_test.moc"

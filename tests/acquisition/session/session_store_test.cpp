@@ -1,0 +1,517 @@
+#include "acquisition/session/session_store.h"
+
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <QDir>
+#include <QElapsedTimer>
+#include <QProcess>
+#include <QSqlDatabase>
+#include <QSqlQuery>
+#include <QTemporaryDir>
+#include <QTest>
+#include <cmath>
+#include <cstdio>
+#include <random>
+
+#include "tests/support/matchers.h"
+
+using namespace fieldtrue;
+
+namespace {
+
+constexpr int kSamples = 60;
+/// Argument with which this program only tries to open a session and prints what came of it.
+constexpr const char* kTryOpen = "--try-open";
+
+Plan smallPlan() {
+  Plan plan;
+  plan.counts = {3, 2, 2};
+  plan.pitch_m = {0.3, 0.3, 0.3};
+  return plan;
+}
+
+TableMetadata fullMetadata() {
+  TableMetadata metadata;
+  metadata.frame = "room";
+  metadata.tracker = "Fastrak \"one\"";
+  metadata.rig = "wooden jig";
+  metadata.date = "2024-05-01";
+  metadata.excitation = "ac";
+  metadata.carrier_hz = 10016.0;
+  metadata.rate_hz = 120.0;
+  metadata.quantum_m = 1e-5;
+  metadata.jig_tolerance_m = 0.0007;
+  metadata.jig_tolerance_rad = 0.002;
+  metadata.alignment_known = true;
+  metadata.alignment_tolerance_m = 0.001;
+  metadata.alignment_tolerance_rad = 0.003;
+  metadata.other = {{"operator", "Zoë"}, {"room", "cellar"}};
+  return metadata;
+}
+
+/// Samples that tell which take they are: `take` is their x in metres. Every tenth carries an error status.
+std::vector<Sample> samplesOf(int take) {
+  std::mt19937_64 random(static_cast<std::uint64_t>(take) + 7);
+  std::normal_distribution<double> noise(0.0, 1e-4);
+  std::vector<Sample> samples;
+  for (int n = 0; n < kSamples; ++n) {
+    Sample sample;
+    sample.time_s = take + n / 120.0;
+    sample.sensor = 1;
+    sample.tracker_from_sensor.position_m = {take + noise(random), noise(random), noise(random)};
+    sample.tracker_from_sensor.orientation = rotationFromVector({noise(random), 0.2, noise(random)});
+    if (n % 10 == 9) sample.status = "k";
+    samples.push_back(sample);
+  }
+  samples.back().tracker_from_sensor.position_m.x() = std::nan("");
+  return samples;
+}
+
+Result<void> storeTake(SessionStore& store, std::size_t place, int take, const std::string& suspicious = {}) {
+  const std::vector<Sample> samples = samplesOf(take);
+  return store.storeTake(place, samples, averageSamples(samples).value(), suspicious);
+}
+
+bool sameSamples(const std::vector<Sample>& a, const std::vector<Sample>& b) {
+  const auto same = [](double x, double y) { return x == y || (std::isnan(x) && std::isnan(y)); };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const Sample& x, const Sample& y) {
+    const Pose &p = x.tracker_from_sensor, &q = y.tracker_from_sensor;
+    return x.time_s == y.time_s && x.sensor == y.sensor && x.status == y.status &&
+           same(p.position_m.x(), q.position_m.x()) && same(p.position_m.y(), q.position_m.y()) &&
+           same(p.position_m.z(), q.position_m.z()) && p.orientation.coeffs() == q.orientation.coeffs();
+  });
+}
+
+/// Changes a closed session behind the store's back.
+void tamper(const QString& path, const QString& sql) {
+  {
+    QSqlDatabase database = QSqlDatabase::addDatabase("QSQLITE", "tamper");
+    database.setDatabaseName(path);
+    QVERIFY(database.open());
+    QVERIFY(QSqlQuery(database).exec(sql));
+    database.close();
+  }
+  QSqlDatabase::removeDatabase("tamper");
+}
+
+}  // namespace
+
+class SessionStoreTest : public QObject {
+  Q_OBJECT
+
+  QTemporaryDir folder_;
+  int n_files_ = 0;
+
+  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
+  SessionStore newStore(const QString& path) {
+    auto store = SessionStore::create(path, smallPlan(), fullMetadata());
+    if (!store) qFatal("%s", store.error().message.c_str());
+    return *std::move(store);
+  }
+  SessionStore opened(const QString& path) {
+    auto store = SessionStore::open(path);
+    if (!store) qFatal("%s", store.error().message.c_str());
+    return *std::move(store);
+  }
+
+ private slots:
+  void newSessionIsAllPlanned() {
+    const QString path = newPath();
+    SessionStore store = newStore(path);
+    QCOMPARE(store.places().size(), std::size_t{12});
+    QCOMPARE(store.states(), std::vector<PlaceState>(12, PlaceState::kPlanned));
+    QCOMPARE(store.nextPlace(), std::optional<std::size_t>(0));
+    QVERIFY(store.nodeTable().nodes.empty());
+    QVERIFY(!store.canUndo() && !store.canRedo());
+    QVERIFY(!store.newestSample_s());
+    QVERIFY(std::abs(store.created().secsTo(QDateTime::currentDateTimeUtc())) < 60);
+  }
+
+  void everythingSurvivesClosing() {
+    const QString path = newPath();
+    {
+      SessionStore store = newStore(path);
+      FT_VERIFY_OK(storeTake(store, 0, 10));
+      FT_VERIFY_OK(storeTake(store, 1, 11, "moved once"));
+      FT_VERIFY_OK(store.skip(2, "a pillar stands there"));
+      FT_VERIFY_OK(store.setState("page", "fit"));
+      FT_VERIFY_OK(store.setState("page", "compare"));
+      FT_VERIFY_OK(store.storeFit("first", "{1}"));
+      FT_VERIFY_OK(store.storeFit("second", "{2}"));
+      FT_VERIFY_OK(store.addEvent("device", "lost"));
+    }
+    SessionStore store = opened(path);
+    const auto places = fieldtrue::places(smallPlan());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      QCOMPARE(store.places()[i].node, places[i].node);
+      QCOMPARE(store.places()[i].visit, places[i].visit);
+      QCOMPARE(store.places()[i].index, places[i].index);
+      FT_VERIFY_MATCH(testing::sameBits(store.places()[i].reference_from_sensor, places[i].reference_from_sensor));
+    }
+    QVERIFY(toJson(store.plan()) == toJson(smallPlan()));
+    QCOMPARE(store.states()[0], PlaceState::kDone);
+    QCOMPARE(store.states()[1], PlaceState::kSuspicious);
+    QCOMPARE(store.states()[2], PlaceState::kSkipped);
+    QCOMPARE(store.nextPlace(), std::optional<std::size_t>(3));
+    QCOMPARE(store.state("page"), std::string("compare"));
+    QCOMPARE(store.state("nothing"), std::string());
+    QVERIFY((store.fits() == std::vector<std::pair<std::string, std::string>>{{"second", "{2}"}, {"first", "{1}"}}));
+    QVERIFY((store.events() == std::vector<std::pair<std::string, std::string>>{{"device", "lost"}}));
+    QVERIFY(sameSamples(store.samples(0), samplesOf(10)));
+    QVERIFY(sameSamples(store.samples(1), samplesOf(11)));
+    QVERIFY(store.samples(2).empty());
+    QCOMPARE(store.sampleTable().rows.size(), std::size_t(2 * kSamples));
+    QCOMPARE(*store.newestSample_s(), samplesOf(11).back().time_s);
+  }
+
+  void metadataIsKept() {
+    const QString path = newPath();
+    { SessionStore store = newStore(path); }
+    SessionStore store = opened(path);
+    const TableMetadata kept = store.metadata(), expected = fullMetadata();
+    QCOMPARE(kept.frame, expected.frame);
+    QVERIFY(kept.tracker == expected.tracker && kept.rig == expected.rig && kept.date == expected.date);
+    QVERIFY(kept.excitation == expected.excitation && kept.carrier_hz == expected.carrier_hz);
+    QVERIFY(kept.rate_hz == expected.rate_hz && kept.quantum_m == expected.quantum_m);
+    QVERIFY(kept.jig_tolerance_m == expected.jig_tolerance_m && kept.jig_tolerance_rad == expected.jig_tolerance_rad);
+    QVERIFY(kept.alignment_known && kept.alignment_tolerance_m == expected.alignment_tolerance_m);
+    QVERIFY(kept.alignment_tolerance_rad == expected.alignment_tolerance_rad && kept.other == expected.other);
+    TableMetadata changed;
+    changed.tracker = "another";
+    FT_VERIFY_OK(store.setMetadata(changed));
+    QVERIFY(store.nodeTable().metadata.tracker == changed.tracker && !store.nodeTable().metadata.rig);
+  }
+
+  void nodeHoldsWhatTheSamplesSay() {
+    SessionStore store = newStore(newPath());
+    FT_VERIFY_OK(storeTake(store, 4, 3));
+    const NodeStatistics expected = averageSamples(samplesOf(3)).value();
+    const Node node = store.node(4).value();
+    QCOMPARE(node.node, store.places()[4].node);
+    QCOMPARE(node.index, store.places()[4].index);
+    QCOMPARE(node.sensor, 1);
+    FT_VERIFY_MATCH(testing::sameBits(node.reference_from_sensor, store.places()[4].reference_from_sensor));
+    FT_VERIFY_MATCH(testing::sameBits(node.tracker_from_sensor, expected.mean));
+    QVERIFY(*node.covariance_m2 == expected.covariance_m2);
+    QCOMPARE(*node.sd_rot_rad, expected.sd_rot_rad);
+    QCOMPARE(node.n_effective, expected.n_effective);
+    QCOMPARE(std::size_t(node.n_used), expected.n_used);
+    QCOMPARE(std::size_t(node.n_rejected), expected.rejections.size());
+    QVERIFY(node.n_rejected >= 6);
+    QCOMPARE(*node.t_start_s, 3.0);
+    QCOMPARE(*node.t_end_s, 3.0 + 59 / 120.0);
+    QVERIFY(!store.node(5));
+  }
+
+  void retakeSupersedesAndUndoBringsBack() {
+    const QString path = newPath();
+    SessionStore store = newStore(path);
+    FT_VERIFY_OK(storeTake(store, 0, 1));
+    FT_VERIFY_OK(storeTake(store, 0, 2));
+    QCOMPARE(store.nodeTable().nodes.size(), std::size_t{1});
+    QVERIFY(sameSamples(store.samples(0), samplesOf(2)));
+    QCOMPARE(store.undo().value(), std::optional<std::size_t>(0));
+    QVERIFY(sameSamples(store.samples(0), samplesOf(1)));
+    QCOMPARE(store.redo().value(), std::optional<std::size_t>(0));
+    QVERIFY(sameSamples(store.samples(0), samplesOf(2)));
+  }
+
+  void skippingATakenPlaceMarksItsRow() {
+    SessionStore store = newStore(newPath());
+    FT_VERIFY_OK(storeTake(store, 0, 1));
+    FT_VERIFY_OK(store.skip(0, "wobbly"));
+    FT_VERIFY_OK(store.skip(1, "pillar"));
+    const CalibrationTable table = store.nodeTable();
+    QCOMPARE(table.nodes.size(), std::size_t{1});
+    QVERIFY(table.nodes[0].role == NodeRole::kSkipped);
+    FT_VERIFY_OK(storeTake(store, 0, 2));
+    QVERIFY(store.nodeTable().nodes[0].role == NodeRole::kFit);
+    QCOMPARE(store.states()[0], PlaceState::kDone);
+  }
+
+  /// Hundreds of random actions against the plainest model of undo: a list of actions and a position in it.
+  void undoAnyNumberOfTimes() {
+    SessionStore store = newStore(newPath());
+    struct Action {
+      std::size_t place;
+      int take;  // -1: skip
+    };
+    std::vector<Action> actions;
+    std::size_t position = 0;
+    std::mt19937_64 random(3);
+    for (int step = 0; step < 200; ++step) {
+      const auto what = random() % 8;
+      if (what < 3) {
+        const auto expected = position > 0 ? std::optional(actions[--position].place) : std::nullopt;
+        QCOMPARE(store.undo().value(), expected);
+      } else if (what < 5) {
+        const auto expected = position < actions.size() ? std::optional(actions[position++].place) : std::nullopt;
+        QCOMPARE(store.redo().value(), expected);
+      } else {
+        const std::size_t place = random() % 12;
+        actions.resize(position);
+        actions.push_back({place, what == 7 ? -1 : step});
+        ++position;
+        FT_VERIFY_OK(what == 7 ? store.skip(place, "x") : storeTake(store, place, step));
+      }
+      std::vector<PlaceState> expected(12, PlaceState::kPlanned);
+      std::vector<int> takes(12, -1);
+      for (std::size_t i = 0; i < position; ++i) {
+        expected[actions[i].place] = actions[i].take < 0 ? PlaceState::kSkipped : PlaceState::kDone;
+        if (actions[i].take >= 0) takes[actions[i].place] = actions[i].take;
+      }
+      QCOMPARE(store.states(), expected);
+      QCOMPARE(store.canUndo(), position > 0);
+      QCOMPARE(store.canRedo(), position < actions.size());
+      const std::size_t looked_at = random() % 12;
+      QVERIFY(sameSamples(store.samples(looked_at),
+                          takes[looked_at] < 0 ? std::vector<Sample>{} : samplesOf(takes[looked_at])));
+    }
+  }
+
+  void oneFileWhenClosed() {
+    const QString path = newPath();
+    {
+      SessionStore store = newStore(path);
+      FT_VERIFY_OK(storeTake(store, 0, 1));
+    }
+    const QString name = QFileInfo(path).fileName();
+    QCOMPARE(QDir(folder_.path()).entryList({name + "*"}, QDir::Files), QStringList{name});
+    SessionStore moved = opened(path);
+    SessionStore again = std::move(moved);
+    QCOMPARE(again.nodeTable().nodes.size(), std::size_t{1});
+  }
+
+  void secondProgramIsKeptOut() {
+    const QString path = newPath();
+    {
+      SessionStore store = newStore(path);
+      const auto second = SessionStore::open(path);
+      QVERIFY(!second && second.error().code == ErrorCode::kIo);
+      FT_VERIFY_MATCH(testing::holdsAll(second.error().message, {"open in another program"}));
+      // A real second program too: SQLite keeps its own account of the locks within one.
+      QProcess other;
+      other.start(QCoreApplication::applicationFilePath(), {kTryOpen, path});
+      QVERIFY(other.waitForFinished());
+      FT_VERIFY_MATCH(testing::holdsAll(other.readAllStandardOutput().toStdString(), {"open in another program"}));
+      FT_VERIFY_OK(storeTake(store, 0, 1));
+    }
+    QCOMPARE(opened(path).nodeTable().nodes.size(), std::size_t{1});
+  }
+
+  void wrongFilesAreNamed_data() {
+    QTest::addColumn<QByteArray>("content");
+    QTest::newRow("empty") << QByteArray();
+    QTest::newRow("text") << QByteArray("node,x_m\n").repeated(200);
+    QTest::newRow("short") << QByteArray("SQLite format 3");
+    QTest::newRow("zeros") << QByteArray(8192, '\0');
+  }
+  void wrongFilesAreNamed() {
+    QFETCH(QByteArray, content);
+    const QString path = newPath();
+    QFile file(path);
+    QVERIFY(file.open(QIODevice::WriteOnly));
+    file.write(content);
+    file.close();
+    const auto store = SessionStore::open(path);
+    QVERIFY(!store);
+    QVERIFY2(store.error().code == ErrorCode::kBadInput, store.error().message.c_str());
+    FT_VERIFY_MATCH(testing::holdsAll(store.error().message, {"is not a Fieldtrue session"}));
+    QFile after(path);
+    QVERIFY(after.open(QIODevice::ReadOnly));
+    QCOMPARE(after.readAll(), content);
+  }
+
+  void damagedFilesAreNamed_data() {
+    QTest::addColumn<double>("kept");
+    QTest::newRow("half is missing") << 0.5;
+    QTest::newRow("the end is missing") << 0.95;
+  }
+  void damagedFilesAreNamed() {
+    QFETCH(double, kept);
+    const QString path = newPath();
+    {
+      SessionStore store = newStore(path);
+      for (std::size_t place = 0; place < 12; ++place) FT_VERIFY_OK(storeTake(store, place, 1));
+    }
+    QVERIFY(QFile::resize(path, static_cast<qint64>(kept * static_cast<double>(QFileInfo(path).size()))));
+    const auto store = SessionStore::open(path);
+    QVERIFY(!store);
+    QVERIFY2(store.error().code == ErrorCode::kBadInput, store.error().message.c_str());
+    FT_VERIFY_MATCH(testing::holdsAll(store.error().message, {"damaged"}));
+  }
+
+  void newerVersionIsNamed() {
+    const QString path = newPath();
+    { SessionStore store = newStore(path); }
+    tamper(path, "PRAGMA user_version=2");
+    const auto store = SessionStore::open(path);
+    QVERIFY(!store && store.error().code == ErrorCode::kNewerVersion);
+    FT_VERIFY_MATCH(testing::holdsAll(store.error().message, {"newer version of Fieldtrue", "format 2"}));
+  }
+
+  void otherDatabaseIsNamed() {
+    const QString path = newPath();
+    tamper(path, "CREATE TABLE recipes(name TEXT)");
+    const auto store = SessionStore::open(path);
+    QVERIFY(!store && store.error().code == ErrorCode::kBadInput);
+  }
+
+  void missingAndExistingFiles() {
+    const auto missing = SessionStore::open(newPath());
+    QVERIFY(!missing && missing.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(testing::holdsAll(missing.error().message, {"no such session file"}));
+    const auto folder = SessionStore::open(folder_.path());
+    QVERIFY(!folder && folder.error().code == ErrorCode::kIo);
+    const QString path = newPath();
+    { SessionStore store = newStore(path); }
+    const auto twice = SessionStore::create(path, smallPlan(), {});
+    QVERIFY(!twice && twice.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(testing::holdsAll(twice.error().message, {"exists already"}));
+    const auto nowhere = SessionStore::create(folder_.filePath("no/such/a.fieldtrue"), smallPlan(), {});
+    QVERIFY(!nowhere && nowhere.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(testing::holdsAll(nowhere.error().message, {"there is no folder"}));
+  }
+
+  void fullDiskStoresNothingOfTheTake() {
+    const QString path = newPath();
+    {
+      SessionStore store = newStore(path);
+      FT_VERIFY_OK(storeTake(store, 0, 1));
+      FT_VERIFY_OK(store.limitSize(1));
+      bool full = false;
+      for (int take = 2; take < 50 && !full; ++take) {
+        const std::size_t n_before = store.nodeTable().nodes.size();
+        const auto stored = storeTake(store, std::size_t(take % 12), take);
+        full = !stored;
+        if (full) {
+          QVERIFY(stored.error().code == ErrorCode::kIo);
+          FT_VERIFY_MATCH(testing::holdsAll(stored.error().message, {"disk is full"}));
+          QCOMPARE(store.nodeTable().nodes.size(), n_before);
+          QCOMPARE(store.sampleTable().rows.size(), n_before * kSamples);
+        }
+      }
+      QVERIFY(full);
+      FT_VERIFY_OK(store.limitSize(1 << 30));
+      FT_VERIFY_OK(storeTake(store, 11, 99));
+    }
+    SessionStore store = opened(path);
+    QVERIFY(sameSamples(store.samples(0), samplesOf(1)));
+    QVERIFY(sameSamples(store.samples(11), samplesOf(99)));
+    QCOMPARE(store.sampleTable().rows.size(), store.nodeTable().nodes.size() * kSamples);
+  }
+
+  /// The system itself refuses to let the file grow: the write fails in the middle of a take.
+  void refusedWriteStoresNothingOfTheTake() {
+    const QString path = newPath();
+    { SessionStore store = newStore(path); }
+    const pid_t child = fork();
+    if (child == 0) {
+      signal(SIGXFSZ, SIG_IGN);
+      auto store = SessionStore::open(path);
+      const rlimit limit{100000, 100000};
+      if (!store || setrlimit(RLIMIT_FSIZE, &limit) != 0) _exit(2);
+      std::size_t n_stored = 0;
+      for (int take = 0; take < 60; ++take) {
+        if (storeTake(*store, std::size_t(take % 12), take)) {
+          ++n_stored;
+        } else {
+          const bool whole = store->sampleTable().rows.size() == store->nodeTable().nodes.size() * kSamples;
+          _exit(whole && n_stored > 0 ? 0 : 3);
+        }
+      }
+      _exit(4);
+    }
+    int status = -1;
+    waitpid(child, &status, 0);
+    QVERIFY(WIFEXITED(status));
+    QCOMPARE(WEXITSTATUS(status), 0);
+    SessionStore store = opened(path);
+    QVERIFY(!store.nodeTable().nodes.empty());
+    QCOMPARE(store.sampleTable().rows.size(), store.nodeTable().nodes.size() * kSamples);
+    FT_VERIFY_OK(storeTake(store, 0, 1));
+  }
+
+  /// Kills a program that stores takes at any moment: all takes it was told of are there, whole, and at most one more.
+  void killedProgramLosesAtMostTheTakeInProgress() {
+    const QString path = newPath();
+    { SessionStore store = newStore(path); }
+    std::mt19937_64 random(11);
+    for (int round = 0; round < 15; ++round) {
+      const int n_before = countTakes(path);
+      int pipes[2];
+      QVERIFY(pipe(pipes) == 0);
+      const pid_t child = fork();
+      if (child == 0) {
+        auto store = SessionStore::open(path);
+        if (!store) _exit(1);
+        for (int take = 0;; ++take) {
+          if (!storeTake(*store, std::size_t(take % 12), take)) _exit(1);
+          if (write(pipes[1], "x", 1) != 1) _exit(1);
+        }
+      }
+      ::close(pipes[1]);
+      char byte = 0;
+      QVERIFY(read(pipes[0], &byte, 1) == 1);
+      usleep(static_cast<useconds_t>(random() % 20000));
+      ::kill(child, SIGKILL);
+      waitpid(child, nullptr, 0);
+      int n_told = 1;
+      while (read(pipes[0], &byte, 1) == 1) ++n_told;
+      ::close(pipes[0]);
+      const int n_kept = countTakes(path) - n_before;
+      QVERIFY2(n_kept == n_told || n_kept == n_told + 1,
+               qPrintable(QString("%1 kept, %2 told").arg(n_kept).arg(n_told)));
+    }
+  }
+
+  void largePlanIsQuick() {
+    Plan plan;
+    plan.counts = {50, 20, 10};
+    const QString path = newPath();
+    auto store = SessionStore::create(path, plan, {});
+    FT_VERIFY_OK(store);
+    QCOMPARE(store->places().size(), std::size_t{10000});
+    QElapsedTimer timer;
+    timer.start();
+    for (std::size_t place = 0; place < 20; ++place) FT_VERIFY_OK(storeTake(*store, place, int(place)));
+    const double each_ms = static_cast<double>(timer.elapsed()) / 20.0;
+    QVERIFY2(each_ms < 250.0, qPrintable(QString("%1 ms a take").arg(each_ms)));
+  }
+
+ private:
+  /// Undo steps of a session: every take stored, superseded ones too; checks that each is whole on the way.
+  int countTakes(const QString& path) {
+    int n_takes = 0;
+    SessionStore store = opened(path);
+    while (store.canUndo()) {
+      for (const Node& node : store.nodeTable().nodes) {
+        if (node.n_used + node.n_rejected != kSamples) qFatal("a take is not whole");
+      }
+      const auto place = store.undo();
+      if (!place) qFatal("%s", place.error().message.c_str());
+      ++n_takes;
+    }
+    for (int i = 0; i < n_takes; ++i) {
+      const auto place = store.redo();
+      if (!place || store.samples(**place).size() != kSamples) qFatal("a take is not whole");
+    }
+    return n_takes;
+  }
+};
+
+int main(int argc, char** argv) {
+  QCoreApplication application(argc, argv);
+  if (argc == 3 && std::string(argv[1]) == kTryOpen) {
+    const auto store = SessionStore::open(QString::fromLocal8Bit(argv[2]));
+    std::puts(store ? "opened" : store.error().message.c_str());
+    return 0;
+  }
+  SessionStoreTest test;
+  return QTest::qExec(&test, argc, argv);
+}
+
+#include "session_store_test.moc"
