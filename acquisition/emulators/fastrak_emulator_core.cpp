@@ -85,7 +85,6 @@ Sample FastrakEmulatorCore::misread(Sample sample, double time_s) {
     sample.status = "k";
     position_m += Eigen::Vector3d(0.2, -0.1, 0.15);
   }
-  if (faults.hemisphere_flip && faultySecond(time_s)) position_m = -position_m;
   if (faults.outliers && unit(random_) < 0.01) {
     std::normal_distribution<double> normal;
     const Eigen::Vector3d direction(normal(random_), normal(random_), normal(random_));
@@ -130,7 +129,8 @@ void FastrakEmulatorCore::send(const std::vector<Sample>& samples, bool every, s
   for (const Sample& read : samples) {
     const int station = read.sensor + 1;
     const Sample sample = misread(read, read.time_s);
-    const Pose pose = source_->recorded() ? sample.tracker_from_sensor : reported(station, sample.tracker_from_sensor);
+    Pose pose = source_->recorded() ? sample.tracker_from_sensor : reported(station, sample.tracker_from_sensor);
+    if (options_.faults.hemisphere_flip && faultySecond(read.time_s)) pose.position_m = -pose.position_m;
     Memory& memory = memory_[static_cast<std::size_t>(read.sensor)];
     const double increment_m = numbers('I', station)[0] * metresPer(setup_.unit);
     const bool moved =

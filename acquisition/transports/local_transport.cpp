@@ -1,8 +1,18 @@
 #include "acquisition/transports/local_transport.h"
 
+#include <poll.h>
+
 #include <array>
 
 namespace fieldtrue {
+namespace {
+
+bool hungUp(int descriptor) {
+  pollfd line{descriptor, POLLIN, 0};
+  return ::poll(&line, 1, 0) > 0 && (line.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
+}
+
+}  // namespace
 
 LocalTransport::LocalTransport(std::string path, int baud, std::vector<std::unique_ptr<LineDriver>> drivers,
                                QObject* parent)
@@ -47,8 +57,8 @@ void LocalTransport::readReady() {
   QByteArray bytes;
   long n = 0;
   while ((n = driver_->read(chunk.data(), chunk.size())) > 0) bytes.append(chunk.data(), static_cast<qsizetype>(n));
-  // Readable without bytes is the end of the file: the adapter was pulled, or the other end closed.
-  const bool ended = n < 0 || bytes.isEmpty();
+  // A pulled adapter reads as an error or, like a closed peer, as readable without bytes.
+  const bool ended = n < 0 || (bytes.isEmpty() && hungUp(static_cast<int>(readable_->socket())));
   received(bytes);
   if (ended) gone();
 }

@@ -86,7 +86,7 @@ class TermiosDriver : public LineDriver {
     ::cfmakeraw(&settings);
     settings.c_cflag |= CLOCAL | CREAD;
     settings.c_cflag &= ~static_cast<tcflag_t>(CSTOPB | CRTSCTS);
-    settings.c_cc[VMIN] = 0;
+    settings.c_cc[VMIN] = 1;
     settings.c_cc[VTIME] = 0;
     if ((!setSpeed(settings, baud) && !pseudo_terminal_) || ::tcsetattr(descriptor_, TCSANOW, &settings) != 0) {
       return fail(ErrorCode::kDevice, path + " cannot be set to " + std::to_string(baud) +

@@ -1,0 +1,93 @@
+#include "acquisition/devices/sample_clock.h"
+
+#include <QTest>
+#include <random>
+
+#include "tests/support/matchers.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+class SampleClockTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void spreadsBunches_data();
+  void spreadsBunches();
+  void growsAlways();
+  void startsAnewAfterAGap();
+  void seesTheHemisphereFlip();
+  void doesNotMistakeMotionForAFlip();
+};
+
+void SampleClockTest::spreadsBunches_data() {
+  QTest::addColumn<double>("true_rate_hz");
+  QTest::addColumn<int>("bunch");
+  QTest::newRow("one by one") << 120.0 << 1;
+  QTest::newRow("bunches of 4") << 120.0 << 4;
+  QTest::newRow("bunches of 4 at another rate") << 100.0 << 4;
+  QTest::newRow("bunches of 10, slow") << 70.0 << 10;
+}
+
+void SampleClockTest::spreadsBunches() {
+  QFETCH(double, true_rate_hz);
+  QFETCH(int, bunch);
+  SampleClock clock(1.0 / 120.0);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> latency(0.001, 0.003);
+  const double bunch_s = bunch / true_rate_hz;
+  double arrival_s = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    if (i % bunch == 0) arrival_s = (i + bunch - 1) / true_rate_hz + latency(random);
+    const double error_s = clock.stamp(arrival_s) - i / true_rate_hz;
+    // After settling, late by the mean latency and no more than half a bunch to either side.
+    if (i > 1500) QVERIFY2(error_s > -0.5 * bunch_s && error_s < bunch_s + 0.004, qPrintable(QString::number(error_s)));
+  }
+  FT_VERIFY_MATCH(near(clock.period_s(), 1.0 / true_rate_hz, 0.05 / true_rate_hz));
+}
+
+void SampleClockTest::growsAlways() {
+  SampleClock clock(0.01);
+  double last_s = -1.0;
+  for (int i = 0; i < 100; ++i) {
+    const double now_s = clock.stamp(i < 50 ? 1.0 : 1.2);
+    QVERIFY(now_s > last_s);
+    last_s = now_s;
+  }
+}
+
+void SampleClockTest::startsAnewAfterAGap() {
+  SampleClock clock(0.01);
+  for (int i = 0; i < 100; ++i) clock.stamp(i * 0.01);
+  QCOMPARE(clock.stamp(5.0), 5.0);
+}
+
+void SampleClockTest::seesTheHemisphereFlip() {
+  HemisphereWatch watch;
+  for (int i = 0; i < 300; ++i) {
+    const bool flipped = i >= 100 && i < 200;
+    const Eigen::Vector3d p(0.3 + 0.001 * i, 0.1, -0.05);
+    Sample sample{i * 0.01, 0, {flipped ? Eigen::Vector3d(-p) : p, Eigen::Quaterniond::Identity()}, {}};
+    watch.check(sample);
+    QCOMPARE(sample.status, std::string(flipped ? "flipped" : ""));
+  }
+}
+
+void SampleClockTest::doesNotMistakeMotionForAFlip() {
+  HemisphereWatch watch;
+  // A hand passing close by the transmitter, an error in between, and another sensor on the other side.
+  for (int i = -50; i <= 50; ++i) {
+    Sample sample{i * 0.01, 0, {{0.01 * i, 0.12, 0.0}, Eigen::Quaterniond::Identity()}, {}};
+    Sample other{i * 0.01, 1, {{-0.01 * i, -0.12, 0.0}, Eigen::Quaterniond::Identity()}, i % 7 ? "" : "k"};
+    watch.check(sample);
+    watch.check(other);
+    QCOMPARE(sample.status, std::string());
+    QCOMPARE(other.status, std::string(i % 7 ? "" : "k"));
+  }
+  // Carried to the other side out of sight.
+  Sample later{10.0, 0, {{-0.5, -0.12, 0.0}, Eigen::Quaterniond::Identity()}, {}};
+  watch.check(later);
+  QCOMPARE(later.status, std::string());
+}
+
+QTEST_GUILESS_MAIN(SampleClockTest)
+#include "sample_clock_test.moc"
