@@ -143,7 +143,7 @@ void FieldScene::updateMarks() {
   places_.setRadius(kPlaceRadius * pitch);
   places_.setPoints(fitted);
   validation_.setColor(theme_->text);
-  validation_.setRadius(1.6 * kPlaceRadius * pitch);
+  validation_.setRadius(1.9 * kPlaceRadius * pitch);
   validation_.setPoints(validation);
   halo_.setColor(theme_->accent);
   halo_.setRadius(0.16 * pitch);

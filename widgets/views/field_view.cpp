@@ -3,6 +3,11 @@
 #include "widgets/views/field_scene.h"
 
 namespace fieldtrue {
+namespace {
+
+constexpr std::size_t kMostSmooth = 2000;  ///< Arrows drawn with smooth edges where no graphics processor helps.
+
+}  // namespace
 
 FieldView::FieldView(QWidget* parent) : OrbitView(parent), scene_(std::make_unique<FieldScene>(renderer())) {
   setAccessibleName(tr("Error at every place"));
@@ -12,6 +17,7 @@ FieldView::~FieldView() = default;
 
 void FieldView::setField(const ErrorField& field) {
   scene_->setField(field);
+  setSmooth(field.arrows.size() <= kMostSmooth);
   setAccessibleDescription(field.title);
   setSpace(scene_->space());
 }

@@ -9,6 +9,8 @@ void setDefaultGlFormat() {
   format.setRenderableType(QSurfaceFormat::OpenGL);
   format.setVersion(3, 2);
   format.setProfile(QSurfaceFormat::CoreProfile);
+  // A forward-compatible context would draw every line one pixel wide, too thin on dense screens.
+  format.setOption(QSurfaceFormat::DeprecatedFunctions);
   format.setSwapBehavior(QSurfaceFormat::DoubleBuffer);
   format.setRedBufferSize(8);
   format.setGreenBufferSize(8);

@@ -35,6 +35,7 @@ constexpr double kBelowBar_px = 34.0;
 constexpr double kScaleWidth_px = 92.0;
 constexpr int kMostTicks = 7;
 constexpr double kLabelGap_px = 10.0;
+constexpr double kShortestAxis_px = 90.0;
 constexpr double kUpright = 0.9;
 
 enum class Align { kLeft, kCenter, kRight };
@@ -277,7 +278,7 @@ void drawAxis(const Pencil& pencil, const SceneSpace& space, LengthUnit unit, in
   const auto center = pencil.place(space.center_m());
   if (!edge || !center) return;
   const auto start = pencil.place((*edge)[0]), end = pencil.place((*edge)[1]);
-  if (!start || !end || (*end - *start).norm() < 40.0) return;
+  if (!start || !end || (*end - *start).norm() < kShortestAxis_px) return;
   const Eigen::Vector2d along = (*end - *start).normalized();
   Eigen::Vector2d outward(-along.y(), along.x());
   if (outward.dot(0.5 * (*start + *end) - *center) < 0.0) outward = -outward;
@@ -323,8 +324,9 @@ bool Overlay::Paint(vtkContext2D* painter) {
   const Pencil pencil(painter, renderer, content);
   if (content.axes)
     for (int axis = 0; axis < 3; ++axis) drawAxis(pencil, *content.axes, content.unit, axis);
+  const Eigen::Vector3d up = worldFromView(renderer).col(1);
   for (const SceneLabel& label : content.labels)
-    if (const auto at = pencil.place(label.at_m))
+    if (const auto at = pencil.place(label.at_m - label.below_m * up))
       pencil.text(*at, label.text, label.color, Align::kCenter, kTextSize, true);
   drawScales(pencil, content.scales);
   drawSymbols(pencil, content.symbols);

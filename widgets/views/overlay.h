@@ -33,6 +33,7 @@ struct SceneLabel {
   Eigen::Vector3d at_m;
   std::string text;
   QColor color;
+  double below_m = 0.0;  ///< The text stands this far below the point, as seen on screen.
 };
 
 /// All text and legends of a scene.

@@ -1,13 +1,9 @@
 #include "widgets/views/room_parts.h"
 
 #include <vtkActor.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
-#include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
-#include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +14,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr std::size_t kTrailLength = 60;
+constexpr double kLeastStep_m = 1e-5;
 
 QColor between(const QColor& a, const QColor& b, double share_of_b) {
   const auto mix = [share_of_b](int x, int y) { return static_cast<int>(std::lround(x + share_of_b * (y - x))); };
@@ -110,7 +107,7 @@ void TransmitterPart::build(const Pose& reference_from_tracker, const SceneSpace
   for (int axis = 0; axis < 3; ++axis)
     labels_.push_back({reference_from_tracker * Eigen::Vector3d(2.3 * size * Eigen::Vector3d::Unit(axis)),
                        std::string(1, "xyz"[axis]), axisColor(axis, theme)});
-  labels_.push_back({reference_from_tracker.position_m - Eigen::Vector3d(0, 0, 1.3 * size), "transmitter", theme.text});
+  labels_.push_back({reference_from_tracker.position_m, "transmitter", theme.text, 1.3 * size});
 }
 
 JigPart::JigPart(vtkRenderer* renderer) : actor_(addSolidActor(renderer)) {}
@@ -144,27 +141,20 @@ void SensorPart::add(const std::optional<Pose>& reference_from_sensor) {
   if (trail_m_.size() > kTrailLength) trail_m_.pop_front();
 }
 
-void SensorPart::build(const SceneSpace& space, const Theme& theme, double ratio) {
+void SensorPart::build(const SceneSpace& space, const Theme& theme) {
   Mesh mesh;
   const double length = 0.34 * space.pitch_m.minCoeff();
   if (pose_) addAxes(mesh, *pose_, length, 0.055 * length, theme);
   setShape(axes_, mesh.polyData());
 
-  Lines lines;
-  vtkNew<vtkUnsignedCharArray> colors;
-  colors->SetNumberOfComponents(3);
+  Mesh trail;
   for (std::size_t k = 1; k < trail_m_.size(); ++k) {
-    lines.add(trail_m_[k - 1], trail_m_[k]);
-    for (const std::size_t end : {k - 1, k}) {
-      const double age = static_cast<double>(trail_m_.size() - 1 - end) / static_cast<double>(kTrailLength);
-      const QColor color = between(theme.text, theme.background, age);
-      colors->InsertNextTuple3(color.red(), color.green(), color.blue());
-    }
+    if ((trail_m_[k] - trail_m_[k - 1]).norm() < kLeastStep_m) continue;
+    const double age = static_cast<double>(trail_m_.size() - k) / static_cast<double>(kTrailLength);
+    trail.setColor(between(theme.text, theme.background, 0.85 * age));
+    trail.addCylinder(trail_m_[k - 1], trail_m_[k], (1.0 - 0.7 * age) * 0.04 * length, 6);
   }
-  const vtkSmartPointer<vtkPolyData> trail = lines.polyData();
-  trail->GetPointData()->SetScalars(colors);
-  setShape(trail_, trail);
-  trail_->GetProperty()->SetLineWidth(static_cast<float>(3.0 * ratio));
+  setShape(trail_, trail.polyData());
 }
 
 PathPart::PathPart(vtkRenderer* renderer) : actor_(addFlatActor(renderer)) {}

@@ -55,7 +55,7 @@ class SensorPart {
  public:
   explicit SensorPart(vtkRenderer* renderer);
   void add(const std::optional<Pose>& reference_from_sensor);
-  void build(const SceneSpace& space, const Theme& theme, double ratio);
+  void build(const SceneSpace& space, const Theme& theme);
 
  private:
   std::optional<Pose> pose_;

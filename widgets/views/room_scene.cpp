@@ -146,7 +146,7 @@ void RoomScene::update() {
     updateMarks();
     updateOverlay();
   }
-  if (live_changed_ || room_changed_) sensor_.build(space_, *theme_, ratio_);
+  if (live_changed_ || room_changed_) sensor_.build(space_, *theme_);
   room_changed_ = marks_changed_ = live_changed_ = false;
 }
 

@@ -14,6 +14,7 @@ constexpr int kPulse_ms = 1400;
 
 RoomView::RoomView(QWidget* parent) : OrbitView(parent), scene_(std::make_unique<RoomScene>(renderer())) {
   setAccessibleName(tr("Room with the places to visit"));
+  setSmooth(false);  // it moves all the time
   pulse_ = new QTimer(this);
   pulse_->setInterval(kPulseFrame_ms);
   connect(pulse_, &QTimer::timeout, this, [this] {

@@ -109,6 +109,8 @@ QString styleSheetOf(const Theme& t) {
       {"@line", t.line},
       {"@text", t.text},
   };
+  sheet.replace(QLatin1String("@check_image"),
+                QLatin1String(t.dark ? ":/style/check_dark.svg" : ":/style/check_light.svg"));
   for (const auto& [name, color] : colors) sheet.replace(QLatin1String(name), color.name());
   return sheet;
 }

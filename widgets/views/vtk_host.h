@@ -48,14 +48,21 @@ class VtkHost : public QOpenGLWidget {
   /// ratio.
   virtual void restyle(double pixel_ratio);
 
+  /// Whether frames take the time for smooth edges: always with a graphics processor, without one only if
+  /// `in_software`.
+  void setSmooth(bool in_software);
+
  private:
   void releaseGl();
+  void updateSmoothness();
   void blitToWidget();
   void restyleNow();
 
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> window_;
   vtkSmartPointer<vtkRenderer> renderer_;
   double styled_ratio_ = 0.0;
+  bool software_ = false;
+  bool smooth_in_software_ = true;
 };
 
 }  // namespace fieldtrue
