@@ -6,126 +6,17 @@
 #include <QElapsedTimer>
 #include <QTemporaryDir>
 #include <QTest>
-#include <QThread>
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "tests/acquisition/session/controller_bench.h"
 #include "tests/support/matchers.h"
 
 using namespace fieldtrue;
 
-namespace {
-
-constexpr double kRate_hz = 120.0;
-
-/// A tracker whose every reading is the test's: the jig is carried, set down and unplugged by calls.
-class FakeTracker : public TrackerDevice {
- public:
-  Pose reference_from_tracker{{0.1, -0.2, 0.05}, rotationFromVector({0.0, 0.0, 0.3})};
-  Pose true_pose{{-1.0, -1.0, -1.0}, Eigen::Quaterniond::Identity()};
-  std::vector<Pose> guided;
-  QString tracker_name = QStringLiteral("fake");
-
-  void start() override { emit stateChanged(DeviceState::kRunning, "running"); }
-  void stop() override {}
-  void guideTo(const Pose& pose) override { guided.push_back(pose); }
-  TableMetadata describe() const override {
-    TableMetadata metadata;
-    metadata.tracker = tracker_name.toStdString();
-    metadata.rate_hz = kRate_hz;
-    return metadata;
-  }
-
-  void restartClock() { n_ = 0; }
-  void send(const Pose& pose, const std::string& status = {}) {
-    Sample sample;
-    sample.time_s = static_cast<double>(n_++) / kRate_hz;
-    sample.tracker_from_sensor = inverse(reference_from_tracker) * pose;
-    // Bounded noise: nothing of it is ever an outlier.
-    for (double& x : sample.tracker_from_sensor.position_m) x += uniform_(random_);
-    sample.status = status;
-    emit samplesReceived({sample});
-  }
-  void stand(double seconds, const std::string& status = {}) {
-    for (int n = 0; n < seconds * kRate_hz; ++n) send(true_pose, status);
-  }
-  void carryTo(const Pose& place, double seconds = 0.8) {
-    const Pose from = true_pose;
-    const int steps = static_cast<int>(seconds * kRate_hz);
-    for (int n = 1; n <= steps; ++n) {
-      const double s = n / double(steps);
-      true_pose = {from.position_m + s * (place.position_m - from.position_m), place.orientation};
-      send(true_pose);
-    }
-  }
-  void lose() { emit stateChanged(DeviceState::kFailed, "The cable was pulled."); }
-  void comeBack() {
-    restartClock();
-    emit stateChanged(DeviceState::kRunning, "running");
-  }
-
- private:
-  std::uint64_t n_ = 0;
-  std::mt19937_64 random_{5};
-  std::uniform_real_distribution<double> uniform_{-1e-4, 1e-4};
-};
-
-Plan planOf(std::array<int, 3> counts) {
-  Plan plan;
-  plan.counts = counts;
-  plan.pitch_m = {0.3, 0.3, 0.3};
-  return plan;
-}
-
-/// One controller with its fake tracker and everything it said.
-struct Bench {
-  explicit Bench(const QString& path, const Plan& plan = planOf({3, 3, 2}), bool create = true) {
-    QObject::connect(&controller, &AcquisitionController::nodeStored,
-                     [this](int place, const Node& node, const QString& suspicious) {
-                       stored.push_back(place);
-                       nodes.push_back(node);
-                       suspicions << suspicious;
-                     });
-    QObject::connect(&controller, &AcquisitionController::takeFailed,
-                     [this](const QString& text) { take_failures << text; });
-    QObject::connect(&controller, &AcquisitionController::failed, [this](const QString& text) { failures << text; });
-    QObject::connect(&controller, &AcquisitionController::finished, [this] { ++n_finished; });
-    QObject::connect(&controller, &AcquisitionController::sessionOpened,
-                     [this](const QString&, const QString& page, const QString& plan_json) {
-                       opened_page = page;
-                       opened_plan = plan_json;
-                     });
-    QObject::connect(&controller, &AcquisitionController::tablesReady,
-                     [this](const CalibrationTable& nodes_now, const SampleTable& samples_now) {
-                       table = nodes_now;
-                       samples = samples_now;
-                     });
-    auto device = std::make_unique<FakeTracker>();
-    tracker = device.get();
-    controller.adoptDevice(std::move(device));
-    controller.openSession(path, create ? QString::fromStdString(toJson(plan).dump()) : QString());
-  }
-  Pose placePose(std::size_t place) const { return controller.status().places.at(place).reference_from_sensor; }
-  /// Carries the jig to the current place and takes it as an operator does with the space bar.
-  void takeHere() {
-    tracker->carryTo(placePose(*controller.status().current));
-    controller.take();
-    tracker->stand(0.51);
-  }
-  void readTables() { controller.requestTables(); }
-
-  AcquisitionController controller;
-  FakeTracker* tracker = nullptr;
-  std::vector<int> stored;
-  std::vector<Node> nodes;
-  QStringList suspicions, take_failures, failures;
-  int n_finished = 0;
-  QString opened_page, opened_plan;
-  CalibrationTable table;
-  SampleTable samples;
-};
-
-}  // namespace
+using testing::Bench;
+using testing::kRate_hz;
+using testing::planOf;
 
 class AcquisitionControllerTest : public QObject {
   Q_OBJECT
@@ -205,7 +96,7 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(bench.stored.size(), std::size_t{6});
     QCOMPARE(bench.controller.status().reason, QString("still, but 0.25 m away: move it here; or press space"));
     bench.tracker->carryTo(bench.placePose(*status.current));
-    bench.tracker->stand(1.2);
+    bench.tracker->stand(1.5);
     QCOMPARE(bench.stored.size(), std::size_t{7});
   }
 
@@ -439,52 +330,6 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(bench.nodes.at(0).n_used, 25);
     bench.controller.setSamplesPerNode(0);
     QCOMPARE(bench.failures.size(), 1);
-  }
-
-  /// The simulated tracker, in a worker thread as in the window: emulated Fastrak, virtual operator, automatic mode.
-  void simulatedTrackerRecordsAPlanByItself() {
-    qRegisterMetaType<AcquisitionStatus>();
-    qRegisterMetaType<Node>();
-    qRegisterMetaType<CalibrationTable>();
-    qRegisterMetaType<SampleTable>();
-    QThread thread;
-    auto* controller = new AcquisitionController;
-    controller->moveToThread(&thread);
-    connect(&thread, &QThread::finished, controller, &QObject::deleteLater);
-    std::vector<Node> nodes;
-    QStringList troubles;
-    bool finished = false;
-    SampleTable samples;
-    connect(controller, &AcquisitionController::nodeStored, this,
-            [&](int, const Node& node) { nodes.push_back(node); });
-    connect(controller, &AcquisitionController::failed, this, [&](const QString& text) { troubles << text; });
-    connect(controller, &AcquisitionController::takeFailed, this, [&](const QString& text) { troubles << text; });
-    connect(controller, &AcquisitionController::finished, this, [&] { finished = true; });
-    connect(controller, &AcquisitionController::tablesReady, this,
-            [&](const CalibrationTable&, const SampleTable& all) { samples = all; });
-    thread.start();
-    const QString path = newPath();
-    const QString plan = "grid:2x2x2@0.2:reseat=2";
-    QMetaObject::invokeMethod(controller, [=] {
-      controller->openSession(path, plan);
-      controller->setAutomatic(true);
-      controller->connectDevice("simulated:speed=10,seed=1", {});
-    });
-    QTRY_VERIFY2_WITH_TIMEOUT(finished, qPrintable(troubles.join('\n')), 120000);
-    QMetaObject::invokeMethod(controller, [=] {
-      controller->requestTables();
-      controller->disconnectDevice();
-      controller->closeSession();
-    });
-    QTRY_COMPARE_WITH_TIMEOUT(samples.rows.size(), std::size_t(16 * 60), 10000);
-    thread.quit();
-    QVERIFY(thread.wait());
-    QVERIFY2(troubles.isEmpty(), qPrintable(troubles.join('\n')));
-    QCOMPARE(nodes.size(), std::size_t{16});
-    for (const Node& node : nodes) {
-      // A clean room: what is left is the tracker's noise and the Fastrak's resolution, well below a centimetre here.
-      FT_VERIFY_MATCH(testing::near(node.tracker_from_sensor.position_m, node.reference_from_sensor.position_m, 0.01));
-    }
   }
 
  private:

@@ -1,10 +1,5 @@
 #include "acquisition/session/session_store.h"
 
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <QDir>
 #include <QElapsedTimer>
 #include <QProcess>
@@ -16,74 +11,21 @@
 #include <cstdio>
 #include <random>
 
+#include "tests/acquisition/session/session_samples.h"
 #include "tests/support/matchers.h"
 
 using namespace fieldtrue;
+using testing::fullMetadata;
+using testing::kSamples;
+using testing::sameSamples;
+using testing::samplesOf;
+using testing::smallPlan;
+using testing::storeTake;
 
 namespace {
 
-constexpr int kSamples = 60;
 /// Argument with which this program only tries to open a session and prints what came of it.
 constexpr const char* kTryOpen = "--try-open";
-
-Plan smallPlan() {
-  Plan plan;
-  plan.counts = {3, 2, 2};
-  plan.pitch_m = {0.3, 0.3, 0.3};
-  return plan;
-}
-
-TableMetadata fullMetadata() {
-  TableMetadata metadata;
-  metadata.frame = "room";
-  metadata.tracker = "Fastrak \"one\"";
-  metadata.rig = "wooden jig";
-  metadata.date = "2024-05-01";
-  metadata.excitation = "ac";
-  metadata.carrier_hz = 10016.0;
-  metadata.rate_hz = 120.0;
-  metadata.quantum_m = 1e-5;
-  metadata.jig_tolerance_m = 0.0007;
-  metadata.jig_tolerance_rad = 0.002;
-  metadata.alignment_known = true;
-  metadata.alignment_tolerance_m = 0.001;
-  metadata.alignment_tolerance_rad = 0.003;
-  metadata.other = {{"operator", "Zoë"}, {"room", "cellar"}};
-  return metadata;
-}
-
-/// Samples that tell which take they are: `take` is their x in metres. Every tenth carries an error status.
-std::vector<Sample> samplesOf(int take) {
-  std::mt19937_64 random(static_cast<std::uint64_t>(take) + 7);
-  std::normal_distribution<double> noise(0.0, 1e-4);
-  std::vector<Sample> samples;
-  for (int n = 0; n < kSamples; ++n) {
-    Sample sample;
-    sample.time_s = take + n / 120.0;
-    sample.sensor = 1;
-    sample.tracker_from_sensor.position_m = {take + noise(random), noise(random), noise(random)};
-    sample.tracker_from_sensor.orientation = rotationFromVector({noise(random), 0.2, noise(random)});
-    if (n % 10 == 9) sample.status = "k";
-    samples.push_back(sample);
-  }
-  samples.back().tracker_from_sensor.position_m.x() = std::nan("");
-  return samples;
-}
-
-Result<void> storeTake(SessionStore& store, std::size_t place, int take, const std::string& suspicious = {}) {
-  const std::vector<Sample> samples = samplesOf(take);
-  return store.storeTake(place, samples, averageSamples(samples).value(), suspicious);
-}
-
-bool sameSamples(const std::vector<Sample>& a, const std::vector<Sample>& b) {
-  const auto same = [](double x, double y) { return x == y || (std::isnan(x) && std::isnan(y)); };
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const Sample& x, const Sample& y) {
-    const Pose &p = x.tracker_from_sensor, &q = y.tracker_from_sensor;
-    return x.time_s == y.time_s && x.sensor == y.sensor && x.status == y.status &&
-           same(p.position_m.x(), q.position_m.x()) && same(p.position_m.y(), q.position_m.y()) &&
-           same(p.position_m.z(), q.position_m.z()) && p.orientation.coeffs() == q.orientation.coeffs();
-  });
-}
 
 /// Changes a closed session behind the store's back.
 void tamper(const QString& path, const QString& sql) {
@@ -376,98 +318,6 @@ class SessionStoreTest : public QObject {
     FT_VERIFY_MATCH(testing::holdsAll(nowhere.error().message, {"there is no folder"}));
   }
 
-  void fullDiskStoresNothingOfTheTake() {
-    const QString path = newPath();
-    {
-      SessionStore store = newStore(path);
-      FT_VERIFY_OK(storeTake(store, 0, 1));
-      FT_VERIFY_OK(store.limitSize(1));
-      bool full = false;
-      for (int take = 2; take < 50 && !full; ++take) {
-        const std::size_t n_before = store.nodeTable().nodes.size();
-        const auto stored = storeTake(store, std::size_t(take % 12), take);
-        full = !stored;
-        if (full) {
-          QVERIFY(stored.error().code == ErrorCode::kIo);
-          FT_VERIFY_MATCH(testing::holdsAll(stored.error().message, {"disk is full"}));
-          QCOMPARE(store.nodeTable().nodes.size(), n_before);
-          QCOMPARE(store.sampleTable().rows.size(), n_before * kSamples);
-        }
-      }
-      QVERIFY(full);
-      FT_VERIFY_OK(store.limitSize(1 << 30));
-      FT_VERIFY_OK(storeTake(store, 11, 99));
-    }
-    SessionStore store = opened(path);
-    QVERIFY(sameSamples(store.samples(0), samplesOf(1)));
-    QVERIFY(sameSamples(store.samples(11), samplesOf(99)));
-    QCOMPARE(store.sampleTable().rows.size(), store.nodeTable().nodes.size() * kSamples);
-  }
-
-  /// The system itself refuses to let the file grow: the write fails in the middle of a take.
-  void refusedWriteStoresNothingOfTheTake() {
-    const QString path = newPath();
-    { SessionStore store = newStore(path); }
-    const pid_t child = fork();
-    if (child == 0) {
-      signal(SIGXFSZ, SIG_IGN);
-      auto store = SessionStore::open(path);
-      const rlimit limit{100000, 100000};
-      if (!store || setrlimit(RLIMIT_FSIZE, &limit) != 0) _exit(2);
-      std::size_t n_stored = 0;
-      for (int take = 0; take < 60; ++take) {
-        if (storeTake(*store, std::size_t(take % 12), take)) {
-          ++n_stored;
-        } else {
-          const bool whole = store->sampleTable().rows.size() == store->nodeTable().nodes.size() * kSamples;
-          _exit(whole && n_stored > 0 ? 0 : 3);
-        }
-      }
-      _exit(4);
-    }
-    int status = -1;
-    waitpid(child, &status, 0);
-    QVERIFY(WIFEXITED(status));
-    QCOMPARE(WEXITSTATUS(status), 0);
-    SessionStore store = opened(path);
-    QVERIFY(!store.nodeTable().nodes.empty());
-    QCOMPARE(store.sampleTable().rows.size(), store.nodeTable().nodes.size() * kSamples);
-    FT_VERIFY_OK(storeTake(store, 0, 1));
-  }
-
-  /// Kills a program that stores takes at any moment: all takes it was told of are there, whole, and at most one more.
-  void killedProgramLosesAtMostTheTakeInProgress() {
-    const QString path = newPath();
-    { SessionStore store = newStore(path); }
-    std::mt19937_64 random(11);
-    for (int round = 0; round < 15; ++round) {
-      const int n_before = countTakes(path);
-      int pipes[2];
-      QVERIFY(pipe(pipes) == 0);
-      const pid_t child = fork();
-      if (child == 0) {
-        auto store = SessionStore::open(path);
-        if (!store) _exit(1);
-        for (int take = 0;; ++take) {
-          if (!storeTake(*store, std::size_t(take % 12), take)) _exit(1);
-          if (write(pipes[1], "x", 1) != 1) _exit(1);
-        }
-      }
-      ::close(pipes[1]);
-      char byte = 0;
-      QVERIFY(read(pipes[0], &byte, 1) == 1);
-      usleep(static_cast<useconds_t>(random() % 20000));
-      ::kill(child, SIGKILL);
-      waitpid(child, nullptr, 0);
-      int n_told = 1;
-      while (read(pipes[0], &byte, 1) == 1) ++n_told;
-      ::close(pipes[0]);
-      const int n_kept = countTakes(path) - n_before;
-      QVERIFY2(n_kept == n_told || n_kept == n_told + 1,
-               qPrintable(QString("%1 kept, %2 told").arg(n_kept).arg(n_told)));
-    }
-  }
-
   void largePlanIsQuick() {
     Plan plan;
     plan.counts = {50, 20, 10};
@@ -480,26 +330,6 @@ class SessionStoreTest : public QObject {
     for (std::size_t place = 0; place < 20; ++place) FT_VERIFY_OK(storeTake(*store, place, int(place)));
     const double each_ms = static_cast<double>(timer.elapsed()) / 20.0;
     QVERIFY2(each_ms < 250.0, qPrintable(QString("%1 ms a take").arg(each_ms)));
-  }
-
- private:
-  /// Undo steps of a session: every take stored, superseded ones too; checks that each is whole on the way.
-  int countTakes(const QString& path) {
-    int n_takes = 0;
-    SessionStore store = opened(path);
-    while (store.canUndo()) {
-      for (const Node& node : store.nodeTable().nodes) {
-        if (node.n_used + node.n_rejected != kSamples) qFatal("a take is not whole");
-      }
-      const auto place = store.undo();
-      if (!place) qFatal("%s", place.error().message.c_str());
-      ++n_takes;
-    }
-    for (int i = 0; i < n_takes; ++i) {
-      const auto place = store.redo();
-      if (!place || store.samples(**place).size() != kSamples) qFatal("a take is not whole");
-    }
-    return n_takes;
   }
 };
 
