@@ -81,7 +81,20 @@ CLI::App* CommandLine::addCommand(const std::string& name, const std::string& he
   return command;
 }
 
+std::string CommandLine::unknownCommand(int argc, char** argv) const {
+  if (argc < 2 || argv[1][0] == '-') return {};
+  std::string known;
+  for (const CLI::App* command : app_.get_subcommands({})) {
+    if (command->get_name() == argv[1]) return {};
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  }
+  return "there is no command '" + std::string(argv[1]) + "'; known: " + known;
+}
+
 int CommandLine::run(int argc, char** argv) {
+  if (const std::string unknown = unknownCommand(argc, argv); !unknown.empty()) {
+    return complain(kProgram, {kWrongUsage, unknown});
+  }
   try {
     app_.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -94,6 +107,7 @@ int CommandLine::run(int argc, char** argv) {
   const std::string who = std::string(kProgram) + " " + app_.get_subcommands().front()->get_name();
   const Outcome outcome = run_();
   if (!outcome) return complain(who, outcome.error());
+  for (const std::string& remark : outcome->remarks) std::cerr << "note: " << remark << '\n';
   if (common_.json) {
     std::cout << outcome->json.dump(2) << '\n';
   } else {

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
@@ -28,6 +29,7 @@ struct Failure {
 struct Answer {
   std::string text;
   nlohmann::json json = nlohmann::json::object();
+  std::vector<std::string> remarks;  ///< On the input; printed on stderr, so that stdout stays clean.
 };
 
 using Outcome = tl::expected<Answer, Failure>;
@@ -79,6 +81,8 @@ class CommandLine {
 
  private:
   CLI::App* addCommand(const std::string& name, const std::string& help);
+  /// What is wrong with the command's name; empty when it is known or left out.
+  std::string unknownCommand(int argc, char** argv) const;
 
   CLI::App app_;
   CommonOptions common_;

@@ -167,7 +167,7 @@ class Acquisition {
     failed_takes_.erase(index);
     live_line_.clear();
     lines_ << placeText(now.places.at(index)) << "  done " << now.n_done << " of " << now.places.size() << ", SD "
-           << significantText(sd_mm(node)) << " mm";
+           << errorFigure(sd_mm(node)) << " mm";
     if (node.n_rejected > 0) lines_ << ", " << node.n_rejected << " rejected";
     if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
     lines_ << std::endl;

@@ -47,7 +47,7 @@ Read<const EmulatorKind*> findEmulator(const std::string& id) {
   return wrongUsage("no emulator is called '" + id + "'; known: " + known);
 }
 
-Read<FastrakEmulation> readEmulation(const EmulateOptions& options) {
+Read<FastrakEmulation> readEmulation(const EmulateOptions& options, std::vector<std::string>& notes) {
   if (options.pty_link.empty() == !options.port) {
     return wrongUsage("an emulator needs one line: --pty LINK or --listen PORT");
   }
@@ -67,7 +67,7 @@ Read<FastrakEmulation> readEmulation(const EmulateOptions& options) {
   if (options.replay.empty()) return emulation;
   auto recording = readSampleTable(std::filesystem::path(options.replay));
   if (!recording) return notPossible(recording.error());
-  remark(recording->notes);
+  notes = recording->notes;
   emulation.replay = std::move(recording->table);
   return emulation;
 }
@@ -75,7 +75,8 @@ Read<FastrakEmulation> readEmulation(const EmulateOptions& options) {
 Outcome runEmulate(const EmulateOptions& options, const CommonOptions& common) {
   const auto kind = findEmulator(options.tracker);
   if (!kind) return tl::unexpected(kind.error());
-  const auto emulation = readEmulation(options);
+  Answer answer;
+  const auto emulation = readEmulation(options, answer.remarks);
   if (!emulation) return tl::unexpected(emulation.error());
   auto emulator = (*kind)->make(*emulation);
   if (!emulator) return notPossible(emulator.error());
@@ -96,7 +97,6 @@ Outcome runEmulate(const EmulateOptions& options, const CommonOptions& common) {
                        [] { QCoreApplication::quit(); });
   }
   QCoreApplication::exec();
-  Answer answer;
   answer.json = {{"tracker", (*kind)->id}, {"address", address}, {"records_sent", runner.recordsSent()}};
   answer.text = std::to_string(runner.recordsSent()) + " records sent\n";
   return answer;

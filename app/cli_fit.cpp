@@ -63,16 +63,19 @@ Answer fitAnswer(const FitOptions& options, const Corrector& corrector, AlignMod
 Outcome runFit(const FitOptions& options, const CommonOptions& common) {
   const auto choice = parseCorrectorChoice(options.position, options.orientation);
   if (!choice) return wrongUsage(choice.error());
-  const auto table = readNodesArgument(options.nodes);
-  if (!table) return tl::unexpected(table.error());
-  const auto align = readAlignArgument(options.align, defaultAlignMode(table->metadata));
+  const auto reading = readNodesArgument(options.nodes);
+  if (!reading) return tl::unexpected(reading.error());
+  const CalibrationTable& table = reading->table;
+  const auto align = readAlignArgument(options.align, defaultAlignMode(table.metadata));
   if (!align) return tl::unexpected(align.error());
-  const std::vector<Node> rows = fitRows(*table);
-  const auto corrector = Corrector::fit(rows, table->metadata, *choice, *align, runControl(common, "fitting"));
+  const std::vector<Node> rows = fitRows(table);
+  const auto corrector = Corrector::fit(rows, table.metadata, *choice, *align, runControl(common, "fitting"));
   if (!corrector) return notPossible(corrector.error());
   const auto saved = corrector->save(options.out);
   if (!saved) return notPossible(saved.error());
-  return fitAnswer(options, *corrector, *align, table->nodes.size() - rows.size());
+  Answer answer = fitAnswer(options, *corrector, *align, table.nodes.size() - rows.size());
+  answer.remarks = reading->notes;
+  return answer;
 }
 
 void addFit(CommandLine& line) {
@@ -110,14 +113,15 @@ ReportInput reportInput(CalibrationTable table, Comparison comparison, const std
 Outcome runCompare(const CompareOptions& options, const CommonOptions& common) {
   const auto arguments = readComparisonArguments(options.comparison);
   if (!arguments) return tl::unexpected(arguments.error());
-  const auto table = readNodesArgument(options.nodes);
-  if (!table) return tl::unexpected(table.error());
-  const auto comparison = compareMethods(*table, *arguments, runControl(common, "comparing"));
+  const auto reading = readNodesArgument(options.nodes);
+  if (!reading) return tl::unexpected(reading.error());
+  const auto comparison = compareMethods(reading->table, *arguments, runControl(common, "comparing"));
   if (!comparison) return notPossible(comparison.error());
-  Answer answer{comparisonText(*comparison), toJson(*comparison)};
+  Answer answer{comparisonText(*comparison), toJson(*comparison), reading->notes};
   if (!options.html.empty()) {
-    const auto written =
-        writeHtmlReport(reportInput(*table, *comparison, options.nodes, options.comparison.seed), options.html);
+    ReportInput input = reportInput(reading->table, *comparison, options.nodes, options.comparison.seed);
+    input.notes = reading->notes;
+    const auto written = writeHtmlReport(input, options.html);
     if (!written) return notPossible(written.error());
   }
   return answer;
@@ -141,9 +145,10 @@ struct ReportOptions {
 Read<ReportInput> readReportInput(const ReportOptions& options) {
   ReportInput input;
   if (options.session.empty()) {
-    auto table = readNodesArgument(options.nodes);
-    if (!table) return tl::unexpected(table.error());
-    input.table = std::move(*table);
+    auto reading = readNodesArgument(options.nodes);
+    if (!reading) return tl::unexpected(reading.error());
+    input.table = std::move(reading->table);
+    input.notes = std::move(reading->notes);
     input.source = options.nodes;
     return input;
   }
@@ -174,6 +179,7 @@ Outcome runReport(const ReportOptions& options, const CommonOptions& common) {
   whole.plan = input->plan;
   whole.places = input->places;
   whole.states = input->states;
+  whole.notes = input->notes;
   const auto written = writeHtmlReport(whole, options.html);
   if (!written) return notPossible(written.error());
   Answer answer;

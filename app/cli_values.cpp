@@ -1,10 +1,8 @@
 #include "app/cli_values.h"
 
-#include <iostream>
 #include <sstream>
 #include <string_view>
 
-#include "calib/core/table_io.h"
 #include "calib/correctors/registry.h"
 
 namespace fieldtrue::cli {
@@ -61,11 +59,10 @@ Read<Scene> readSceneArgument(const std::string& path) {
   return *scene;
 }
 
-Read<CalibrationTable> readNodesArgument(const std::string& path) {
+Read<TableReading<CalibrationTable>> readNodesArgument(const std::string& path) {
   auto reading = readNodeTable(std::filesystem::path(path));
   if (!reading) return notPossible(reading.error());
-  remark(reading->notes);
-  return std::move(reading->table);
+  return std::move(*reading);
 }
 
 Read<AlignMode> readAlignArgument(const std::string& text, AlignMode fallback) {
@@ -130,10 +127,6 @@ std::vector<std::string> splitMethods(const std::string& text) {
   }
   if (text.empty() || text.back() == ',') methods.emplace_back();
   return methods;
-}
-
-void remark(const std::vector<std::string>& notes) {
-  for (const std::string& note : notes) std::cerr << "note: " << note << '\n';
 }
 
 }  // namespace fieldtrue::cli

@@ -7,6 +7,7 @@
 #include "app/cli.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/settings.h"
+#include "calib/core/table_io.h"
 #include "calib/correctors/corrector.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/simulation/scene.h"
@@ -24,8 +25,8 @@ Read<Plan> readPlanArgument(const std::string& text_or_path);
 /// The scene of a file; the clean room with the default tracker when the path is empty.
 Read<Scene> readSceneArgument(const std::string& path);
 
-/// A node table; what its reader noticed goes to stderr.
-Read<CalibrationTable> readNodesArgument(const std::string& path);
+/// A node table, and what its reader noticed.
+Read<TableReading<CalibrationTable>> readNodesArgument(const std::string& path);
 
 /// `none` or `rigid`; `fallback` when empty.
 Read<AlignMode> readAlignArgument(const std::string& text, AlignMode fallback);
@@ -43,8 +44,5 @@ Read<ComparisonOptions> readComparisonArguments(const ComparisonArguments& argum
 
 /// Splits `a,b:key=1,other=2,c` into method texts; a part with '=' and no ':' continues the method before it.
 std::vector<std::string> splitMethods(const std::string& text);
-
-/// Remarks go to stderr, one line each, so that stdout stays clean.
-void remark(const std::vector<std::string>& notes);
 
 }  // namespace fieldtrue::cli

@@ -1,0 +1,229 @@
+#include <signal.h>
+
+#include <QElapsedTimer>
+#include <QFileInfo>
+#include <QRegularExpression>
+#include <QTemporaryDir>
+#include <QTest>
+#include <set>
+
+#include "calib/core/table_io.h"
+#include "tests/app/cli_program.h"
+#include "tests/support/matchers.h"
+
+/// Recording with the simulated tracker and with an emulated one over TCP and a pty.
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+/// Reads the process's output until a line matches.
+QRegularExpressionMatch waitForLine(QProcess& process, const QString& pattern, int timeout_ms = 60000) {
+  const QRegularExpression expression(pattern, QRegularExpression::MultilineOption);
+  QElapsedTimer timer;
+  timer.start();
+  QString text;
+  do {
+    text += QString::fromUtf8(process.readAllStandardOutput());
+    const auto match = expression.match(text);
+    if (match.hasMatch()) return match;
+  } while (timer.elapsed() < timeout_ms && (process.waitForReadyRead(1000) || process.state() == QProcess::Running));
+  return {};
+}
+
+CalibrationTable tableOf(const QString& path) {
+  const auto reading = readNodeTable(std::filesystem::path(path.toStdString()));
+  return reading ? reading->table : CalibrationTable{};
+}
+
+}  // namespace
+
+class CliAcquireTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void initTestCase() { QVERIFY2(QFileInfo(cliPath()).isExecutable(), qPrintable(cliPath() + " is not built")); }
+
+  void aWholeSessionByItself() {
+    const QString session = at("auto.fieldtrue");
+    const CliRun run = runCli({"acquire", "--device", "simulated:speed=20", "--plan", "grid:3x3x2@0.15", "--auto",
+                               "--samples-per-node", "20", "--session", session});
+    FT_VERIFY_STATUS(run, 0);
+    QVERIFY2(run.out.contains("done 18 of 18"), run.out.constData());
+    QVERIFY(QRegularExpression(
+                "^C3, pipe 2  \\(-?\\d+\\.\\d\\d m, -?\\d+\\.\\d\\d m, -?\\d+\\.\\d\\d m\\)  done \\d+ of 18, SD "
+                "<?\\d+(\\.\\d+)? mm",
+                QRegularExpression::MultilineOption)
+                .match(QString::fromUtf8(run.out))
+                .hasMatch());
+    FT_VERIFY_STATUS(
+        runCli({"tables", "--session", session, "--nodes", at("a.nodes.csv"), "--samples", at("a.samples.csv")}), 0);
+    const CalibrationTable table = tableOf(at("a.nodes.csv"));
+    QCOMPARE(table.nodes.size(), std::size_t(18));
+    std::set<int> places;
+    for (const Node& node : table.nodes) {
+      places.insert(node.node);
+      QVERIFY(node.n_used + node.n_rejected >= 20);
+    }
+    QCOMPARE(places.size(), std::size_t(18));
+    const auto samples = readSampleTable(std::filesystem::path(at("a.samples.csv").toStdString()));
+    FT_VERIFY_OK(samples);
+    QVERIFY(samples->table.rows.size() >= 18 * 20);
+    FT_VERIFY_STATUS(runCli({"report", "--session", session, "--methods", "rigid,affine", "--html", at("a.html")}), 0);
+    QVERIFY(readWhole(at("a.html")).contains("auto.fieldtrue"));
+  }
+
+  void anInterruptedSessionIsResumed() {
+    const QString session = at("stopped.fieldtrue");
+    const QStringList arguments = {"acquire",         "--device", "simulated:speed=10", "--plan",
+                                   "grid:3x3x3@0.15", "--auto",   "--samples-per-node", "20",
+                                   "--session",       session};
+    QProcess process;
+    process.start(cliPath(), arguments);
+    QVERIFY(waitForLine(process, "done 3 of 27").hasMatch());
+    QCOMPARE(::kill(static_cast<pid_t>(process.processId()), SIGINT), 0);
+    const CliRun stopped = finished(process, 20000);
+    FT_VERIFY_STATUS(stopped, 0);
+    FT_VERIFY_STATUS(runCli({"tables", "--session", session, "--nodes", at("s.nodes.csv")}), 0);
+    const CalibrationTable before = tableOf(at("s.nodes.csv"));
+    QVERIFY(before.nodes.size() >= 3 && before.nodes.size() < 27);
+    const CliRun resumed = runCli(arguments);
+    FT_VERIFY_STATUS(resumed, 0);
+    QVERIFY2(resumed.out.contains("Resuming: " + QByteArray::number(before.nodes.size()) + " of 27 done"),
+             resumed.out.constData());
+    FT_VERIFY_STATUS(runCli({"tables", "--session", session, "--nodes", at("s.nodes.csv")}), 0);
+    const CalibrationTable after = tableOf(at("s.nodes.csv"));
+    QCOMPARE(after.nodes.size(), std::size_t(27));
+    for (const Node& kept : before.nodes) {
+      const auto same = std::find_if(after.nodes.begin(), after.nodes.end(),
+                                     [&](const Node& node) { return node.node == kept.node; });
+      QVERIFY(same != after.nodes.end());
+      FT_VERIFY_MATCH(sameBits(same->tracker_from_sensor, kept.tracker_from_sensor));
+    }
+  }
+
+  void anotherPlanIsNotMixedIn() {
+    const QString session = at("plan.fieldtrue");
+    const QStringList start = {
+        "acquire", "--device", "simulated:speed=20", "--auto", "--samples-per-node", "5", "--session",
+        session,   "--plan"};
+    FT_VERIFY_STATUS(runCli(start + QStringList{"grid:2x1x1@0.2"}), 0);
+    const CliRun other = runCli(start + QStringList{"grid:2x2x1@0.2"});
+    FT_VERIFY_STATUS(other, 1);
+    FT_VERIFY_MATCH(holdsAll(other.err.toStdString(), {"another plan"}));
+    FT_VERIFY_STATUS(runCli(start + QStringList{"grid:2x1x1@0.2"}), 0);
+  }
+
+  void theOperatorTakesSkipsAndTakesBack() {
+    const QString session = at("hand.fieldtrue");
+    QProcess process;
+    process.start(cliPath(), {"acquire", "--device", "simulated:speed=20", "--plan", "grid:3x1x1@0.2",
+                              "--samples-per-node", "10", "--session", session});
+    QVERIFY(waitForLine(process, "^Next: A1").hasMatch());
+    process.write("\n");
+    QVERIFY(waitForLine(process, "^A1.*done 1 of 3").hasMatch());
+    process.write("u\n");
+    QVERIFY(waitForLine(process, "^Next: A1").hasMatch());
+    process.write("s\n");
+    QVERIFY(waitForLine(process, "^Next: B1").hasMatch());
+    process.write("x\n");
+    QVERIFY(waitForLine(process, "'x' is not known").hasMatch());
+    process.write("\n");
+    QVERIFY(waitForLine(process, "^B1.*done 1 of 3").hasMatch());
+    process.write("q\n");
+    const CliRun run = finished(process, 20000);
+    FT_VERIFY_STATUS(run, 0);
+    QVERIFY2(run.out.contains("1 of 3 places done, 1 skipped"), run.out.constData());
+  }
+
+  void anEmulatedTrackerOverTcp() {
+    QProcess emulator;
+    emulator.start(cliPath(), {"emulate", "fastrak", "--listen", "0", "--duration", "120"});
+    const auto line = waitForLine(emulator, "device (fastrak:tcp:\\S+:\\d+)");
+    QVERIFY(line.hasMatch());
+    const QString session = at("tcp.fieldtrue");
+    recordByHand(line.captured(1), session);
+    QCOMPARE(::kill(static_cast<pid_t>(emulator.processId()), SIGTERM), 0);
+    const CliRun run = finished(emulator, 20000);
+    FT_VERIFY_STATUS(run, 0);
+    QVERIFY2(run.out.contains("records sent"), run.out.constData());
+    FT_VERIFY_STATUS(runCli({"tables", "--session", session, "--nodes", at("tcp.nodes.csv")}), 0);
+    QCOMPARE(tableOf(at("tcp.nodes.csv")).nodes.size(), std::size_t(1));
+  }
+
+  void aRecordingIsPlayedOverAPty() {
+    // A sensor that stands at one exactly known pose.
+    QByteArray recording = "node,sensor,visit,t_s,x_m,y_m,z_m,qw,qx,qy,qz,status\n";
+    for (int i = 0; i < 3000; ++i) {
+      recording += "-1,0,0," + QByteArray::number(i * 0.01, 'f', 2) + ",0.4,-0.127,0.0635,1,0,0,0,\n";
+    }
+    QVERIFY(writeWhole(at("still.samples.csv"), recording));
+    QProcess emulator;
+    const QString link = at("fastrak");
+    emulator.start(cliPath(), {"emulate", "fastrak", "--pty", link, "--replay", at("still.samples.csv")});
+    QVERIFY(waitForLine(emulator, "emulator at").hasMatch());
+    QVERIFY(QFileInfo(link).isSymLink());
+    const QString session = at("pty.fieldtrue");
+    recordByHand("fastrak:" + link, session);
+    QCOMPARE(::kill(static_cast<pid_t>(emulator.processId()), SIGINT), 0);
+    FT_VERIFY_STATUS(finished(emulator, 20000), 0);
+    QVERIFY(!QFileInfo(link).isSymLink());
+    FT_VERIFY_STATUS(runCli({"tables", "--session", session, "--nodes", at("pty.nodes.csv")}), 0);
+    const CalibrationTable table = tableOf(at("pty.nodes.csv"));
+    QCOMPARE(table.nodes.size(), std::size_t(1));
+    FT_VERIFY_MATCH(
+        near(table.nodes.front().tracker_from_sensor.position_m, Eigen::Vector3d(0.4, -0.127, 0.0635), 1e-6));
+  }
+
+  void listsAreMachineReadable_data() {
+    QTest::addColumn<QString>("command");
+    QTest::addColumn<QString>("list");
+    QTest::addColumn<QString>("id");
+    QTest::newRow("methods") << "methods"
+                             << "position"
+                             << "hmq";
+    QTest::newRow("orientation") << "methods"
+                                 << "orientation"
+                                 << "hmq_matrix";
+    QTest::newRow("effects") << "effects"
+                             << "effects"
+                             << "metal_plane";
+    QTest::newRow("devices") << "devices"
+                             << "devices"
+                             << "simulated";
+  }
+
+  void listsAreMachineReadable() {
+    QFETCH(QString, command);
+    QFETCH(QString, list);
+    QFETCH(QString, id);
+    const CliRun run = runCli({command, "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    const auto rows = run.json().at(list.toStdString());
+    const bool found =
+        std::any_of(rows.begin(), rows.end(), [&](const auto& row) { return row.at("id") == id.toStdString(); });
+    QVERIFY(found);
+    const CliRun people = runCli({command});
+    FT_VERIFY_STATUS(people, 0);
+    QVERIFY(people.out.contains(id.toUtf8()));
+  }
+
+ private:
+  QString at(const QString& name) const { return folder_.filePath(name); }
+
+  /// Records the only place of a plan by pressing Enter.
+  void recordByHand(const QString& device, const QString& session) {
+    QProcess process;
+    process.start(cliPath(), {"acquire", "--device", device, "--plan", "grid:1x1x1@0.2", "--samples-per-node", "20",
+                              "--session", session});
+    QVERIFY2(waitForLine(process, "^Next: A1").hasMatch(), process.readAllStandardError().constData());
+    process.write("\n");
+    const CliRun run = finished(process, 60000);
+    FT_VERIFY_STATUS(run, 0);
+    QVERIFY2(run.out.contains("done 1 of 1"), run.out.constData());
+  }
+
+  QTemporaryDir folder_;
+};
+
+QTEST_GUILESS_MAIN(CliAcquireTest)
+#include "cli_acquire_test.moc"

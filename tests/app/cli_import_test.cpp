@@ -1,0 +1,106 @@
+#include <QTemporaryDir>
+#include <QTest>
+
+#include "tests/app/cli_program.h"
+#include "tests/support/matchers.h"
+#include "tests/support/real_data.h"
+
+/// Recordings of other people's trackers, from their files to figures that others published.
+using namespace fieldtrue::testing;
+using nlohmann::json;
+
+namespace {
+
+QString data(const std::string& relative) { return QString::fromStdString(realData(relative).value_or("").string()); }
+
+}  // namespace
+
+class CliImportTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void anserConditionsReproduceTheirFigures_data() {
+    QTest::addColumn<QString>("condition");
+    QTest::addColumn<double>("in_sample_mm");
+    QTest::addColumn<double>("held_out_mm");
+    QTest::newRow("standard") << "standard_data_grid" << 2.26 << 2.34;
+    QTest::newRow("interpolate") << "interpolate_data_grid" << 2.08 << 2.16;
+    QTest::newRow("probe calibrate") << "interpolate_data_grid_probe_calibrate" << 2.40 << 2.50;
+    QTest::newRow("finer points") << "finer_mesh_points" << 4.53 << 4.72;
+    QTest::newRow("finer 3 axis") << "finer_mesh_3axis" << 2.46 << 2.57;
+    QTest::newRow("steel shield") << "steel_shield" << 5.21 << 5.39;
+  }
+
+  void anserConditionsReproduceTheirFigures() {
+    FT_REQUIRE_REAL_DATA();
+    QFETCH(QString, condition);
+    QFETCH(double, in_sample_mm);
+    QFETCH(double, held_out_mm);
+    const QString nodes = folder_.filePath(condition + ".nodes.csv");
+    FT_VERIFY_STATUS(runCli({"import", "--format", "anser:condition=" + condition, "--in",
+                             data("anser_duplo/nodes.csv"), "--nodes", nodes}),
+                     0);
+    const CliRun fit =
+        runCli({"fit", "--nodes", nodes, "--position", "rigid", "--out", folder_.filePath("f.ftcal.json"), "--json"});
+    FT_VERIFY_STATUS(fit, 0);
+    FT_VERIFY_MATCH(near(fit.json().at("in_sample").at("rms_mm").get<double>(), in_sample_mm, 0.01));
+    const CliRun compared = runCli({"compare", "--nodes", nodes, "--validate", "loo", "--json"});
+    FT_VERIFY_STATUS(compared, 0);
+    const json result = compared.json();
+    QCOMPARE(result.at("places").get<int>(), 41);
+    FT_VERIFY_MATCH(near(result.at("before").at("position_mm").at("rms").get<double>(), held_out_mm, 0.01));
+    for (const json& score : result.at("position")) {
+      if (score.at("method") != "rigid") continue;
+      FT_VERIFY_MATCH(near(score.at("position_mm").at("rms").get<double>(), held_out_mm, 0.01));
+    }
+    // Positions only: nothing can be said about orientation.
+    QVERIFY(result.at("before").at("orientation_deg").is_null());
+    QVERIFY(!result.at("verdict").at("apply_orientation").get<bool>());
+  }
+
+  void plusSamplesBecomeNodes() {
+    FT_REQUIRE_REAL_DATA();
+    const QString nodes = folder_.filePath("plus.nodes.csv"), samples = folder_.filePath("plus.samples.csv");
+    const CliRun run = runCli({"import", "--format", "plus", "--in", data("pluslib_fcal/samples.csv"), "--nodes", nodes,
+                               "--samples", samples, "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    QCOMPARE(run.json().at("nodes").at("places").get<int>(), 8);
+    QCOMPARE(run.json().at("samples").at("rows").get<int>(), 1000);
+    FT_VERIFY_STATUS(runCli({"compare", "--nodes", nodes, "--json"}), 0);
+  }
+
+  void trajectoriesHaveSamplesOnly() {
+    FT_REQUIRE_REAL_DATA();
+    const QString in = data("polhemus_hand/user1_cup0.traj");
+    const CliRun refused =
+        runCli({"import", "--format", "traj", "--in", in, "--nodes", folder_.filePath("t.nodes.csv")});
+    FT_VERIFY_STATUS(refused, 1);
+    FT_VERIFY_MATCH(holdsAll(refused.err.toStdString(), {"no true positions", "--samples"}));
+    QVERIFY(!QFile::exists(folder_.filePath("t.nodes.csv")));
+    const CliRun run =
+        runCli({"import", "--format", "traj", "--in", in, "--samples", folder_.filePath("t.samples.csv"), "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    QVERIFY(run.json().at("samples").at("rows").get<int>() > 100);
+  }
+
+  void formatsAreListedWithTheirSettings() {
+    const CliRun run = runCli({"formats", "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    const json listed = run.json();
+    bool found = false;
+    for (const json& row : listed.at("import")) {
+      for (const char* key : {"id", "label", "settings", "needs_truth"}) QVERIFY2(row.contains(key), key);
+      for (const json& setting : row.at("settings")) {
+        for (const char* key : {"key", "label", "type", "unit", "default"}) QVERIFY2(setting.contains(key), key);
+      }
+      found = found || row.at("id") == "anser";
+    }
+    QVERIFY(found);
+    QVERIFY(listed.at("export").size() >= 2);
+  }
+
+ private:
+  QTemporaryDir folder_;
+};
+
+QTEST_GUILESS_MAIN(CliImportTest)
+#include "cli_import_test.moc"
