@@ -1,0 +1,263 @@
+#include "widgets/report/report.h"
+
+#include <QImage>
+#include <QTemporaryDir>
+#include <QTest>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "tests/support/matchers.h"
+#include "tests/support/synthetic.h"
+#include "tests/support/xml_tree.h"
+#include "widgets/report/numbers.h"
+#include "widgets/report/report_data.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+/// A bent 5x5x4 grid of which an affine fit undoes most and hmq the rest.
+CalibrationTable bentTable() {
+  SyntheticOptions options;
+  options.smooth_distortion_m = 0.03;
+  options.orientation_error_rad = 0.05;
+  SyntheticNoise noise;
+  noise.position_sd_m = 0.0002;
+  CalibrationTable table = syntheticTable(options, noise);
+  for (Node& node : table.nodes) {
+    node.covariance_m2 = Eigen::Vector3d(4e-6, 4e-6, 1e-6).asDiagonal();
+    node.n_used = 60;
+    node.n_rejected = 1;
+    node.n_effective = 20.0;
+  }
+  return table;
+}
+
+ReportInput reportOf(CalibrationTable table, const ComparisonOptions& options) {
+  ReportInput input;
+  const auto comparison = compareMethods(table, options);
+  if (!comparison) qFatal("%s", comparison.error().message.c_str());
+  input.comparison = *comparison;
+  input.table = std::move(table);
+  input.source = "room.nodes.csv";
+  input.made_at = "2024-05-01T12:00:00";
+  input.with_pictures = false;
+  return input;
+}
+
+ComparisonOptions fewMethods() {
+  ComparisonOptions options;
+  options.position_methods = {{"none", {}}, {"affine", {}}, {"polynomial", {{"degree", "3"}}}};
+  options.orientation_methods = {{"none", {}}, {"rigid", {}}};
+  options.validation = Validation{ValidationKind::kFolds, 5};
+  return options;
+}
+
+std::unique_ptr<XmlElement> parsed(const ReportInput& input) {
+  QString error;
+  auto page = parseXml(QByteArray::fromStdString(htmlReport(input)), error);
+  if (!error.isEmpty()) qFatal("%s", qPrintable(error));
+  return page;
+}
+
+std::vector<QString> rowTexts(const XmlElement& row) {
+  std::vector<QString> cells;
+  for (const auto& cell : row.children) cells.push_back(cell->text);
+  return cells;
+}
+
+}  // namespace
+
+class ReportTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void initTestCase() { input_ = reportOf(bentTable(), fewMethods()); }
+
+  void verdictComesFirst() {
+    const auto page = parsed(input_);
+    const auto bodies = page->all("body");
+    QCOMPARE(bodies.size(), std::size_t(1));
+    const XmlElement& first = *bodies.front()->children.front()->children.front();
+    QVERIFY(first.hasClass("verdict"));
+    QCOMPARE(first.text.toStdString(), input_.comparison.verdict.text);
+    QVERIFY(!first.text.isEmpty());
+  }
+
+  void positionTableHoldsTheComparison() {
+    const auto page = parsed(input_);
+    const XmlElement& table = *page->all("table").front();
+    const auto rows = table.all("tbody").front()->all("tr");
+    QCOMPARE(rows.size(), 1 + input_.comparison.position.size());
+    QCOMPARE(rowTexts(*rows.front()).at(3).toStdString(), errorFigure(input_.comparison.before_position_mm.rms));
+    const MethodScore* best = bestPosition(input_.comparison);
+    QVERIFY(best != nullptr);
+    for (std::size_t i = 0; i < input_.comparison.position.size(); ++i) {
+      const MethodScore& score = input_.comparison.position[i];
+      const auto cells = rowTexts(*rows[i + 1]);
+      QCOMPARE(cells.at(1).toStdString(), errorFigure(score.stats.mean));
+      QCOMPARE(cells.at(3).toStdString(), errorFigure(score.stats.rms));
+      QCOMPARE(cells.at(5).toStdString(), errorFigure(score.stats.p95));
+      QCOMPARE(cells.at(6).toStdString(), errorFigure(score.stats.max));
+      QCOMPARE(rows[i + 1]->hasClass("best"), &score == best);
+    }
+  }
+
+  void worseThanBeforeIsMarked() {
+    ReportInput input = input_;
+    MethodScore& score = input.comparison.position.at(1);
+    score.stats.rms = 2.0 * input.comparison.before_position_mm.rms;
+    input.comparison.best_position_row = 2;
+    const auto page = parsed(input);
+    const auto rows = page->all("tbody").front()->all("tr");
+    QVERIFY(rows.at(2)->hasClass("worse"));
+    QVERIFY(rows.at(2)->text.contains("worse than before"));
+    QVERIFY(!rows.at(3)->text.contains("worse than before"));
+  }
+
+  void skippedMethodsSayWhy() {
+    ReportInput input = input_;
+    input.comparison.position.at(0) = {};
+    input.comparison.position.at(0).method = "hmq";
+    input.comparison.position.at(0).skipped = "needs nodes <not> in one plane";
+    const auto page = parsed(input);
+    const auto rows = page->all("tbody").front()->all("tr");
+    QVERIFY(rows.at(1)->text.contains("needs nodes <not> in one plane"));
+  }
+
+  void placesAreListedOnceWorstFirst() {
+    const auto page = parsed(input_);
+    const auto details = page->all("details");
+    QCOMPARE(details.size(), std::size_t(1));
+    const auto tables = page->all("table");
+    QCOMPARE(tables.size(), std::size_t(4));
+    const auto worst = tables.at(2)->all("tbody").front()->all("tr");
+    const auto rest = details.front()->all("tbody").front()->all("tr");
+    QCOMPARE(worst.size(), std::size_t(10));
+    QCOMPARE(worst.size() + rest.size(), input_.comparison.places.size());
+    std::set<QString> nodes;
+    double last = 1e9;
+    for (const auto* rows : {&worst, &rest}) {
+      for (const XmlElement* row : *rows) {
+        const auto cells = rowTexts(*row);
+        nodes.insert(cells.at(1));
+        const double after = cells.at(6).toDouble();
+        QVERIFY(after <= last);
+        last = after;
+      }
+    }
+    QCOMPARE(nodes.size(), input_.comparison.places.size());
+    const auto best = bestPosition(input_.comparison);
+    const double largest = *std::max_element(best->place_errors.begin(), best->place_errors.end());
+    QCOMPARE(rowTexts(*worst.front()).at(6).toStdString(), errorFigure(largest));
+  }
+
+  void measuredFactsAreThoseOfTheTable() {
+    const MeasurementSummary summary = measurementSummary(input_.table);
+    QCOMPARE(summary.n_rows, std::size_t(100));
+    QCOMPARE(summary.n_used, 6000L);
+    QCOMPARE(summary.n_rejected, 100L);
+    QCOMPARE(summary.n_sensors, 1);
+    FT_VERIFY_MATCH(near(summary.sd_mm.value_or(0.0), 3.0, 1e-12));  // sqrt(4 + 4 + 1) mm
+    FT_VERIFY_MATCH(
+        near(summary.autocorrelation.value_or(0.0), 0.5, 1e-12));  // 60 samples worth 20: (1 - 1/3) / (1 + 1/3)
+    const auto page = parsed(input_);
+    QVERIFY(page->text.contains("6000 used, 100 rejected"));
+  }
+
+  void textIsEscaped() {
+    ReportInput input = input_;
+    input.source = "<script>alert('&')</script>\x01.csv";
+    input.comparison.verdict.text = "a < b & \"c\"";
+    input.table.metadata.tracker = "Fast\"rak <1>";
+    input.notes = {"]]> <b>bold</b>"};
+    const std::string html = htmlReport(input);
+    QVERIFY(html.find("<script") == std::string::npos);
+    const auto page = parsed(input);
+    QVERIFY(page->all("script").empty());
+    QVERIFY(page->all("b").empty());
+    QCOMPARE(page->all("p").front()->text, QString("a < b & \"c\""));
+    QVERIFY(page->text.contains("Fast\"rak <1>"));
+    QVERIFY(page->text.contains("]]> <b>bold</b>"));
+  }
+
+  void nothingIsLoadedFromElsewhere() {
+    std::string html = htmlReport(input_);
+    const auto name_space = html.find("http://www.w3.org/1999/xhtml");
+    QVERIFY(name_space != std::string::npos);
+    html.erase(name_space, 28);
+    for (const char* reference : {"http:", "https:", "file:", "url(", "@import", "<link"}) {
+      QVERIFY2(html.find(reference) == std::string::npos, reference);
+    }
+  }
+
+  void missingPicturesAreExplained() {
+    const auto page = parsed(input_);
+    QVERIFY(page->all("img").empty());
+    bool told = false;
+    for (const XmlElement* paragraph : page->all("p")) {
+      told = told || (paragraph->hasClass("notice") && paragraph->text.contains("Pictures could not be drawn"));
+    }
+    QVERIFY(told);
+  }
+
+  void picturesAreInThePage() {
+    ReportInput input = input_;
+    input.with_pictures = true;
+    const auto page = parsed(input);
+    const auto figures = page->all("figure");
+    if (page->text.contains("Pictures could not be drawn")) {
+      for (const XmlElement* p : page->all("p")) {
+        if (p->hasClass("notice")) QSKIP(qPrintable("this machine draws no pictures: " + p->text));
+      }
+    }
+    QCOMPARE(figures.size(), std::size_t(4));
+    for (const XmlElement* figure : figures) {
+      const QString light = figure->all("img").front()->attributes["src"];
+      const QString dark = figure->all("source").front()->attributes["srcset"];
+      QVERIFY(light != dark);
+      for (const QString& source : {light, dark}) {
+        const QString prefix = "data:image/png;base64,";
+        QVERIFY(source.startsWith(prefix));
+        const QImage image = QImage::fromData(QByteArray::fromBase64(source.mid(prefix.size()).toLatin1()), "PNG");
+        QVERIFY(image.width() > 400 && image.height() > 300);
+        std::set<QRgb> colours;
+        for (int y = 0; y < image.height(); y += 3) {
+          for (int x = 0; x < image.width(); x += 3) colours.insert(image.pixel(x, y));
+        }
+        QVERIFY2(colours.size() > 8, "the picture is blank");
+      }
+      QVERIFY(!figure->all("figcaption").front()->text.isEmpty());
+    }
+  }
+
+  void tablesWithoutOrientationSayIt() {
+    SyntheticOptions options;
+    options.has_orientation = false;
+    options.smooth_distortion_m = 0.02;
+    const auto page = parsed(reportOf(syntheticTable(options), fewMethods()));
+    QVERIFY(page->text.contains("reported no orientation"));
+  }
+
+  void theSameInputGivesTheSamePage() { QCOMPARE(htmlReport(input_), htmlReport(input_)); }
+
+  void writesTheFileOrSaysWhyNot() {
+    const QTemporaryDir folder;
+    const std::filesystem::path path = folder.filePath("report.html").toStdString();
+    FT_VERIFY_OK(writeHtmlReport(input_, path));
+    std::ifstream in(path, std::ios::binary);
+    std::stringstream bytes;
+    bytes << in.rdbuf();
+    QCOMPARE(bytes.str(), htmlReport(input_));
+    const auto refused = writeHtmlReport(input_, path / "below" / "report.html");
+    QVERIFY(!refused);
+    FT_VERIFY_MATCH(holdsAll(refused.error().message, {"report.html"}));
+  }
+
+ private:
+  ReportInput input_;
+};
+
+QTEST_GUILESS_MAIN(ReportTest)
+#include "report_test.moc"
