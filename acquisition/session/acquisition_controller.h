@@ -88,7 +88,8 @@ class AcquisitionController : public QObject {
   void finished();  ///< No place is left.
   void tablesReady(const fieldtrue::CalibrationTable& table, const fieldtrue::SampleTable& samples);
   void sessionOpened(const QString& path, const QString& page, const QString& plan_json);
-  void failed(const QString& message);  ///< One sentence for the message line.
+  void fitOpened(const QString& ftcal_text);  ///< The newest calibration of the session just opened, if it has one.
+  void failed(const QString& message);        ///< One sentence for the message line.
 
  private:
   struct Impl;

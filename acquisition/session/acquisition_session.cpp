@@ -50,6 +50,8 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   setCurrent(store->nextPlace());
   const QString plan_json = QString::fromStdString(toJson(store->plan()).dump());
   emit owner->sessionOpened(path, QString::fromStdString(store->state("page")), plan_json);
+  const auto fits = store->fits();
+  if (!fits.empty()) emit owner->fitOpened(QString::fromStdString(fits.front().second));
 }
 
 void AcquisitionController::Impl::close() {

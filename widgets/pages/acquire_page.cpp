@@ -247,7 +247,7 @@ void AcquirePage::showPlace(const AcquisitionStatus& status) {
     place_->setText(status.current_is_retake ? tr("Retake %1").arg(name) : name);
     QString where = positionText(place.reference_from_sensor.position_m);
     if (status.distance_m && status.reference_known && status.take != TakeState::kCollecting)
-      where += tr("     %1 to go").arg(formatLength(*status.distance_m, placingUnit(), 2));
+      where += tr("     %1 to go").arg(distanceText(*status.distance_m));
     position_->setText(where);
   } else {
     place_->setText(tr("All places done"));

@@ -30,7 +30,7 @@
 namespace fieldtrue {
 namespace {
 
-constexpr int kInspectorWidth = 400;
+constexpr int kInspectorWidth = 380;
 constexpr std::size_t kFewestPlaces = 5;
 
 // The slider runs over magnifications 1 to 100 in even ratios.
@@ -184,20 +184,18 @@ QWidget* ComparePage::makeViewBar() {
   layout->addWidget(scale_text_);
   layout->addWidget(two_views_);
   layout->addWidget(orientation_);
-  struct View {
-    const char* label;
-    CameraPreset preset;
-  };
-  for (const View& view :
-       {View{QT_TR_NOOP("Operator"), CameraPreset::kOperator}, View{QT_TR_NOOP("Front"), CameraPreset::kFront},
-        View{QT_TR_NOOP("Side"), CameraPreset::kSide}, View{QT_TR_NOOP("Top"), CameraPreset::kTop}}) {
-    auto* button = new QPushButton(tr(view.label), bar);
-    button->setFlat(true);
-    connect(button, &QPushButton::clicked, this, [this, preset = view.preset] { before_->setCamera(preset); });
-    layout->addWidget(button);
-  }
+  auto* camera = new QComboBox(bar);
+  camera->setAccessibleName(tr("Where to look from"));
+  for (const auto& [label, preset] :
+       {std::pair(tr("Operator"), CameraPreset::kOperator), std::pair(tr("Front"), CameraPreset::kFront),
+        std::pair(tr("Side"), CameraPreset::kSide), std::pair(tr("Top"), CameraPreset::kTop)})
+    camera->addItem(label, static_cast<int>(preset));
+  connect(camera, &QComboBox::activated, this,
+          [this, camera] { before_->setCamera(static_cast<CameraPreset>(camera->currentData().toInt())); });
+  layout->addWidget(camera);
   hovered_ = new QLabel(bar);
   hovered_->setProperty("role", "muted");
+  hovered_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
   layout->addWidget(hovered_, 1);
   return bar;
 }
@@ -269,7 +267,7 @@ QWidget* ComparePage::makeInspector() {
               if (row.isValid()) selectMethod(*part, part->model->method(part->sorted->mapToSource(row).row()));
             });
   }
-  fit_ = new QPushButton(tr("Fit these on every place"), inspector);
+  fit_ = new QPushButton(tr("Fit these methods"), inspector);
   fit_->setObjectName(QStringLiteral("fit"));
   fit_->setProperty("primary", true);
   connect(fit_, &QPushButton::clicked, this, &ComparePage::fitChosen);

@@ -10,6 +10,7 @@
 #include <QLineEdit>
 #include <QPushButton>
 #include <QVBoxLayout>
+#include <algorithm>
 
 #include "acquisition/devices/registry.h"
 #include "widgets/pages/settings_form.h"
@@ -19,6 +20,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr int kColumnWidth = 640;
+constexpr QLatin1String kDemonstrationScene("steel_floor");
 
 QString sceneTitle(const QString& file_stem) {
   QString title = file_stem;
@@ -83,6 +85,8 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   for (const QFileInfo& file : QDir(QStringLiteral(":/scenes")).entryInfoList())
     scene_->addItem(sceneTitle(file.fileName().section(QLatin1Char('.'), 0, 0)),
                     file.fileName().section(QLatin1Char('.'), 0, 0));
+  scene_->setObjectName(QStringLiteral("deviceScene"));
+  scene_->setCurrentIndex(std::max(0, scene_->findData(QString(kDemonstrationScene))));
   scene_->addItem(tr("Another scene file..."), QString());
   settings_ = new SettingsForm(column);
 
@@ -141,7 +145,8 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
 void ConnectPage::onKind() {
   const DeviceKind& kind = deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
   const bool simulated = kind_->currentIndex() == 0;
-  kind_help_->setText(QString::fromStdString(kind.address_help));
+  kind_help_->setText(simulated ? tr("A Fastrak in a simulated room; a virtual operator carries the jig.")
+                                : QString::fromStdString(kind.address_help));
   for (QWidget* widget :
        {static_cast<QWidget*>(address_label_), static_cast<QWidget*>(address_), static_cast<QWidget*>(refresh_)})
     widget->setVisible(!simulated);

@@ -23,6 +23,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr int kColumnWidth = 720;
+constexpr int kRowHeight = 36;  // As the style sheet draws a list that is a menu.
 
 }  // namespace
 
@@ -59,7 +60,8 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   layout->addStretch(1);
   layout->addWidget(title);
   layout->addWidget(calibration_);
-  layout->addWidget(list_, 3);
+  list_->setSizePolicy(QSizePolicy::Preferred, QSizePolicy::Fixed);
+  layout->addWidget(list_);
   layout->addWidget(about_);
   layout->addLayout(row);
   layout->addStretch(1);
@@ -76,12 +78,15 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   page->setContentsMargins(0, 0, 0, 0);
   page->addWidget(stack_);
 
-  for (const Target& target : targets_) list_->addItem(target.label);
+  for (const Target& target : targets_) list_->addItem(QStringLiteral("%1   (%2)").arg(target.label, target.extension));
+  list_->setProperty("menu", true);
+  list_->setFixedHeight(static_cast<int>(targets_.size()) * kRowHeight + 4);
   connect(list_, &QListWidget::currentRowChanged, this, &ExportPage::onTarget);
   connect(browse_button, &QPushButton::clicked, this, &ExportPage::browse);
   connect(write_, &QPushButton::clicked, this, &ExportPage::write);
   connect(&workbench_, &Workbench::correctorChanged, this, &ExportPage::onData);
   connect(&workbench_, &Workbench::sessionChanged, this, &ExportPage::onData);
+  connect(&workbench_, &Workbench::tableChanged, this, &ExportPage::onData);
   list_->setCurrentRow(0);
   onData();
 }
@@ -130,11 +135,16 @@ void ExportPage::onData() {
   const std::optional<Corrector>& corrector = workbench_.corrector();
   stack_->setCurrentIndex(corrector ? 1 : 0);
   if (!corrector) return;
-  calibration_->setText(tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows. It turns what the "
-                           "tracker says into what is true.")
-                            .arg(QString::fromStdString(corrector->choice().position_id),
-                                 QString::fromStdString(corrector->choice().orientation_id))
-                            .arg(corrector->report().n_nodes));
+  const QString warning =
+      workbench_.correctorIsCurrent()
+          ? QString()
+          : tr(" It was fitted before the session's places changed: fit again on the compare page.");
+  const CorrectorChoice& choice = corrector->choice();
+  calibration_->setText(
+      tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows.%4")
+          .arg(QString::fromStdString(choice.position_id), QString::fromStdString(choice.orientation_id))
+          .arg(corrector->report().n_nodes)
+          .arg(warning));
   onTarget();
 }
 

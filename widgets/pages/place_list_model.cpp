@@ -14,8 +14,7 @@ namespace {
 
 constexpr std::array kColumns{QT_TRANSLATE_NOOP("PlaceListModel", "Place"),
                               QT_TRANSLATE_NOOP("PlaceListModel", "State"), QT_TRANSLATE_NOOP("PlaceListModel", "n"),
-                              QT_TRANSLATE_NOOP("PlaceListModel", "SD mm"),
-                              QT_TRANSLATE_NOOP("PlaceListModel", "Rejected")};
+                              QT_TRANSLATE_NOOP("PlaceListModel", "SD mm"), QT_TRANSLATE_NOOP("PlaceListModel", "Out")};
 
 }  // namespace
 

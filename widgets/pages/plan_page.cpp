@@ -22,7 +22,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr std::array kAxes{"x", "y", "z"};
-constexpr int kFormWidth = 340;
+constexpr int kFormWidth = 360;
 constexpr int kMaxCount = 40;
 // A practised operator carries the jig to the next mark and lets it settle in about this time.
 constexpr double kSecondsPerPlacement = 15.0;
@@ -61,7 +61,7 @@ PlanPage::PlanPage(Workbench& workbench, QWidget* parent)
 
 QDoubleSpinBox* PlanPage::makeLength(const QString& name, double metres) {
   auto* box = new QDoubleSpinBox(this);
-  box->setDecimals(3);
+  box->setDecimals(enteredDecimals(shown_unit_));
   box->setRange(-100000.0, 100000.0);
   box->setAccessibleName(name);
   box->setValue(metres / metresPer(shown_unit_));
@@ -102,11 +102,13 @@ QWidget* PlanPage::makeForm() {
   unit_->setCurrentIndex(static_cast<int>(shown_unit_));
   unit_->setAccessibleName(tr("Unit of places"));
   connect(unit_, &QComboBox::currentIndexChanged, this, &PlanPage::onUnit);
-  default_origin_ = new QCheckBox(tr("centred in front of the transmitter"), this);
+  default_origin_ = new QCheckBox(tr("centred in front"), this);
   default_origin_->setChecked(true);
   connect(default_origin_, &QCheckBox::toggled, this, &PlanPage::onChanged);
   order_ = new QComboBox(this);
-  order_->addItems({tr("Serpentine: shortest way, fewest pipe changes"), tr("Random: tells drift from place")});
+  order_->addItems({tr("Serpentine"), tr("Random")});
+  order_->setItemData(0, tr("Shortest way, fewest pipe changes"), Qt::ToolTipRole);
+  order_->setItemData(1, tr("Tells drift with time from error with place"), Qt::ToolTipRole);
   order_->setAccessibleName(tr("Order"));
   connect(order_, &QComboBox::currentIndexChanged, this, &PlanPage::onChanged);
   seed_ = makeCount(tr("Seed of the random order"), 1, 0, 1000000);
@@ -169,7 +171,9 @@ void PlanPage::onUnit() {
   for (const auto& boxes : {pitch_, origin_}) {
     for (QDoubleSpinBox* box : boxes) {
       const QSignalBlocker quiet(box);
-      box->setValue(box->value() * ratio);
+      const double value = box->value() * ratio;
+      box->setDecimals(enteredDecimals(unit));
+      box->setValue(value);
     }
   }
   room_->setLengthUnit(unit);

@@ -19,7 +19,8 @@ constexpr int kColumnWidth = 560;
 
 QPushButton* makeChoice(const QString& name, const QString& icon_name, const QString& title, const QString& text,
                         bool primary) {
-  auto* button = new QPushButton(icon(icon_name), QStringLiteral("%1\n%2").arg(title, text));
+  auto* button = new QPushButton(primary ? icon(icon_name, Qt::white) : icon(icon_name),
+                                 QStringLiteral("%1\n%2").arg(title, text));
   button->setObjectName(name);
   button->setProperty("choice", true);
   button->setProperty("primary", primary);
@@ -52,7 +53,7 @@ StartPage::StartPage(Workbench& workbench, QWidget* parent) : QWidget(parent), w
   layout->addSpacing(12);
 
   auto* demo = makeChoice(QStringLiteral("startDemo"), QStringLiteral("play"), tr("Run the demonstration"),
-                          tr("A simulated room with a steel floor. It acquires by itself in about two minutes."), true);
+                          tr("A simulated room with a steel floor, recorded by itself."), true);
   auto* connect_tracker = makeChoice(QStringLiteral("startConnect"), QStringLiteral("connect"), tr("Connect a tracker"),
                                      tr("Serial line, network or the simulated tracker."), false);
   auto* open = makeChoice(QStringLiteral("startOpen"), QStringLiteral("folder"), tr("Open a session"),

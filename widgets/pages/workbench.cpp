@@ -6,6 +6,7 @@
 #include <QFileInfo>
 #include <QSettings>
 #include <QStandardPaths>
+#include <algorithm>
 #include <array>
 
 #include "widgets/pages/background.h"
@@ -26,6 +27,14 @@ constexpr std::array<StepName, 6> kStepNames{{{Step::kStart, "start"},
                                               {Step::kExport, "export"}}};
 
 constexpr int kRecentSessions = 6;
+
+/// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
+std::vector<Node> fitRows(const CalibrationTable& table) {
+  std::vector<Node> rows;
+  for (const Node& node : table.nodes)
+    if (node.role == NodeRole::kFit) rows.push_back(node);
+  return rows;
+}
 
 }  // namespace
 
@@ -71,6 +80,7 @@ void Workbench::wireController() {
   connect(controller_, &AcquisitionController::statusChanged, this, &Workbench::onStatus);
   connect(controller_, &AcquisitionController::tablesReady, this, &Workbench::onTables);
   connect(controller_, &AcquisitionController::sessionOpened, this, &Workbench::onSessionOpened);
+  connect(controller_, &AcquisitionController::fitOpened, this, &Workbench::onFitOpened);
   connect(controller_, &AcquisitionController::nodeStored, this,
           [this](int place, const Node& node, const QString& suspicious) {
             emit nodeStored(place, node, suspicious);
@@ -124,6 +134,27 @@ void Workbench::onSessionOpened(const QString& path, const QString& page, const 
   emit correctorChanged();
   post(&AcquisitionController::requestTables);
   emit stepRequested(stepFromId(page).value_or(Step::kAcquire));
+}
+
+void Workbench::onFitOpened(const QString& ftcal_text) {
+  Result<Corrector> loaded = Corrector::fromText(ftcal_text.toStdString(), session_path_.toStdString());
+  if (!loaded) {
+    showMessage({QString::fromStdString(loaded.error().message), Severity::kAttention, {}, {}});
+    return;
+  }
+  corrector_ = std::move(*loaded);
+  emit correctorChanged();
+}
+
+bool Workbench::correctorIsCurrent() const {
+  if (!corrector_) return false;
+  const auto same = [](const Node& a, const Node& b) {
+    return a.node == b.node && a.sensor == b.sensor && a.visit == b.visit &&
+           a.tracker_from_sensor.position_m == b.tracker_from_sensor.position_m;
+  };
+  const std::vector<Node> now = fitRows(table_);
+  const std::vector<Node>& then = corrector_->table().nodes;
+  return std::equal(now.begin(), now.end(), then.begin(), then.end(), same);
 }
 
 void Workbench::rememberSession(const QString& path) {
@@ -204,13 +235,7 @@ void Workbench::stopComparing() {
 
 void Workbench::fit(const CorrectorChoice& choice, AlignMode align) {
   runInBackground(
-      this,
-      [table = table_, choice, align] {
-        std::vector<Node> rows;
-        for (const Node& node : table.nodes)
-          if (node.role != NodeRole::kSkipped) rows.push_back(node);
-        return Corrector::fit(rows, table.metadata, choice, align);
-      },
+      this, [table = table_, choice, align] { return Corrector::fit(fitRows(table), table.metadata, choice, align); },
       [this](Result<Corrector> result) {
         if (!result) {
           showMessage({QString::fromStdString(result.error().message), Severity::kAttention, {}, {}});

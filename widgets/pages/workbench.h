@@ -45,6 +45,8 @@ class Workbench : public QObject {
   const QString& sessionPath() const { return session_path_; }
   const std::optional<Comparison>& comparison() const { return comparison_; }
   const std::optional<Corrector>& corrector() const { return corrector_; }
+  /// Whether the calibration was fitted on the rows the session has now.
+  bool correctorIsCurrent() const;
   bool isComparing() const { return comparing_; }
 
   // Each of these answers by signal.
@@ -64,7 +66,7 @@ class Workbench : public QObject {
   /// Scores the methods on the session's table in the background; an earlier run is stopped.
   void compare(const ComparisonOptions& options);
   void stopComparing();
-  /// Fits the chosen methods on every row and makes the result the session's calibration.
+  /// Fits the chosen methods on every row of role fit and makes the result the session's calibration.
   void fit(const CorrectorChoice& choice, AlignMode align);
 
   void goToStep(Step step);
@@ -93,6 +95,7 @@ class Workbench : public QObject {
   void rememberSession(const QString& path);
   void onSessionOpened(const QString& path, const QString& page, const QString& plan_json);
   void onStatus(const AcquisitionStatus& status);
+  void onFitOpened(const QString& ftcal_text);
   void onTables(const CalibrationTable& table, const SampleTable& samples);
   template <class... Arguments, class... Given>
   void post(void (AcquisitionController::*slot)(Arguments...), Given&&... given);

@@ -105,9 +105,12 @@ void GuidedSessionTest::startPageOffersWhatToDo() {
 void GuidedSessionTest::connectsTheSimulatedTracker() {
   auto* kind = find<QComboBox>("deviceKind");
   QCOMPARE(kind->currentData().toString(), QStringLiteral("simulated"));
+  auto* scene = find<QComboBox>("deviceScene");
+  QTest::keyClicks(scene, QStringLiteral("steel"));
+  QCOMPARE(scene->currentData().toString(), QStringLiteral("steel_floor"));
   auto* speed = find<QWidget>("setting_speed");
   QTest::keyClick(speed, Qt::Key_A, Qt::ControlModifier);
-  QTest::keyClicks(speed, QStringLiteral("10"));
+  QTest::keyClicks(speed, QStringLiteral("6"));
   QTest::keyClick(speed, Qt::Key_Tab);
   QTest::keyClick(kind, Qt::Key_Tab);
   click("connectButton");
