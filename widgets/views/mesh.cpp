@@ -156,6 +156,8 @@ std::array<double, 3> rgb(const QColor& color) { return {color.redF(), color.gre
 vtkSmartPointer<vtkActor> addFlatActor(vtkRenderer* renderer) {
   auto actor = addSolidActor(renderer);
   actor->GetProperty()->LightingOff();
+  actor->GetProperty()->SetAmbient(0.0);
+  actor->GetProperty()->SetDiffuse(1.0);
   return actor;
 }
 
