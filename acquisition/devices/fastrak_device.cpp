@@ -86,10 +86,13 @@ void FastrakDevice::readReady() {
   bytes_at_last_record_ = parser_->bytes();
   if (!running_) running();
   const double arrival_s = now_s();
+  std::array<std::size_t, kFastrakStations> left{};
+  for (const auto& record : records) ++left[static_cast<std::size_t>(record.station - 1)];
   std::vector<Sample> samples;
   samples.reserve(records.size());
   for (const auto& record : records) {
-    Sample sample = toSample(record, clocks_[static_cast<std::size_t>(record.station - 1)].stamp(arrival_s));
+    const auto station = static_cast<std::size_t>(record.station - 1);
+    Sample sample = toSample(record, clocks_[station].stamp(arrival_s, --left[station]));
     hemisphere_.check(sample);
     noteStatus(sample);
     samples.push_back(std::move(sample));

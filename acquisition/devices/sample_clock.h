@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 #include "calib/core/calibration_table.h"
 
@@ -13,8 +14,9 @@ class SampleClock {
   /// @param nominal_period_s from one reading to the next; the true one may differ by a factor of two
   explicit SampleClock(double nominal_period_s);
   /// @param arrival_s when the reading's bytes were read, never less than before
+  /// @param later_in_bunch readings of this stream that were read with it and come after it
   /// @return time of the reading [s], always growing; starts anew after a gap
-  double stamp(double arrival_s);
+  double stamp(double arrival_s, std::size_t later_in_bunch = 0);
   double period_s() const { return period_s_; }
 
  private:
@@ -28,14 +30,15 @@ class SampleClock {
 /// readings: the tracker has lost its hemisphere.
 class HemisphereWatch {
  public:
-  /// Marks the sample `flipped` while its stream is mirrored.
+  /// Marks the sample `flipped` while its stream is mirrored. Counts readings, because arrival times of a busy machine
+  /// do not tell how long a hand had.
   void check(Sample& sample);
 
  private:
   struct Track {
     bool known = false;
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< With the mirroring undone.
-    double time_s = 0.0;
+    int readings_since = 0;
   };
   std::array<Track, 4> tracks_;
 };

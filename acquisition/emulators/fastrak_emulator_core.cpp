@@ -16,7 +16,7 @@ bool within(const Eigen::Vector3d& v, const std::vector<double>& max_then_min) {
          (v.array() >= vectorAt(max_then_min, 3).array()).all();
 }
 
-/// True in one second of every four, never in the first.
+/// True in one second of every four, never in the first three of a stream.
 bool faultySecond(double time_s) { return std::fmod(time_s, 4.0) >= 3.0; }
 
 }  // namespace
@@ -77,11 +77,11 @@ std::vector<int> FastrakEmulatorCore::activeSensors() const {
   return sensors;
 }
 
-Sample FastrakEmulatorCore::misread(Sample sample, double time_s) {
+Sample FastrakEmulatorCore::misread(Sample sample, double streaming_s) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   const EmulatorFaults& faults = options_.faults;
   Eigen::Vector3d& position_m = sample.tracker_from_sensor.position_m;
-  if (faults.error_status && faultySecond(time_s)) {
+  if (faults.error_status && faultySecond(streaming_s)) {
     sample.status = "k";
     position_m += Eigen::Vector3d(0.2, -0.1, 0.15);
   }
@@ -128,9 +128,10 @@ FastrakLayout FastrakEmulatorCore::layout(int station) const {
 void FastrakEmulatorCore::send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out) {
   for (const Sample& read : samples) {
     const int station = read.sensor + 1;
-    const Sample sample = misread(read, read.time_s);
+    const Sample sample = misread(read, read.time_s - stream_start_s_);
     Pose pose = source_->recorded() ? sample.tracker_from_sensor : reported(station, sample.tracker_from_sensor);
-    if (options_.faults.hemisphere_flip && faultySecond(read.time_s)) pose.position_m = -pose.position_m;
+    if (options_.faults.hemisphere_flip && faultySecond(read.time_s - stream_start_s_))
+      pose.position_m = -pose.position_m;
     Memory& memory = memory_[static_cast<std::size_t>(read.sensor)];
     const double increment_m = numbers('I', station)[0] * metresPer(setup_.unit);
     const bool moved =

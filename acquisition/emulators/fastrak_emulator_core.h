@@ -86,7 +86,7 @@ class FastrakEmulatorCore : public EmulatedTracker {
   void changeUnit(FastrakUnit unit);
 
   std::vector<int> activeSensors() const;
-  Sample misread(Sample sample, double time_s);
+  Sample misread(Sample sample, double streaming_s);
   Pose reported(int station, const Pose& tracker_from_sensor) const;
   char errorOf(const Sample& sample, int station, const Pose& pose) const;
   void send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out);

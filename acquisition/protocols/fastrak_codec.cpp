@@ -54,9 +54,10 @@ std::optional<double> parseExtended(std::string_view text) {
 }
 
 double littleEndianFloat(const char* bytes) {
-  std::uint32_t word = 0;
-  for (int i = 3; i >= 0; --i) word = (word << 8) | static_cast<unsigned char>(bytes[i]);
-  return static_cast<double>(std::bit_cast<float>(word));
+  const auto at = [bytes](int i) {
+    return static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[i])) << (8 * i);
+  };
+  return static_cast<double>(std::bit_cast<float>(at(0) | at(1) | at(2) | at(3)));
 }
 
 void appendLittleEndianFloat(std::string& out, double value) {
@@ -121,15 +122,20 @@ void appendAscii(std::string& out, const FastrakItem& item, double value) {
 
 }  // namespace
 
-std::optional<FastrakRecord> decodeRecord(std::string_view bytes, const FastrakLayout& layout, FastrakUnit unit) {
-  if (bytes.size() != layout.bytes || bytes[0] != '0' || bytes[1] < '1' || bytes[1] > '4') return std::nullopt;
-  FastrakRecord record;
+bool decodeRecord(std::string_view bytes, const FastrakLayout& layout, FastrakUnit unit, FastrakRecord& record) {
+  if (bytes.size() != layout.bytes || bytes[0] != '0' || bytes[1] < '1' || bytes[1] > '4') return false;
   record.station = bytes[1] - '0';
   record.error = bytes[2];
   const double scale = metresPer(unit);
   for (const auto& field : layout.fields) {
-    if (!decodeField(bytes, field, layout.format, scale, record)) return std::nullopt;
+    if (!decodeField(bytes, field, layout.format, scale, record)) return false;
   }
+  return true;
+}
+
+std::optional<FastrakRecord> decodeRecord(std::string_view bytes, const FastrakLayout& layout, FastrakUnit unit) {
+  std::optional<FastrakRecord> record(std::in_place);
+  if (!decodeRecord(bytes, layout, unit, *record)) record.reset();
   return record;
 }
 

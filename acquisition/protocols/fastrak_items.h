@@ -76,6 +76,9 @@ Result<FastrakLayout> fastrakLayout(std::span<const int> items, FastrakFormat fo
 /// @return none when the header, a fixed byte or a number is not what the layout asks for
 std::optional<FastrakRecord> decodeRecord(std::string_view bytes, const FastrakLayout& layout, FastrakUnit unit);
 
+/// The same into a record already there, which must be as new; false where the other gives none.
+bool decodeRecord(std::string_view bytes, const FastrakLayout& layout, FastrakUnit unit, FastrakRecord& record);
+
 /// Writes one record; quantities the record lacks are written as zero.
 std::string encodeRecord(const FastrakRecord& record, const FastrakLayout& layout, FastrakUnit unit);
 

@@ -35,15 +35,12 @@ FastrakParser::Match FastrakParser::match(std::string_view bytes, FastrakRecord&
   const FastrakLayout& layout = layouts_[station];
   length = layout.bytes;
   if (bytes.size() < length) return Match::kMore;
-  auto decoded = decodeRecord(bytes.substr(0, length), layout, unit_);
-  if (!decoded) return Match::kNo;
-  record = std::move(*decoded);
-  return Match::kYes;
+  return decodeRecord(bytes.substr(0, length), layout, unit_, record) ? Match::kYes : Match::kNo;
 }
 
 FastrakParser::Match FastrakParser::matchRow(std::string_view bytes) const {
-  FastrakRecord record;
   for (int i = 0; i < records_to_lock_; ++i) {
+    FastrakRecord record;
     std::size_t length = 0;
     const Match result = match(bytes, record, length);
     if (result != Match::kYes) return result;
@@ -52,13 +49,19 @@ FastrakParser::Match FastrakParser::matchRow(std::string_view bytes) const {
   return Match::kYes;
 }
 
+FastrakParser::Match FastrakParser::take(std::string_view bytes, std::size_t& length,
+                                         std::vector<FastrakRecord>& out) const {
+  const Match result = match(bytes, out.emplace_back(), length);
+  if (result != Match::kYes) out.pop_back();
+  return result;
+}
+
 std::size_t FastrakParser::consume(std::string_view bytes, std::vector<FastrakRecord>& out) {
   std::size_t at = 0;
-  FastrakRecord record;
   while (at < bytes.size()) {
     const std::string_view rest = bytes.substr(at);
     std::size_t length = 0;
-    const Match result = locked_ ? match(rest, record, length) : matchRow(rest);
+    const Match result = locked_ ? take(rest, length, out) : matchRow(rest);
     if (result == Match::kMore) break;
     if (result == Match::kNo) {
       losses_of_lock_ += locked_ ? 1 : 0;
@@ -66,7 +69,6 @@ std::size_t FastrakParser::consume(std::string_view bytes, std::vector<FastrakRe
       ++dropped_bytes_;
       ++at;
     } else if (locked_) {
-      out.push_back(std::move(record));
       ++records_;
       at += length;
     } else {

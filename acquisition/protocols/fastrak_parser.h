@@ -40,6 +40,7 @@ class FastrakParser {
   FastrakParser() = default;
   Match match(std::string_view bytes, FastrakRecord& record, std::size_t& length) const;
   Match matchRow(std::string_view bytes) const;
+  Match take(std::string_view bytes, std::size_t& length, std::vector<FastrakRecord>& out) const;
   std::size_t consume(std::string_view bytes, std::vector<FastrakRecord>& out);
 
   FastrakUnit unit_ = FastrakUnit::kCentimetre;

@@ -29,14 +29,21 @@ void LoopbackTransport::unplug() {
 
 qint64 LoopbackTransport::writeData(const char* from, qint64 size) {
   if (!other_) return -1;
-  LoopbackTransport* other = other_.data();
+  other_->deliverLater(QByteArray(from, size));
+  return size;
+}
+
+void LoopbackTransport::deliverLater(const QByteArray& bytes) {
+  const bool announced = !on_the_way_.isEmpty();
+  on_the_way_ += bytes;
+  if (announced) return;
   QMetaObject::invokeMethod(
-      other,
-      [other, bytes = QByteArray(from, size)] {
-        if (other->isOpen()) other->received(bytes);
+      this,
+      [this] {
+        const QByteArray arrived = std::exchange(on_the_way_, {});
+        if (isOpen()) received(arrived);
       },
       Qt::QueuedConnection);
-  return size;
 }
 
 }  // namespace fieldtrue

@@ -8,7 +8,8 @@
 
 namespace fieldtrue {
 
-/// One end of a line inside this process: what is written to one end is read at the other, each write by itself.
+/// One end of a line inside this process: what is written to one end is read at the other once control is back
+/// in the event loop.
 class LoopbackTransport : public BufferedTransport {
   Q_OBJECT
  public:
@@ -24,6 +25,9 @@ class LoopbackTransport : public BufferedTransport {
 
  private:
   LoopbackTransport() = default;
+  void deliverLater(const QByteArray& bytes);
+
+  QByteArray on_the_way_;
   QPointer<LoopbackTransport> other_;
 };
 

@@ -238,8 +238,8 @@ void FastrakDeviceTest::faults() {
   QFETCH(QByteArray, fault);
   QFETCH(bool, fails);
   QFETCH(QList<QByteArray>, sentence);
-  constexpr double kSpeed = 10.0;
-  constexpr std::size_t kSamples = 1000;
+  constexpr double kSpeed = 20.0;
+  constexpr std::size_t kSamples = 700;
   Bench bench = makeBench("in process", {kPose}, *parseFaults(fault.toStdString()), kSpeed);
   DeviceProbe& probe = *bench.probe;
   bench.device->start();
