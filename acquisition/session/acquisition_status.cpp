@@ -87,14 +87,11 @@ QString AcquisitionController::Impl::reason(bool* attention) const {
 QString AcquisitionController::Impl::waitingReason() const {
   if (automatic && stand.hasTaken() && !stand.left()) return QStringLiteral("move the sensor here; or press space");
   if (!stillness.still()) return QString::fromStdString(stillness.reason());
-  return automatic ? automaticReason() : QStringLiteral("press space");
+  return automatic ? automaticReason() : QStringLiteral("press space to take");
 }
 
 QString AcquisitionController::Impl::automaticReason() const {
-  if (guess.known && !near()) {
-    return QStringLiteral("still, but %1 m away: move it here; or press space")
-        .arg(distanceToCurrent_m().value_or(0.0), 0, 'f', 2);
-  }
+  if (guess.known && !near()) return QStringLiteral("still, but not at the place: move it here; or press space");
   return QStringLiteral("hold still: about to take");
 }
 

@@ -155,7 +155,7 @@ QWidget* AcquirePage::makeInspector() {
   layout->addWidget(counts_);
   layout->addWidget(progress_);
 
-  take_ = new QPushButton(icon(QStringLiteral("take")), tr("Take  (Space or Page Down)"), inspector);
+  take_ = new QPushButton(icon(QStringLiteral("take"), Qt::white), tr("Take  (Space or Page Down)"), inspector);
   take_->setObjectName(QStringLiteral("take"));
   take_->setProperty("primary", true);
   take_->setFocusPolicy(Qt::TabFocus);
@@ -198,7 +198,7 @@ QWidget* AcquirePage::makeInspector() {
   list_->setShowGrid(false);
   list_->verticalHeader()->hide();
   list_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
-  list_->horizontalHeader()->setStretchLastSection(true);
+  list_->horizontalHeader()->setSectionResizeMode(0, QHeaderView::Stretch);
   connect(list_, &QTableView::doubleClicked, this, [this](const QModelIndex& row) { workbench_.goTo(row.row()); });
   connect(list_->selectionModel(), &QItemSelectionModel::currentRowChanged, this, [this](const QModelIndex& row) {
     room_->setSelected(row.isValid() ? std::optional<int>(row.row()) : std::nullopt);

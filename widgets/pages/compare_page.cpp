@@ -30,7 +30,7 @@
 namespace fieldtrue {
 namespace {
 
-constexpr int kInspectorWidth = 380;
+constexpr int kInspectorWidth = 430;
 constexpr std::size_t kFewestPlaces = 5;
 
 // The slider runs over magnifications 1 to 100 in even ratios.
@@ -216,6 +216,7 @@ ComparePage::Part ComparePage::makePart(ScoreModel::Part which, const QString& n
   part.table->setSelectionMode(QAbstractItemView::SingleSelection);
   part.table->verticalHeader()->hide();
   part.table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
+  part.table->horizontalHeader()->setSectionResizeMode(ScoreModel::kMethod, QHeaderView::Stretch);
   auto* copy = new QShortcut(QKeySequence::Copy, part.table);
   copy->setContext(Qt::WidgetShortcut);
   connect(copy, &QShortcut::activated, this,
@@ -311,8 +312,10 @@ void ComparePage::onComparison() {
     details_->clear();
   }
   if (running) return;
-  position_.model->setComparison(comparison);
-  rotation_.model->setComparison(comparison);
+  for (Part* part : {&position_, &rotation_}) {
+    part->model->setComparison(comparison);
+    part->table->setColumnHidden(ScoreModel::kUncovered, !part->model->anyUncovered());
+  }
   if (!comparison) {
     verdict_->setText(tr("Not compared yet."));
     details_->clear();

@@ -72,6 +72,7 @@ void MainWindow::addPage(Step step, QWidget* page) {
 }
 
 void MainWindow::openStep(Step step) {
+  messages_->clearInformation();
   pages_->setCurrentWidget(page_of_.at(step));
   rail_->setCurrent(step);
 }

@@ -77,6 +77,10 @@ void MessageLine::show(const Message& message) {
   }
 }
 
+void MessageLine::clearInformation() {
+  if (message_.severity == Severity::kInfo) clear();
+}
+
 QString MessageLine::text() const { return message_.text; }
 
 void MessageLine::clear() {

@@ -17,6 +17,8 @@ class MessageLine : public QWidget {
  public:
   explicit MessageLine(QWidget* parent = nullptr);
   void show(const Message& message);
+  /// Drops a mere piece of information: the person went on. What needs attention stays.
+  void clearInformation();
   QString text() const;
 
  private:

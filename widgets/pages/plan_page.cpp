@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::array kAxes{"x", "y", "z"};
 constexpr int kFormWidth = 360;
+constexpr int kScrollBarWidth = 14;
 constexpr int kMaxCount = 40;
 // A practised operator carries the jig to the next mark and lets it settle in about this time.
 constexpr double kSecondsPerPlacement = 15.0;
@@ -50,7 +51,8 @@ PlanPage::PlanPage(Workbench& workbench, QWidget* parent)
   scroll->setWidgetResizable(true);
   scroll->setFrameShape(QFrame::NoFrame);
   scroll->setWidget(makeForm());
-  scroll->setMinimumWidth(kFormWidth);
+  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  scroll->setMinimumWidth(std::max(kFormWidth, scroll->widget()->minimumSizeHint().width() + kScrollBarWidth));
   splitter->addWidget(room_);
   splitter->addWidget(scroll);
   splitter->setStretchFactor(0, 1);

@@ -2,7 +2,7 @@
 
 #include <QFont>
 #include <QStringList>
-#include <array>
+#include <algorithm>
 #include <limits>
 
 #include "calib/correctors/registry.h"
@@ -12,7 +12,8 @@
 namespace fieldtrue {
 namespace {
 
-enum Column { kMethod, kRms, kMean, kP95, kMax, kUncovered, kColumnCount };
+// Differences of the last bits are neither better nor worse: a millionth of a millimetre or of a degree.
+constexpr double kTie = 1e-6;
 
 QString labelOf(ScoreModel::Part part, const std::string& id) {
   if (part == ScoreModel::Part::kPosition) {
@@ -55,7 +56,7 @@ void ScoreModel::setComparison(const std::optional<Comparison>& comparison) {
         row.why_skipped = QString::fromStdString(*score.skipped);
       } else {
         row.stats = score.stats;
-        row.worse = before && score.stats.rms > before->rms;
+        row.worse = before && score.stats.rms > before->rms + kTie;
       }
       rows_.push_back(std::move(row));
     }
@@ -69,6 +70,10 @@ int ScoreModel::rowOf(const QString& method) const {
   for (std::size_t row = 0; row < rows_.size(); ++row)
     if (rows_[row].method == method) return static_cast<int>(row);
   return -1;
+}
+
+bool ScoreModel::anyUncovered() const {
+  return std::any_of(rows_.begin(), rows_.end(), [](const Row& row) { return row.n_uncovered > 0; });
 }
 
 QString ScoreModel::toText() const {

@@ -14,6 +14,7 @@ class ScoreModel : public QAbstractTableModel {
   Q_OBJECT
  public:
   enum class Part { kPosition, kOrientation };
+  enum Column { kMethod, kRms, kMean, kP95, kMax, kUncovered, kColumnCount };
   /// The value to sort by, under this role.
   static constexpr int kSortRole = Qt::UserRole + 1;
 
@@ -22,6 +23,7 @@ class ScoreModel : public QAbstractTableModel {
   /// The method of a row; row 0 is "before".
   QString method(int row) const;
   int rowOf(const QString& method) const;  ///< -1 when it is not there.
+  bool anyUncovered() const;
   /// The table as tab-separated text, for the clipboard.
   QString toText() const;
 

@@ -94,7 +94,7 @@ class AcquisitionControllerTest : public QObject {
     bench.tracker->carryTo(wrong);
     bench.tracker->stand(10.0);
     QCOMPARE(bench.stored.size(), std::size_t{6});
-    QCOMPARE(bench.controller.status().reason, QString("still, but 0.25 m away: move it here; or press space"));
+    QCOMPARE(bench.controller.status().reason, QString("still, but not at the place: move it here; or press space"));
     bench.tracker->carryTo(bench.placePose(*status.current));
     bench.tracker->stand(1.5);
     QCOMPARE(bench.stored.size(), std::size_t{7});

@@ -152,6 +152,8 @@ bool GuidedSessionTest::waitUntilStillAtPlace() {
 bool GuidedSessionTest::takeWith(Qt::Key key) {
   const std::size_t done = status().n_done;
   if (!waitUntilStillAtPlace()) return false;
+  QTest::qWait(100);  // An operator, too, lets the jig settle before pressing.
+  if (!waitUntilStillAtPlace()) return false;
   QTest::keyClick(window_.get(), key);
   return QTest::qWaitFor([this, done] { return status().n_done > done; }, kWaitMs);
 }
