@@ -98,6 +98,7 @@ QWidget* PlanPage::makeForm() {
     pitch_[axis]->setMinimum(0.001);
     origin_[axis] = makeLength(tr("First place %1").arg(letter), origin_m(start)[static_cast<Eigen::Index>(axis)]);
   }
+  pipe_foot_ = makeLength(tr("Height of the pipes' feet"), start.pipe_base_m);
   unit_ = new QComboBox(this);
   for (LengthUnit unit : {LengthUnit::kMetre, LengthUnit::kMillimetre, LengthUnit::kFoot, LengthUnit::kInch})
     unit_->addItem(unitSymbol(unit), static_cast<int>(unit));
@@ -126,6 +127,7 @@ QWidget* PlanPage::makeForm() {
   form->addRow(tr("Pitch x, y, z"), inRow({pitch_[0], pitch_[1], pitch_[2]}));
   form->addRow(tr("First place"), default_origin_);
   form->addRow(QString(), inRow({origin_[0], origin_[1], origin_[2]}));
+  form->addRow(tr("Pipe foot z"), pipe_foot_);
   form->addRow(tr("Order"), order_);
   form->addRow(tr("Seed"), seed_);
   form->addRow(tr("Orientations"), orientations_);
@@ -144,6 +146,12 @@ QWidget* PlanPage::makeForm() {
   connect(load, &QPushButton::clicked, this, &PlanPage::loadPlanFile);
   layout->addWidget(create_);
   layout->addWidget(load);
+  use_grid_ = new QPushButton(tr("Use a grid instead of the file's places"), panel);
+  connect(use_grid_, &QPushButton::clicked, this, [this] {
+    explicit_places_.clear();
+    onChanged();
+  });
+  layout->addWidget(use_grid_);
   layout->addStretch();
   return panel;
 }
@@ -161,6 +169,7 @@ Plan PlanPage::plan() const {
   plan.seed = static_cast<std::uint64_t>(seed_->value());
   plan.orientations = orientations_->value();
   plan.reseat = reseat_->value();
+  plan.pipe_base_m = pipe_foot_->value() * unit_m;
   plan.explicit_places = explicit_places_;
   return plan;
 }
@@ -170,7 +179,9 @@ void PlanPage::onUnit() {
   const double ratio = metresPer(shown_unit_) / metresPer(unit);
   shown_unit_ = unit;
   setPlacingUnit(unit);
-  for (const auto& boxes : {pitch_, origin_}) {
+  for (const auto& boxes : {std::vector<QDoubleSpinBox*>(pitch_.begin(), pitch_.end()),
+                            std::vector<QDoubleSpinBox*>(origin_.begin(), origin_.end()),
+                            {pipe_foot_}}) {
     for (QDoubleSpinBox* box : boxes) {
       const QSignalBlocker quiet(box);
       const double value = box->value() * ratio;
@@ -184,30 +195,44 @@ void PlanPage::onUnit() {
 
 void PlanPage::onChanged() {
   const Plan now = plan();
-  seed_->setEnabled(now.order == PlanOrder::kRandom);
+  enableFields(now);
   const Eigen::Vector3d first_m = origin_m(now);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    origin_[axis]->setEnabled(now.origin_m.has_value());
-    if (now.origin_m) continue;
+  for (std::size_t axis = 0; axis < 3 && !now.origin_m; ++axis) {
     const QSignalBlocker quiet(origin_[axis]);
     origin_[axis]->setValue(first_m[static_cast<Eigen::Index>(axis)] / metresPer(shown_unit_));
   }
   const std::vector<PlannedPlace> planned = places(now);
   room_->setPlaces(planned);
   room_->setTransmitter(Pose{});
-  summary_->setText(summary(planned));
+  summary_->setText(summary(now, planned));
 }
 
-QString PlanPage::summary(const std::vector<PlannedPlace>& planned) const {
+void PlanPage::enableFields(const Plan& now) {
+  const bool grid = now.explicit_places.empty();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    counts_[axis]->setEnabled(grid);
+    pitch_[axis]->setEnabled(grid);
+    origin_[axis]->setEnabled(grid && now.origin_m.has_value());
+  }
+  default_origin_->setEnabled(grid);
+  seed_->setEnabled(now.order == PlanOrder::kRandom);
+  use_grid_->setVisible(!grid);
+}
+
+QString PlanPage::summary(const Plan& now, const std::vector<PlannedPlace>& planned) const {
   std::set<double> levels_m;
   for (const PlannedPlace& place : planned)
     levels_m.insert(std::round(place.reference_from_sensor.position_m.z() * 1000.0) / 1000.0);
   const double minutes =
       static_cast<double>(planned.size()) * (kSecondsPerPlacement + samples_->value() / kSamplesPerSecond) / 60.0;
-  return tr("%1 placements on %2 levels, about %3 minutes for a practised operator.")
-      .arg(planned.size())
-      .arg(levels_m.size())
-      .arg(std::ceil(minutes), 0, 'f', 0);
+  QString text = tr("%1 placements on %2 levels, about %3 minutes for a practised operator.")
+                     .arg(planned.size())
+                     .arg(levels_m.size())
+                     .arg(std::ceil(minutes), 0, 'f', 0);
+  QStringList pipes;
+  for (const double length_m : pipeLengths_m(now)) pipes << coordinateText(length_m);
+  if (!pipes.isEmpty()) text += tr(" Pipes: %1.").arg(pipes.join(QStringLiteral(", ")));
+  return text;
 }
 
 void PlanPage::loadPlanFile() {
@@ -219,6 +244,7 @@ void PlanPage::loadPlanFile() {
     return;
   }
   explicit_places_ = loaded->explicit_places;
+  pipe_foot_->setValue(loaded->pipe_base_m / metresPer(shown_unit_));
   default_origin_->setChecked(!loaded->origin_m.has_value());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     counts_[axis]->setValue(loaded->counts[axis]);

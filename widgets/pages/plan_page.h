@@ -32,7 +32,8 @@ class PlanPage : public QWidget {
   void onChanged();
   void loadPlanFile();
   void create();
-  QString summary(const std::vector<PlannedPlace>& planned) const;
+  void enableFields(const Plan& now);
+  QString summary(const Plan& now, const std::vector<PlannedPlace>& planned) const;
 
   Workbench& workbench_;
   RoomView* room_;
@@ -47,7 +48,9 @@ class PlanPage : public QWidget {
   QSpinBox* reseat_;
   QSpinBox* samples_;
   QLabel* summary_;
+  QDoubleSpinBox* pipe_foot_;
   QPushButton* create_;
+  QPushButton* use_grid_;
   LengthUnit shown_unit_;
   std::vector<PlannedPlace> explicit_places_;
 };
