@@ -222,7 +222,9 @@ void drawBubble(const Pencil& pencil, const OverlayContent& content) {
   width += 20.0;
   const double height = kLine_px * static_cast<double>(content.bubble.size()) + 10.0;
   double x = at->x() + 16.0, y = at->y() + 12.0;
-  if (x + width > pencil.size_px().x() - 4.0) x = at->x() - 16.0 - width;
+  // The colour scale stays in sight.
+  const double scales_px = content.scales.empty() ? 4.0 : kScaleWidth_px + kMargin_px + 12.0;
+  if (x + width > pencil.size_px().x() - scales_px) x = at->x() - 16.0 - width;
   if (y + height > pencil.size_px().y() - 4.0) y = at->y() - 12.0 - height;
   pencil.fill(pencil.theme().surface);
   pencil.rectangle(x, y, width, height);

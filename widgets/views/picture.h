@@ -11,7 +11,7 @@
 namespace fieldtrue {
 
 /// The error field as a picture, drawn as FieldView draws it but without a window; needs neither a display nor a
-/// QGuiApplication.
+/// QGuiApplication. Call from one thread at a time.
 /// @param size in pixels; text and lines grow with it
 /// @param why when given, receives the reason of a null picture in words
 /// @return a null image when this machine offers no way to draw

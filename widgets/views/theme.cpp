@@ -28,6 +28,7 @@ Theme lightTheme() {
   t.danger = QColor(0xc0, 0x24, 0x2b);
   t.done = QColor(0x13, 0x74, 0x4f);
   t.line = QColor(0xcf, 0xd6, 0xdd);
+  t.on_accent = t.surface;
   return t;
 }
 
@@ -43,6 +44,7 @@ Theme darkTheme() {
   t.danger = QColor(0xff, 0x78, 0x6e);
   t.done = QColor(0x4f, 0xc7, 0x8f);
   t.line = QColor(0x34, 0x3f, 0x4a);
+  t.on_accent = t.background;
   return t;
 }
 
@@ -56,7 +58,6 @@ QColor mixed(const QColor& a, const QColor& b, double share_of_b) {
   return QColor(mix(a.red(), b.red()), mix(a.green(), b.green()), mix(a.blue(), b.blue()));
 }
 
-QColor onAccent(const Theme& t) { return t.dark ? t.background : t.surface; }
 QColor disabled(const Theme& t) { return mixed(t.text_muted, t.surface, 0.4); }
 
 QPalette paletteOf(const Theme& t) {
@@ -73,7 +74,7 @@ QPalette paletteOf(const Theme& t) {
   p.setColor(QPalette::ToolTipBase, t.surface);
   p.setColor(QPalette::ToolTipText, t.text);
   p.setColor(QPalette::Highlight, t.accent);
-  p.setColor(QPalette::HighlightedText, onAccent(t));
+  p.setColor(QPalette::HighlightedText, t.on_accent);
   p.setColor(QPalette::Link, t.accent);
   p.setColor(QPalette::LinkVisited, t.accent);
   p.setColor(QPalette::Mid, t.line);
@@ -96,7 +97,7 @@ QString styleSheetOf(const Theme& t) {
       {"@attention_soft", soft(t.attention)},
       {"@danger_soft", soft(t.danger)},
       {"@done_soft", soft(t.done)},
-      {"@on_accent", onAccent(t)},
+      {"@on_accent", t.on_accent},
       {"@background", t.background},
       {"@attention", t.attention},
       {"@disabled", disabled(t)},

@@ -20,7 +20,8 @@ struct Theme {
   QColor attention;  ///< Amber: needs the operator.
   QColor danger;     ///< Red: lost data or tracker, nothing else.
   QColor done;
-  QColor line;  ///< Separators, grid lines.
+  QColor on_accent;  ///< Words and symbols on a field of the accent colour.
+  QColor line;       ///< Separators, grid lines.
 
   /// The light or the dark set.
   static const Theme& of(bool dark);

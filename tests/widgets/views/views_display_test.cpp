@@ -2,6 +2,7 @@
 
 #include <QElapsedTimer>
 #include <QHBoxLayout>
+#include <QOpenGLContext>
 #include <QSignalSpy>
 #include <QVBoxLayout>
 #include <memory>
@@ -10,6 +11,7 @@
 #include "tests/widgets/views/view_test.h"
 #include "widgets/views/chart_views.h"
 #include "widgets/views/field_view.h"
+#include "widgets/views/picture.h"
 #include "widgets/views/projection.h"
 #include "widgets/views/room_view.h"
 
@@ -301,6 +303,20 @@ class ViewsDisplayTest : public QObject {
     QCOMPARE(hovered.last().at(0).toInt(), 24);
     QTest::mouseClick(&view, Qt::LeftButton, {}, at);
     QCOMPARE(clicked.last().at(0).toInt(), 24);
+  }
+
+  void picturesLeaveTheWindowsContextAlone() {
+    FieldView view;
+    view.setField(uniformField({0.0, 0.04, 0.0}));
+    show(view);
+    const QImage before = shot(view);
+    view.makeCurrent();
+    QString why;
+    const QImage picture = renderFieldPicture(uniformField({0.0, 0.04, 0.0}), 60.0, 1.0, {400, 300}, false, &why);
+    QVERIFY2(!picture.isNull(), qPrintable(why));
+    QCOMPARE(QOpenGLContext::currentContext(), view.context());
+    view.doneCurrent();
+    QCOMPARE(shot(view), before);
   }
 
   void histogramShowsBothSeries() {

@@ -96,6 +96,7 @@ class ViewsThemeTest : public QObject {
     for (const QColor& ground : {t.background, t.surface})
       for (const QColor& word : {t.text, t.text_muted, t.accent, t.attention, t.danger, t.done})
         QVERIFY2(contrast(word, ground) >= 4.5, qPrintable(word.name() + " on " + ground.name()));
+    QVERIFY(contrast(t.on_accent, t.accent) >= 4.5);
     QVERIFY((t.background.lightness() < 128) == dark);
   }
 
