@@ -155,7 +155,7 @@ QWidget* AcquirePage::makeInspector() {
   layout->addWidget(counts_);
   layout->addWidget(progress_);
 
-  take_ = new QPushButton(icon(QStringLiteral("take"), Qt::white), tr("Take  (Space or Page Down)"), inspector);
+  take_ = new QPushButton(icon(QStringLiteral("take"), theme().on_accent), tr("Take  (Space or Page Down)"), inspector);
   take_->setObjectName(QStringLiteral("take"));
   take_->setProperty("primary", true);
   take_->setFocusPolicy(Qt::TabFocus);

@@ -25,6 +25,7 @@
 #include "widgets/pages/settings_form.h"
 #include "widgets/pages/units.h"
 #include "widgets/views/chart_views.h"
+#include "widgets/views/field_scale.h"
 #include "widgets/views/field_view.h"
 
 namespace fieldtrue {
@@ -35,6 +36,7 @@ constexpr std::size_t kFewestPlaces = 5;
 
 // The slider runs over magnifications 1 to 100 in even ratios.
 double magnificationOf(int slider) { return std::pow(10.0, slider / 50.0); }
+int sliderOf(double magnification) { return static_cast<int>(std::lround(50.0 * std::log10(magnification))); }
 
 template <class Method>
 void fillMethods(QComboBox* combo, std::span<const Method> methods) {
@@ -166,10 +168,8 @@ QWidget* ComparePage::makeViewBar() {
   scale_text_ = new QLabel(bar);
   scale_text_->setMinimumWidth(48);
   connect(scale_, &QSlider::valueChanged, this, [this](int value) {
-    const double magnification = magnificationOf(value);
-    scale_text_->setText(tr("x%1").arg(threeFigures(magnification)));
-    before_->setMagnification(magnification);
-    after_->setMagnification(magnification);
+    scale_chosen_by_hand_ = true;
+    magnify(magnificationOf(value));
   });
   two_views_ = new QCheckBox(tr("Before and after"), bar);
   two_views_->setChecked(true);
@@ -328,13 +328,26 @@ void ComparePage::onComparison() {
           .arg(threeFigures(comparison->floor_position_mm));
   for (const std::string& note : comparison->notes) details += QStringLiteral(" ") + QString::fromStdString(note);
   details_->setText(details);
-  const double scale_mm = sharedScaleMax_mm(*comparison);
-  before_->setScaleMax_mm(scale_mm);
-  after_->setScaleMax_mm(scale_mm);
-  if (scale_->value() == 0) scale_->setValue(50);
+  chooseScale(*comparison);
   selectMethod(position_, QString::fromStdString(comparison->best_position));
   selectMethod(rotation_, QString::fromStdString(comparison->best_orientation));
   drawFields();
+}
+
+void ComparePage::chooseScale(const Comparison& comparison) {
+  const FieldScale scale = fieldScale(heldOutField(comparison, workbench_.table(), QString(), QString(), QString()));
+  before_->setScaleMax_mm(scale.max_mm);
+  after_->setScaleMax_mm(scale.max_mm);
+  if (scale_chosen_by_hand_) return;
+  const QSignalBlocker quiet(scale_);
+  scale_->setValue(sliderOf(scale.magnification));
+  magnify(scale.magnification);
+}
+
+void ComparePage::magnify(double magnification) {
+  scale_text_->setText(tr("x%1").arg(threeFigures(magnification)));
+  before_->setMagnification(magnification);
+  after_->setMagnification(magnification);
 }
 
 void ComparePage::selectMethod(Part& part, const QString& method) {

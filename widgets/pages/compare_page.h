@@ -50,6 +50,8 @@ class ComparePage : public QWidget {
   void onComparison();
   void onCorrector();
   void drawFields();
+  void chooseScale(const Comparison& comparison);
+  void magnify(double magnification);
   void selectMethod(Part& part, const QString& method);
   void fitChosen();
   void selectNode(int node);
@@ -74,6 +76,7 @@ class ComparePage : public QWidget {
   Part rotation_;
   QPushButton* fit_;
   QLabel* fitted_;
+  bool scale_chosen_by_hand_ = false;
   bool out_of_date_ = true;
 };
 

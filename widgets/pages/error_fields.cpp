@@ -1,6 +1,5 @@
 #include "widgets/pages/error_fields.h"
 
-#include <cmath>
 #include <map>
 
 namespace fieldtrue {
@@ -54,14 +53,6 @@ ErrorField heldOutField(const Comparison& comparison, const CalibrationTable& ta
     field.arrows.push_back(arrow);
   }
   return field;
-}
-
-double sharedScaleMax_mm(const Comparison& comparison) {
-  const double wanted = std::max(comparison.before_position_mm.p95, 1e-3);
-  const double decade = std::pow(10.0, std::floor(std::log10(wanted)));
-  for (double step : {1.0, 2.0, 5.0, 10.0})
-    if (step * decade >= wanted) return step * decade;
-  return 10.0 * decade;
 }
 
 }  // namespace fieldtrue

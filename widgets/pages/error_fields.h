@@ -16,7 +16,4 @@ ErrorField heldOutField(const Comparison& comparison, const CalibrationTable& ta
 /// Held-out errors per place [mm] of a method; empty method = before.
 std::vector<double> heldOutErrors_mm(const Comparison& comparison, const QString& method);
 
-/// Upper end of a colour scale that all fields share: a round number at or above the 95th percentile before [mm].
-double sharedScaleMax_mm(const Comparison& comparison);
-
 }  // namespace fieldtrue

@@ -19,7 +19,7 @@ constexpr int kColumnWidth = 560;
 
 QPushButton* makeChoice(const QString& name, const QString& icon_name, const QString& title, const QString& text,
                         bool primary) {
-  auto* button = new QPushButton(primary ? icon(icon_name, Qt::white) : icon(icon_name),
+  auto* button = new QPushButton(primary ? icon(icon_name, theme().on_accent) : icon(icon_name),
                                  QStringLiteral("%1\n%2").arg(title, text));
   button->setObjectName(name);
   button->setProperty("choice", true);

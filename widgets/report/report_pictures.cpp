@@ -4,40 +4,16 @@
 #include <cmath>
 #include <functional>
 
-#include "calib/core/statistics.h"
 #include "calib/correctors/corrector.h"
 #include "widgets/report/numbers.h"
+#include "widgets/views/field_scale.h"
 #include "widgets/views/picture.h"
-#include "widgets/views/scene_space.h"
 
 namespace fieldtrue {
 namespace {
 
 constexpr QSize kFieldSize(900, 700);
 constexpr QSize kChartSize(900, 480);
-
-/// Colour scale and arrow length that before and after share.
-struct FieldScale {
-  double max_mm = 1.0;
-  double magnification = 1.0;
-};
-
-/// Round values such that all but a few arrows are inside the colours and arrows stay shorter than the pitch.
-FieldScale fieldScale(const std::vector<PlaceSummary>& places) {
-  std::vector<double> before_mm;
-  std::vector<Eigen::Vector3d> points_m;
-  for (const PlaceSummary& place : places) {
-    before_mm.push_back(place.before_mm);
-    points_m.push_back(place.p_true_m);
-  }
-  const double typical_mm = before_mm.empty() ? 0.0 : quantile(before_mm, 0.95);
-  if (!(typical_mm > 0.0)) return {};
-  double pitch_mm = 1000.0 * gridPitch_m(points_m).minCoeff();
-  if (!(pitch_mm > 0.0)) pitch_mm = 100.0;
-  const double at_most = 0.8 * pitch_mm / typical_mm;
-  // roundStep goes up to 1, 2, 5, 10; 0.4 of the limit therefore never passes it.
-  return {roundStep(typical_mm), std::max(1.0, roundStep(0.4 * at_most))};
-}
 
 ErrorField errorField(const std::vector<PlaceSummary>& places, const std::string& title, bool after,
                       const Pose& reference_from_tracker) {
@@ -90,7 +66,7 @@ class Album {
 
 void addFields(Album& album, const ReportInput& input, const std::vector<PlaceSummary>& places,
                const Pose& reference_from_tracker) {
-  const FieldScale scale = fieldScale(places);
+  const FieldScale scale = fieldScale(errorField(places, {}, false, reference_from_tracker));
   const std::string legend =
       "; colours to " + significantText(scale.max_mm) + " mm, arrows x" + significantText(scale.magnification, 2);
   const auto add = [&](const char* id, const std::string& title, bool after) {

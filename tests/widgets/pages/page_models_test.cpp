@@ -11,6 +11,7 @@
 #include "widgets/pages/score_model.h"
 #include "widgets/pages/settings_form.h"
 #include "widgets/pages/units.h"
+#include "widgets/views/field_scale.h"
 
 namespace fieldtrue {
 namespace {
@@ -95,12 +96,19 @@ class PageModelsTest : public QObject {
     QVERIFY(form.values().at("degree") == SettingValue(std::int64_t{6}));
   }
 
-  void fieldsShareOneScale() {
-    Comparison comparison = smallComparison();
-    comparison.before_position_mm.p95 = 41.0;
-    QCOMPARE(sharedScaleMax_mm(comparison), 50.0);
-    comparison.before_position_mm.p95 = 1.3;
-    QCOMPARE(sharedScaleMax_mm(comparison), 2.0);
+  void fieldsShareOneRoundScale() {
+    ErrorField before;
+    for (int i = 0; i < 20; ++i) {
+      FieldArrow arrow;
+      arrow.from_m = Eigen::Vector3d(0.1 * (i % 5), 0.1 * (i / 5), 0.0);
+      arrow.error_m = Eigen::Vector3d(0.0, 0.0, 0.0041);
+      before.arrows.push_back(arrow);
+    }
+    const FieldScale scale = fieldScale(before);
+    QCOMPARE(scale.max_mm, 5.0);  // The next of 1, 2, 5 above 4.1 mm.
+    QVERIFY(scale.magnification >= 1.0);
+    QVERIFY(scale.magnification * 4.1 <= 100.0);  // Arrows stay shorter than the 100 mm pitch.
+    QCOMPARE(fieldScale(ErrorField()).magnification, 1.0);
   }
 
   void fieldArrowsStandAtTheTruePlaces() {
