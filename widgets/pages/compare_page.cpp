@@ -1,28 +1,21 @@
 #include "widgets/pages/compare_page.h"
 
-#include <QApplication>
 #include <QCheckBox>
-#include <QClipboard>
 #include <QComboBox>
 #include <QHBoxLayout>
-#include <QHeaderView>
 #include <QLabel>
 #include <QProgressBar>
 #include <QPushButton>
-#include <QScrollArea>
-#include <QShortcut>
 #include <QSlider>
 #include <QSplitter>
 #include <QStackedWidget>
 #include <QTabWidget>
-#include <QTableView>
 #include <QVBoxLayout>
 #include <cmath>
 
-#include "calib/correctors/registry.h"
 #include "widgets/pages/empty_page.h"
 #include "widgets/pages/error_fields.h"
-#include "widgets/pages/settings_form.h"
+#include "widgets/pages/method_panel.h"
 #include "widgets/pages/units.h"
 #include "widgets/views/chart_views.h"
 #include "widgets/views/field_scale.h"
@@ -37,12 +30,6 @@ constexpr std::size_t kFewestPlaces = 5;
 // The slider runs over magnifications 1 to 100 in even ratios.
 double magnificationOf(int slider) { return std::pow(10.0, slider / 50.0); }
 int sliderOf(double magnification) { return static_cast<int>(std::lround(50.0 * std::log10(magnification))); }
-
-template <class Method>
-void fillMethods(QComboBox* combo, std::span<const Method> methods) {
-  for (const Method& method : methods)
-    combo->addItem(QString::fromStdString(method.label), QString::fromStdString(method.id));
-}
 
 }  // namespace
 
@@ -200,74 +187,20 @@ QWidget* ComparePage::makeViewBar() {
   return bar;
 }
 
-ComparePage::Part ComparePage::makePart(ScoreModel::Part which, const QString& name) {
-  Part part;
-  part.model = new ScoreModel(which, this);
-  part.sorted = new QSortFilterProxyModel(this);
-  part.sorted->setSourceModel(part.model);
-  part.sorted->setSortRole(ScoreModel::kSortRole);
-  part.table = new QTableView(this);
-  part.table->setObjectName(name + QStringLiteral("Table"));
-  part.table->setModel(part.sorted);
-  part.table->setSortingEnabled(true);
-  part.table->sortByColumn(1, Qt::AscendingOrder);
-  part.table->setShowGrid(false);
-  part.table->setSelectionBehavior(QAbstractItemView::SelectRows);
-  part.table->setSelectionMode(QAbstractItemView::SingleSelection);
-  part.table->verticalHeader()->hide();
-  part.table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
-  part.table->horizontalHeader()->setSectionResizeMode(ScoreModel::kMethod, QHeaderView::Stretch);
-  auto* copy = new QShortcut(QKeySequence::Copy, part.table);
-  copy->setContext(Qt::WidgetShortcut);
-  connect(copy, &QShortcut::activated, this,
-          [model = part.model] { QApplication::clipboard()->setText(model->toText()); });
-  part.method = new QComboBox(this);
-  part.method->setObjectName(name + QStringLiteral("Method"));
-  part.settings = new SettingsForm(this);
-  return part;
-}
-
-QWidget* ComparePage::partPanel(Part& part) {
-  auto* panel = new QWidget(this);
-  auto* layout = new QVBoxLayout(panel);
-  layout->setContentsMargins(0, 8, 0, 0);
-  layout->addWidget(part.table, 1);
-  layout->addWidget(part.method);
-  layout->addWidget(part.settings);
-  return panel;
-}
-
 QWidget* ComparePage::makeInspector() {
   auto* inspector = new QWidget(this);
   inspector->setObjectName(QStringLiteral("inspector"));
   inspector->setAttribute(Qt::WA_StyledBackground);
   auto* layout = new QVBoxLayout(inspector);
   layout->setContentsMargins(12, 12, 12, 12);
-  position_ = makePart(ScoreModel::Part::kPosition, QStringLiteral("position"));
-  rotation_ = makePart(ScoreModel::Part::kOrientation, QStringLiteral("orientation"));
-  fillMethods(position_.method, positionMethods());
-  fillMethods(rotation_.method, orientationMethods());
+  position_ = new MethodPanel(ScoreModel::Part::kPosition, QStringLiteral("position"), inspector);
+  rotation_ = new MethodPanel(ScoreModel::Part::kOrientation, QStringLiteral("orientation"), inspector);
   auto* tabs = new QTabWidget(inspector);
-  tabs->addTab(partPanel(position_), tr("Position"));
-  tabs->addTab(partPanel(rotation_), tr("Orientation"));
+  tabs->addTab(position_, tr("Position"));
+  tabs->addTab(rotation_, tr("Orientation"));
   layout->addWidget(tabs, 1);
-
-  auto showSettings = [this](Part& part, std::span<const Setting> declared) {
-    part.settings->setSettings(declared);
-    drawFields();
-  };
-  connect(position_.method, &QComboBox::currentIndexChanged, this, [this, showSettings](int row) {
-    showSettings(position_, positionMethods()[static_cast<std::size_t>(row)].settings);
-  });
-  connect(rotation_.method, &QComboBox::currentIndexChanged, this, [this, showSettings](int row) {
-    showSettings(rotation_, orientationMethods()[static_cast<std::size_t>(row)].settings);
-  });
-  for (Part* part : {&position_, &rotation_}) {
-    connect(part->table->selectionModel(), &QItemSelectionModel::currentRowChanged, this,
-            [this, part](const QModelIndex& row) {
-              if (row.isValid()) selectMethod(*part, part->model->method(part->sorted->mapToSource(row).row()));
-            });
-  }
+  for (MethodPanel* panel : {position_, rotation_})
+    connect(panel, &MethodPanel::methodChanged, this, &ComparePage::drawFields);
   fit_ = new QPushButton(tr("Fit these methods"), inspector);
   fit_->setObjectName(QStringLiteral("fit"));
   fit_->setProperty("primary", true);
@@ -312,10 +245,8 @@ void ComparePage::onComparison() {
     details_->clear();
   }
   if (running) return;
-  for (Part* part : {&position_, &rotation_}) {
-    part->model->setComparison(comparison);
-    part->table->setColumnHidden(ScoreModel::kUncovered, !part->model->anyUncovered());
-  }
+  position_->setComparison(comparison);
+  rotation_->setComparison(comparison);
   if (!comparison) {
     verdict_->setText(tr("Not compared yet."));
     details_->clear();
@@ -329,8 +260,8 @@ void ComparePage::onComparison() {
   for (const std::string& note : comparison->notes) details += QStringLiteral(" ") + QString::fromStdString(note);
   details_->setText(details);
   chooseScale(*comparison);
-  selectMethod(position_, QString::fromStdString(comparison->best_position));
-  selectMethod(rotation_, QString::fromStdString(comparison->best_orientation));
+  position_->choose(QString::fromStdString(comparison->best_position));
+  rotation_->choose(QString::fromStdString(comparison->best_orientation));
   drawFields();
 }
 
@@ -350,17 +281,12 @@ void ComparePage::magnify(double magnification) {
   after_->setMagnification(magnification);
 }
 
-void ComparePage::selectMethod(Part& part, const QString& method) {
-  const int index = part.method->findData(method.isEmpty() ? QStringLiteral("none") : method);
-  if (index >= 0) part.method->setCurrentIndex(index);
-}
-
 void ComparePage::drawFields() {
   const std::optional<Comparison>& comparison = workbench_.comparison();
   if (!comparison) return;
-  const QString method = position_.method->currentData().toString();
-  const QString turned = rotation_.method->currentData().toString();
-  const QString label = position_.method->currentText();
+  const QString method = position_->method();
+  const QString turned = rotation_->method();
+  const QString label = position_->label();
   before_->setField(heldOutField(*comparison, workbench_.table(), QString(), QString(), tr("Before correction")));
   after_->setField(
       heldOutField(*comparison, workbench_.table(), method, turned, tr("After: %1, places it did not see").arg(label)));
@@ -371,10 +297,10 @@ void ComparePage::drawFields() {
 
 void ComparePage::fitChosen() {
   CorrectorChoice choice;
-  choice.position_id = position_.method->currentData().toString().toStdString();
-  choice.position_settings = position_.settings->values();
-  choice.orientation_id = rotation_.method->currentData().toString().toStdString();
-  choice.orientation_settings = rotation_.settings->values();
+  choice.position_id = position_->method().toStdString();
+  choice.position_settings = position_->settings();
+  choice.orientation_id = rotation_->method().toStdString();
+  choice.orientation_settings = rotation_->settings();
   workbench_.fit(choice, defaultAlignMode(workbench_.table().metadata));
 }
 
@@ -402,7 +328,7 @@ QString ComparePage::describeNode(int node) const {
   if (!comparison) return {};
   for (std::size_t i = 0; i < comparison->places.size(); ++i) {
     if (comparison->places[i] != node) continue;
-    const std::vector<double> after_mm = heldOutErrors_mm(*comparison, position_.method->currentData().toString());
+    const std::vector<double> after_mm = heldOutErrors_mm(*comparison, position_->method());
     return tr("Place %1: before %2 mm, after %3 mm")
         .arg(node)
         .arg(threeFigures(comparison->before_place_mm[i]), threeFigures(after_mm[i]));

@@ -2,7 +2,6 @@
 
 #include <QWidget>
 
-#include "widgets/pages/score_model.h"
 #include "widgets/pages/workbench.h"
 
 class QCheckBox;
@@ -11,15 +10,13 @@ class QLabel;
 class QProgressBar;
 class QPushButton;
 class QSlider;
-class QSortFilterProxyModel;
 class QStackedWidget;
-class QTableView;
 
 namespace fieldtrue {
 
 class FieldView;
 class HistogramView;
-class SettingsForm;
+class MethodPanel;
 
 /// Fit and compare: the verdict, the error field before and after on one colour scale, and every method's held-out
 /// figures.
@@ -32,19 +29,10 @@ class ComparePage : public QWidget {
   void showEvent(QShowEvent* event) override;
 
  private:
-  struct Part {
-    ScoreModel* model = nullptr;
-    QSortFilterProxyModel* sorted = nullptr;
-    QTableView* table = nullptr;
-    QComboBox* method = nullptr;
-    SettingsForm* settings = nullptr;
-  };
   QWidget* makeHeader();
   QWidget* makeViews();
   QWidget* makeViewBar();
   QWidget* makeInspector();
-  Part makePart(ScoreModel::Part part, const QString& name);
-  QWidget* partPanel(Part& part);
   void onTable();
   void runComparison();
   void onComparison();
@@ -52,7 +40,6 @@ class ComparePage : public QWidget {
   void drawFields();
   void chooseScale(const Comparison& comparison);
   void magnify(double magnification);
-  void selectMethod(Part& part, const QString& method);
   void fitChosen();
   void selectNode(int node);
   QString describeNode(int node) const;
@@ -72,8 +59,8 @@ class ComparePage : public QWidget {
   QCheckBox* two_views_;
   QCheckBox* orientation_;
   QLabel* hovered_;
-  Part position_;
-  Part rotation_;
+  MethodPanel* position_;
+  MethodPanel* rotation_;
   QPushButton* fit_;
   QLabel* fitted_;
   bool scale_chosen_by_hand_ = false;
