@@ -57,7 +57,7 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
   if (state != DeviceState::kRunning) {
     silence_timer.stop();
     live.reset();
-    if (was_collecting) failTake("the tracker was lost: " + text.toStdString() + " Nothing of this take was stored");
+    if (was_collecting) failTake("the tracker was lost: " + text.toStdString() + ". Nothing of this take was stored");
   }
   if (state == DeviceState::kFailed && !same) {
     note("device", "failed: " + text.toStdString());

@@ -28,6 +28,9 @@ constexpr double kPlaceTextShare = 1.0 / 11.0;
 constexpr double kPositionTextShare = 1.0 / 24.0;
 constexpr double kReasonTextShare = 1.0 / 28.0;
 constexpr int kInspectorWidth = 320;
+// Nearer than this the tracker's own error decides what it says of the distance, and the marks on the floor know
+// better.
+constexpr double kWorthTelling_m = 0.15;
 
 void setPixelHeight(QLabel* label, int pixels) {
   QFont font = label->font();
@@ -246,7 +249,8 @@ void AcquirePage::showPlace(const AcquisitionStatus& status) {
     const QString name = QString::fromStdString(placeName(place));
     place_->setText(status.current_is_retake ? tr("Retake %1").arg(name) : name);
     QString where = positionText(place.reference_from_sensor.position_m);
-    if (status.distance_m && status.reference_known && status.take != TakeState::kCollecting)
+    if (status.reference_known && status.distance_m.value_or(0.0) > kWorthTelling_m &&
+        status.take != TakeState::kCollecting)
       where += tr("     %1 to go").arg(distanceText(*status.distance_m));
     position_->setText(where);
   } else {

@@ -23,7 +23,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr int kColumnWidth = 720;
-constexpr int kRowHeight = 36;  // As the style sheet draws a list that is a menu.
+constexpr int kRowHeight = 36;
 
 }  // namespace
 
@@ -78,8 +78,10 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   page->setContentsMargins(0, 0, 0, 0);
   page->addWidget(stack_);
 
-  for (const Target& target : targets_) list_->addItem(QStringLiteral("%1   (%2)").arg(target.label, target.extension));
-  list_->setProperty("menu", true);
+  for (const Target& target : targets_) {
+    auto* item = new QListWidgetItem(QStringLiteral("%1   (%2)").arg(target.label, target.extension), list_);
+    item->setSizeHint(QSize(0, kRowHeight));
+  }
   list_->setFixedHeight(static_cast<int>(targets_.size()) * kRowHeight + 4);
   connect(list_, &QListWidget::currentRowChanged, this, &ExportPage::onTarget);
   connect(browse_button, &QPushButton::clicked, this, &ExportPage::browse);
