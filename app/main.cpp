@@ -1,8 +1,7 @@
 #include <QApplication>
 #include <QCommandLineParser>
-#include <QStyleHints>
+#include <QIcon>
 #include <QTimer>
-#include <cstdio>
 
 #include "widgets/pages/main_window.h"
 #include "widgets/views/gl_format.h"
@@ -31,6 +30,7 @@ int main(int argc, char** argv) {
 
   const bool use_dark = parser.isSet(dark) || (!parser.isSet(light) && fieldtrue::systemPrefersDark());
   fieldtrue::applyTheme(application, use_dark);
+  QApplication::setWindowIcon(QIcon(QStringLiteral(":/fieldtrue.svg")));
   fieldtrue::MainWindow window;
   window.show();
   window.activateWindow();
