@@ -6,8 +6,8 @@
 //    dimension 2 (one plane) or say in `note()` what is not claimed.
 // 3. Declare settings with unit, range and default; take shared ones from shared_settings.h.
 // 4. Include the header and add the row below, in the order menus shall show it.
-// 5. Add to tests/calib/correctors/corrector_contract_test.cpp what the method must recover exactly. The other contracts (same
-// bits
+// 5. Add to tests/calib/correctors/corrector_contract_test.cpp what the method must recover exactly. The other
+// contracts (same bits
 //    after reloading, same result twice, finite, errors on bad data) run over every row by themselves.
 #include "calib/correctors/registry.h"
 

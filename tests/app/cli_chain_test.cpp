@@ -19,7 +19,7 @@ using nlohmann::json;
 
 namespace {
 
-const QString kScene = QStringLiteral(FIELDTRUE_TEST_DATA "/../../resources/scenes/steel_floor.scene.json");
+const QString kScene = QStringLiteral(FIELDTRUE_RESOURCES "/scenes/steel_floor.scene.json");
 const QStringList kScores = {"mean", "median", "rms", "p95", "max", "rms_low90", "rms_high90"};
 
 /// Best rigid transform by the singular-value method, as Eigen has it.

@@ -1,5 +1,5 @@
-/* Preloaded before a test of the serial back end: a pseudo-terminal has no modem lines, and libserialport refuses to open
-   a port without them. Answers the modem line requests itself and passes every other one on. */
+/* Preloaded before a test of the serial back end: a pseudo-terminal has no modem lines, and libserialport refuses to
+   open a port without them. Answers the modem line requests itself and passes every other one on. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdarg.h>

@@ -1,5 +1,3 @@
-#include "calib/correctors/registry.h"
-
 #include <QTest>
 #include <cmath>
 #include <limits>
@@ -7,6 +5,7 @@
 #include <set>
 
 #include "calib/core/pose.h"
+#include "calib/correctors/registry.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 

@@ -14,7 +14,7 @@ using fieldtrue::testing::holdsAll;
 
 namespace {
 
-std::filesystem::path shippedScenes() { return std::filesystem::path(FIELDTRUE_TEST_DATA) / "../../resources/scenes"; }
+std::filesystem::path shippedScenes() { return std::filesystem::path(FIELDTRUE_RESOURCES) / "scenes"; }
 
 /// Every key of the expected object stands in the seen one, at any depth; lists are compared item by item.
 bool holdsEveryKey(const nlohmann::json& seen, const nlohmann::json& expected, std::string& missing) {
