@@ -2,6 +2,7 @@
 #include <QCommandLineParser>
 #include <QIcon>
 #include <QTimer>
+#include <clocale>
 
 #include "widgets/pages/main_window.h"
 #include "widgets/views/gl_format.h"
@@ -10,6 +11,8 @@
 int main(int argc, char** argv) {
   fieldtrue::setDefaultGlFormat();
   QApplication application(argc, argv);
+  // Qt takes over the desktop's locale; printf must keep the decimal point that files and messages are written with.
+  std::setlocale(LC_NUMERIC, "C");
   QApplication::setApplicationName(QStringLiteral("fieldtrue"));
   QApplication::setApplicationVersion(QStringLiteral(FIELDTRUE_VERSION));
 

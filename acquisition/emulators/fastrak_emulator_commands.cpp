@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <charconv>
-#include <cstdio>
 
 #include "acquisition/emulators/fastrak_emulator_core.h"
+#include "acquisition/protocols/plain_number.h"
 
 namespace fieldtrue {
 namespace {
@@ -50,11 +50,7 @@ std::optional<double> toNumber(const std::string& text) {
   return value;
 }
 
-std::string column(double value, int decimals) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%7.*f", decimals, value);
-  return text.data();
-}
+std::string column(double value, int decimals) { return fixedText(value, decimals, 7); }
 
 /// The filter macros: 2 none, 3 low, 4 medium, 5 heavy.
 std::optional<std::vector<double>> filterMacro(double level) {

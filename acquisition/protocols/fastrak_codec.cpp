@@ -3,12 +3,12 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <utility>
 
 #include "acquisition/protocols/fastrak_items.h"
+#include "acquisition/protocols/plain_number.h"
 
 namespace fieldtrue {
 namespace {
@@ -110,14 +110,12 @@ bool decodeField(std::string_view bytes, const FastrakLayout::Field& field, Fast
 }
 
 void appendAscii(std::string& out, const FastrakItem& item, double value) {
-  std::array<char, 40> text{};
   if (item.extended) {
-    std::snprintf(text.data(), text.size(), "% .5E ", value);
-  } else {
-    const double limit = 1000.0 / kPowersOfTen[std::max(0, item.decimals - 2)] - 1.0 / kPowersOfTen[item.decimals];
-    std::snprintf(text.data(), text.size(), "%7.*f", item.decimals, std::clamp(value, -limit, limit));
+    out += exponentText(value, 5) + ' ';
+    return;
   }
-  out += text.data();
+  const double limit = 1000.0 / kPowersOfTen[std::max(0, item.decimals - 2)] - 1.0 / kPowersOfTen[item.decimals];
+  out += fixedText(std::clamp(value, -limit, limit), item.decimals, 7);
 }
 
 }  // namespace

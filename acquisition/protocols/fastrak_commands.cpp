@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
+
+#include "acquisition/protocols/plain_number.h"
 
 namespace fieldtrue {
 namespace {
@@ -52,9 +53,7 @@ constexpr FastrakCommandKind kKinds[] = {
 
 /// Up to four decimals, no exponent, no trailing zeros.
 std::string number(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4f", value);
-  std::string result = text.data();
+  std::string result = fixedText(value, 4);
   result.erase(result.find_last_not_of('0') + 1);
   if (result.back() == '.') result.pop_back();
   return result == "-0" ? "0" : result;
