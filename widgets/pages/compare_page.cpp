@@ -24,7 +24,7 @@
 namespace fieldtrue {
 namespace {
 
-constexpr int kInspectorWidth = 390;
+constexpr int kInspectorWidth = 440;
 constexpr std::size_t kFewestPlaces = 5;
 
 // The slider runs over magnifications 1 to 100 in even ratios.
