@@ -1,14 +1,13 @@
 // To add a correction method:
-// 1. Write `calib/correctors/<id>.{h,cpp}`: a model (PositionModel, or ErrorRotationModel for an orientation), its fit,
-// its
-//    load, and one function that returns its row. `parameters()` must hold every bit that `load` needs.
+// 1. Write `calib/correctors/<id>.{h,cpp}`: a model (PositionModel, or ErrorRotationModel for an orientation), its
+//    fit, its load, and one function that returns its row. `parameters()` must hold every bit that `load` needs.
 // 2. In the fit, check the data first (fit_checks.h) and say in one sentence what was seen and what is needed; treat
 //    dimension 2 (one plane) or say in `note()` what is not claimed.
 // 3. Declare settings with unit, range and default; take shared ones from shared_settings.h.
 // 4. Include the header and add the row below, in the order menus shall show it.
 // 5. Add to tests/calib/correctors/corrector_contract_test.cpp what the method must recover exactly. The other
-// contracts (same bits
-//    after reloading, same result twice, finite, errors on bad data) run over every row by themselves.
+//    contracts (same bits after reloading, same result twice, finite, errors on bad data) run over every row by
+//    themselves.
 #include "calib/correctors/registry.h"
 
 #include "calib/correctors/affine.h"

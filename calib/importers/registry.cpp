@@ -1,7 +1,6 @@
 // To add an importer:
 // 1. Write calib/importers/<id>.h with `Importer <id>Importer();` and <id>.cpp with its row: id, label, source,
-// settings,
-//    whether it needs a truth file, and the reading function.
+//    settings, whether it needs a truth file, and the reading function.
 // 2. Put the row into the table below.
 // 3. Add a test beside the others in tests/calib/importers; importer_contract_test checks the new row by itself.
 
