@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "calib/core/grid_index.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/corrector.h"
 
@@ -81,6 +82,17 @@ Eigen::Quaterniond fitMounting(std::span<const Node> nodes, const Eigen::Quatern
   return canonical(mounting);
 }
 
+/// The table's own grid index, or the one its true positions show; empty when they are scattered.
+std::vector<std::array<int, 3>> indexOf(std::span<const Node> nodes) {
+  std::vector<std::array<int, 3>> index;
+  std::vector<Eigen::Vector3d> p_true_m;
+  for (const Node& node : nodes) {
+    if (node.index) index.push_back(*node.index);
+    p_true_m.push_back(node.reference_from_sensor.position_m);
+  }
+  return index.size() == nodes.size() ? index : gridIndex(p_true_m).value_or(std::vector<std::array<int, 3>>());
+}
+
 }  // namespace
 
 AlignMode defaultAlignMode(const TableMetadata& metadata) {
@@ -102,21 +114,25 @@ Result<Alignment> fitAlignment(std::span<const Node> nodes) {
   return Alignment{*reference_from_tracker, fitMounting(nodes, reference_from_tracker->orientation)};
 }
 
-FitData makeFitData(std::span<const Node> nodes, const Alignment& alignment) {
+FitData makeFitData(std::span<const Node> nodes, const TableMetadata& metadata, const Alignment& alignment) {
   FitData data;
   const Pose tracker_from_reference = inverse(alignment.reference_from_tracker);
   const Eigen::Quaterniond mount_from_sensor = alignment.sensor_from_mount.conjugate();
-  const bool has_orientation =
-      !nodes.empty() && std::all_of(nodes.begin(), nodes.end(), [](const Node& node) { return node.has_orientation; });
+  const auto all_have = [&](const auto& has) { return !nodes.empty() && std::all_of(nodes.begin(), nodes.end(), has); };
+  const bool has_orientation = all_have([](const Node& node) { return node.has_orientation; });
+  const bool has_noise = all_have([](const Node& node) { return node.covariance_m2.has_value(); });
   for (const Node& node : nodes) {
     data.p_tracked_m.push_back(node.tracker_from_sensor.position_m);
     data.p_true_m.push_back(tracker_from_reference * node.reference_from_sensor.position_m);
     data.node.push_back(node.node);
+    if (has_noise) data.noise_m2.push_back(*node.covariance_m2 / std::max(1.0, node.n_effective));
     if (!has_orientation) continue;
     data.q_tracked.push_back(node.tracker_from_sensor.orientation);
     data.q_true.push_back(tracker_from_reference.orientation * node.reference_from_sensor.orientation *
                           mount_from_sensor);
   }
+  data.index = indexOf(nodes);
+  data.jig_sd_m = metadata.jig_tolerance_m.value_or(0.0);
   data.dimension = pointSpread(data.p_true_m).dimension;
   return data;
 }

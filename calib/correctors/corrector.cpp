@@ -92,7 +92,7 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
     if (!alignment) return tl::unexpected(alignment.error());
     corrector.alignment_ = *alignment;
   }
-  const FitData data = makeFitData(nodes, corrector.alignment_);
+  const FitData data = makeFitData(nodes, metadata, corrector.alignment_);
   if (auto checked = checkPositions(data, "A calibration"); !checked) return tl::unexpected(checked.error());
 
   auto position = (*position_method)->fit(data, choice.position_settings, control);

@@ -36,8 +36,9 @@ AlignMode defaultAlignMode(const TableMetadata& metadata);
 /// @error kTooFewNodes, kDegenerate as fitRigid
 Result<Alignment> fitAlignment(std::span<const Node> nodes);
 
-/// Rows of a table as fit data in the tracker frame: truth brought there by the inverse alignment.
-FitData makeFitData(std::span<const Node> nodes, const Alignment& alignment);
+/// Rows of a table as fit data in the tracker frame: truth brought there by the inverse alignment. The grid index is
+/// the table's, or found from the true positions where they stand on a grid along the rig's axes.
+FitData makeFitData(std::span<const Node> nodes, const TableMetadata& metadata, const Alignment& alignment);
 
 /// Which methods to fit, with their settings.
 struct CorrectorChoice {

@@ -22,6 +22,7 @@ Places mergePlaces(const FitData& data) {
     if (group == places.size()) {
       groups.push_back(group);
       places.node.push_back(data.node[row]);
+      if (!data.index.empty()) places.index.push_back(data.index[row]);
       places.rows.emplace_back();
       places.p_tracked_m.emplace_back(Eigen::Vector3d::Zero());
       places.p_true_m.emplace_back(Eigen::Vector3d::Zero());

@@ -14,6 +14,7 @@ struct Places {
   std::vector<Eigen::Vector3d> p_tracked_m;  ///< Mean over the visits, tracker frame [m].
   std::vector<Eigen::Vector3d> p_true_m;     ///< Mean over the visits, tracker frame [m].
   std::vector<int> node;
+  std::vector<std::array<int, 3>> index;       ///< Grid index; empty when the places are scattered.
   std::vector<std::vector<std::size_t>> rows;  ///< Rows of the fit data that were averaged.
 
   std::size_t size() const { return node.size(); }

@@ -75,7 +75,7 @@ FoldResult runFold(const Job& job, const Fold& fold, const std::vector<MethodSco
   }
   result.before_position = scoreRows(scored, *alignment, alignedPositionScore);
   if (job.has_orientation) result.before_orientation = scoreRows(scored, *alignment, alignedOrientationScore);
-  FitData data = makeFitData(fitted, *alignment);
+  FitData data = makeFitData(fitted, job.metadata, *alignment);
   // Places that span a volume are not fitted in a plane only because the few of this fold lie in one.
   if (data.dimension == 2) data.dimension = job.dimension;
   for (std::size_t i = 0; i < job.candidates.size(); ++i) {
@@ -165,7 +165,7 @@ Result<std::vector<MethodScore>> fitInSample(Job& job, Comparison& comparison, c
   const std::vector<Node> fitted = rowsOf(job, job.all_fitted);
   const auto alignment = alignmentOf(job, fitted);
   if (!alignment) return tl::unexpected(alignment.error());
-  const FitData data = makeFitData(fitted, *alignment);
+  const FitData data = makeFitData(fitted, job.metadata, *alignment);
   job.dimension = data.dimension;
   if (data.dimension == 2)
     comparison.notes.push_back("The places lie in one plane: methods are fitted in it, and nothing is claimed off it.");

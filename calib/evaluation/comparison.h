@@ -50,8 +50,14 @@ struct MethodScore {
   std::vector<double> place_errors;  ///< Same order as Comparison::places.
   std::vector<Eigen::Vector3d>
       residual_m;  ///< Position only: corrected minus true at each place, reference frame (mean over its rows).
+  std::vector<bool> place_covered;  ///< Same order; where false the input stood unchanged.
   int n_uncovered = 0;
-  double rms_common_mm = 0;            ///< Position only: over the places all methods cover.
+  double rms_common_mm = 0;  ///< Position only: over the places all methods cover.
+  double rms_to_best = 0;    ///< RMS minus the best method's, mm or deg, with its paired 90 % bootstrap interval.
+  double rms_to_best_low90 = 0;
+  double rms_to_best_high90 = 0;
+  int n_folds = 0;                     ///< Fits that were scored; fewer than asked for a costly method.
+  bool closed_form = false;            ///< Held out by downdating one fit rather than by fitting anew.
   double in_sample_rms = 0;            ///< On the rows it was fitted to, all at once. Not a verdict.
   double fit_s = 0;                    ///< One fit on all rows.
   double eval_ns = 0;                  ///< One evaluation.

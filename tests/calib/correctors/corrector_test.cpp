@@ -94,7 +94,7 @@ class CorrectorTest : public QObject {
 
   void bringsTheTruthToTheTrackerFrame() {
     const CalibrationTable table = alignedTable();
-    const FitData data = makeFitData(table.nodes, {kReferenceFromTracker, kMounting});
+    const FitData data = makeFitData(table.nodes, table.metadata, {kReferenceFromTracker, kMounting});
     QCOMPARE(data.size(), table.nodes.size());
     QVERIFY(data.hasOrientation());
     QCOMPARE(data.dimension, 3);
@@ -109,7 +109,7 @@ class CorrectorTest : public QObject {
   void oneRowWithoutOrientationLeavesNone() {
     CalibrationTable table = alignedTable();
     table.nodes[3].has_orientation = false;
-    QVERIFY(!makeFitData(table.nodes, {}).hasOrientation());
+    QVERIFY(!makeFitData(table.nodes, table.metadata, {}).hasOrientation());
     const auto corrector =
         Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice("none", "rigid").value(), AlignMode::kRigid);
     QVERIFY(!corrector);
@@ -121,14 +121,14 @@ class CorrectorTest : public QObject {
     // Tracked positions far from flat, true ones flat.
     for (std::size_t i = 0; i < table.nodes.size(); ++i)
       table.nodes[i].tracker_from_sensor.position_m.z() += 0.05 * std::sin(static_cast<double>(i));
-    QCOMPARE(makeFitData(table.nodes, {}).dimension, 2);
+    QCOMPARE(makeFitData(table.nodes, table.metadata, {}).dimension, 2);
     // Places shifted up and down by turns: the SD across is the shift.
-    const double longest_sd_m = pointSpread(makeFitData(table.nodes, {}).p_true_m).sd_m[0];
+    const double longest_sd_m = pointSpread(makeFitData(table.nodes, table.metadata, {}).p_true_m).sd_m[0];
     for (const auto& [share, dimension] : {std::pair{0.005, 2}, std::pair{0.02, 3}}) {
       CalibrationTable thick = table;
       for (std::size_t i = 0; i < thick.nodes.size(); ++i)
         thick.nodes[i].reference_from_sensor.position_m.z() += (i % 2 == 0 ? share : -share) * longest_sd_m;
-      QCOMPARE(makeFitData(thick.nodes, {}).dimension, dimension);
+      QCOMPARE(makeFitData(thick.nodes, thick.metadata, {}).dimension, dimension);
     }
   }
 

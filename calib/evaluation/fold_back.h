@@ -1,0 +1,39 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/correctors/corrector.h"
+
+namespace fieldtrue {
+
+/// One probe of the map over the calibrated volume.
+struct FoldBackCell {
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  ///< True position, reference frame [m].
+  double size_m = 0.0;                                 ///< Edge of the cube it stands for.
+  double determinant = 1.0;  ///< Of d true / d tracked; 0 or below: the field folds back and no correction is unique.
+  double condition = 1.0;    ///< Ratio of its largest to smallest singular value.
+  bool one_to_one = true;
+  std::vector<int> nodes;  ///< Places at the corners of the cell, where it is a cell of the grid.
+};
+
+/// Whether the tracked position determines the true one over the volume.
+/// @source survey by Kindratenko, section 2.3
+struct FoldBack {
+  std::vector<FoldBackCell> cells;
+  int n_folded = 0;
+  double worst_condition = 1.0;
+  double smallest_determinant = 1.0;
+  std::string text;  ///< One sentence, with the worst cell named.
+};
+
+/// Grid cells judged by the measured nodes themselves (sign of the Jacobian of true to tracked at the eight corners and
+/// the centre); and, between the nodes, the corrector's Jacobian on a lattice.
+/// @param corrector its table is what is judged
+FoldBack foldBackOf(const Corrector& corrector);
+
+nlohmann::json toJson(const FoldBack& fold_back);
+
+}  // namespace fieldtrue
