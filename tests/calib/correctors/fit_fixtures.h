@@ -1,8 +1,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <functional>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "calib/correctors/fit_data.h"
@@ -27,11 +30,38 @@ inline std::vector<Eigen::Vector3d> shakenGrid(const std::array<int, 3>& counts,
   return points_m;
 }
 
-/// Fit data whose truth is tracked + displacement, and, with an error rotation, q_tracked = q_error q_true.
+/// Grid index of places that fill a whole grid, shaken or not: a level ends at a gap of more than half the largest.
+/// Empty for other places.
+inline std::vector<std::array<int, 3>> wholeGridIndex(const std::vector<Eigen::Vector3d>& points_m) {
+  std::vector<std::array<int, 3>> index(points_m.size());
+  std::size_t n_nodes = 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> sorted_m;
+    for (const Eigen::Vector3d& p_m : points_m) sorted_m.push_back(p_m[static_cast<Eigen::Index>(axis)]);
+    std::sort(sorted_m.begin(), sorted_m.end());
+    double largest_m = 0.0;
+    for (std::size_t i = 1; i < sorted_m.size(); ++i) largest_m = std::max(largest_m, sorted_m[i] - sorted_m[i - 1]);
+    std::vector<double> starts_m;
+    for (std::size_t i = 1; i < sorted_m.size(); ++i)
+      if (sorted_m[i] - sorted_m[i - 1] > 0.5 * largest_m) starts_m.push_back(sorted_m[i]);
+    for (std::size_t i = 0; i < points_m.size(); ++i)
+      index[i][axis] = static_cast<int>(
+          std::upper_bound(starts_m.begin(), starts_m.end(), points_m[i][static_cast<Eigen::Index>(axis)]) -
+          starts_m.begin());
+    n_nodes *= starts_m.size() + 1;
+  }
+  const std::set<std::array<int, 3>> distinct(index.begin(), index.end());
+  if (distinct.size() != points_m.size() || n_nodes != points_m.size()) index.clear();
+  return index;
+}
+
+/// Fit data whose truth is tracked + displacement, and, with an error rotation, q_tracked = q_error q_true. Places that
+/// fill a whole grid get their grid index.
 inline FitData fitDataOf(const std::vector<Eigen::Vector3d>& p_tracked_m, const Displacement& displacement_m,
                          const Rotation& q_error = {},
                          const Eigen::Quaterniond& q_true = Eigen::Quaterniond::Identity()) {
   FitData data;
+  data.index = wholeGridIndex(p_tracked_m);
   for (std::size_t i = 0; i < p_tracked_m.size(); ++i) {
     data.p_tracked_m.push_back(p_tracked_m[i]);
     data.p_true_m.push_back(p_tracked_m[i] + displacement_m(p_tracked_m[i]));
