@@ -10,6 +10,9 @@
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
 #include "calib/correctors/corrector.h"
+#include "calib/evaluation/coverage.h"
+#include "calib/evaluation/fold_back.h"
+#include "calib/evaluation/orientation_dependence.h"
 
 namespace fieldtrue {
 
@@ -40,6 +43,9 @@ struct ComparisonOptions {
   std::optional<Validation> validation;         ///< None = defaultValidation.
   std::optional<AlignMode> align;               ///< None = defaultAlignMode.
   std::uint64_t seed = 1;                       ///< Of folds and bootstrap.
+  /// Coverage, fold-back, dependence on orientation and what limits the best method, beside the scores. Without them
+  /// only the scores and the rule of application are found.
+  bool with_surroundings = true;
 };
 
 /// One method's score on the places its fits did not see.
@@ -89,8 +95,26 @@ struct Verdict {
   double gain_without_worst_place = 0;
   GainTest position;     ///< Of the best position method.
   GainTest orientation;  ///< Of the best orientation method.
-  std::string text;      ///< One sentence.
+  /// Held-out RMS of the best position method, or of the error before where nothing beats it, over the places that have
+  /// others on all sides, and over the outermost ones; none where there are no such places.
+  std::optional<double> inside_mm;
+  std::optional<double> edge_mm;
+  int worst_node = -1;     ///< Place with the largest of these errors; -1 = nothing was scored.
+  double worst_mm = 0;     ///< Its error.
+  std::string limited_by;  ///< One phrase: what keeps the error from being smaller. Empty without surroundings.
+  std::string text;        ///< One sentence.
 };
+
+/// Systematic error apart from precision: sqrt(max(0, RMS^2 - floor^2)), what noise and jig do not explain.
+struct Trueness {
+  double before_position_mm = 0;
+  double after_position_mm = 0;                  ///< Of the best position method; as before where nothing beats it.
+  std::optional<double> before_orientation_deg;  ///< None without orientation.
+  std::optional<double> after_orientation_deg;
+};
+
+/// sqrt(max(0, rms^2 - floor^2)).
+double excessError(double rms, double floor);
 
 struct Comparison {
   Validation validation;
@@ -113,7 +137,11 @@ struct Comparison {
   std::string best_position = "none";
   std::string best_orientation = "none";
   Verdict verdict;
-  std::vector<std::string> notes;  ///< E.g. that the nodes lie in one plane.
+  Trueness trueness;
+  std::optional<Coverage> coverage;   ///< These need ComparisonOptions::with_surroundings.
+  std::optional<FoldBack> fold_back;  ///< With the best position method fitted to all rows it may see.
+  std::optional<OrientationDependence> orientation_dependence;  ///< None without orientation.
+  std::vector<std::string> notes;                               ///< E.g. that the nodes lie in one plane.
 };
 
 /// Scores every method on places its fits did not see.

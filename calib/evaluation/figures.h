@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+/// Numbers as sentences show them, independent of the locale, which a desktop program sets and which may write a
+/// decimal comma.
+namespace fieldtrue {
+
+std::string fixedText(double value, int decimals);
+
+/// An error in mm or degrees: three significant digits or so.
+std::string errorText(double value);
+
+/// Percent of a fraction, without the sign.
+std::string percentText(double fraction);
+
+/// "(0.10, -0.25, 1.30) m".
+std::string pointText(const Eigen::Vector3d& point_m);
+
+/// "3, 8, 12 and 9 more".
+std::string listText(const std::vector<int>& numbers, std::size_t most = 8);
+
+/// "1 place", "3 places".
+std::string countText(std::size_t count, const std::string& one, const std::string& several);
+
+}  // namespace fieldtrue
