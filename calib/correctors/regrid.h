@@ -4,11 +4,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "calib/core/error.h"
+#include "calib/core/geometry.h"
 #include "calib/core/pose.h"
-#include "calib/core/settings.h"
 
 namespace fieldtrue {
 
@@ -34,6 +36,40 @@ struct RegridOptions {
 struct RegridWeight {
   std::size_t place = 0;
   double weight = 0.0;
+};
+
+/// Finds, for targets in tracked space, the places whose values make the value there. A target outside the convex hull
+/// of the places has no support, whatever the method: values are never extrapolated. Places that lie in one plane
+/// support nothing.
+class Regridder {
+ public:
+  /// The tetrahedra tried are those of the so many nearest places; twice and four times as many where none of them
+  /// surrounds the target.
+  static constexpr std::size_t kTetrahedronCandidates = 16;
+
+  /// @param p_tracked_m of the distinct places, tracker frame [m], finite
+  Regridder(std::span<const Eigen::Vector3d> p_tracked_m, const RegridOptions& options);
+
+  /// The shares that make the value at a target, adding up to 1; empty where it has no support. A target that coincides
+  /// with a place takes that place's value alone, except under the Gaussian kernel, which smooths everywhere alike.
+  /// @param target_m tracker frame [m]
+  /// @param left_out a place that counts as not measured
+  std::vector<RegridWeight> weightsAt(const Eigen::Vector3d& target_m,
+                                      std::optional<std::size_t> left_out = std::nullopt) const;
+
+ private:
+  using Neighbour = std::pair<double, std::size_t>;  ///< Squared distance [m2] and place.
+
+  std::vector<Neighbour> neighbours(const Eigen::Vector3d& target_m, std::optional<std::size_t> left_out) const;
+  bool inHull(const Eigen::Vector3d& target_m, std::optional<std::size_t> left_out,
+              std::span<const Neighbour> nearest_first) const;
+  std::vector<RegridWeight> tetrahedronWeights(const Eigen::Vector3d& target_m,
+                                               std::span<const Neighbour> nearest_first) const;
+  std::vector<RegridWeight> gaussianWeights(std::span<const Neighbour> nearest_first) const;
+
+  std::vector<Eigen::Vector3d> p_tracked_m_;
+  RegridOptions options_;
+  Region hull_;  ///< Empty where the places span no volume.
 };
 
 /// For each target the shares that make its value, adding up to 1; empty where the target has no support: values are
