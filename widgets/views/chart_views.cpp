@@ -3,6 +3,7 @@
 #include <QMouseEvent>
 #include <QToolTip>
 
+#include "widgets/views/curve_scene.h"
 #include "widgets/views/histogram_scene.h"
 #include "widgets/views/theme.h"
 
@@ -15,8 +16,8 @@ HistogramView::HistogramView(QWidget* parent) : VtkHost(parent), scene_(std::mak
 HistogramView::~HistogramView() = default;
 
 void HistogramView::setSeries(const std::vector<QString>& names, const std::vector<std::vector<double>>& values_mm,
-                              const QString& axis_title) {
-  scene_->setSeries(names, values_mm, axis_title);
+                              const QString& axis_title, const std::vector<std::size_t>& colors) {
+  scene_->setSeries(names, values_mm, axis_title, colors);
   requestRender();
 }
 
@@ -32,5 +33,32 @@ void HistogramView::mouseMoveEvent(QMouseEvent* event) {
 }
 
 void HistogramView::leaveEvent(QEvent*) { QToolTip::hideText(); }
+
+CurveView::CurveView(QWidget* parent) : VtkHost(parent), scene_(std::make_unique<CurveScene>(renderer())) {
+  setAccessibleName(tr("Learning curves"));
+}
+
+CurveView::~CurveView() = default;
+
+void CurveView::setLines(const std::vector<ChartLine>& lines, const QString& x_title, const QString& y_title) {
+  scene_->setLines(lines, x_title, y_title);
+  requestRender();
+}
+
+const std::vector<ChartLine>& CurveView::lines() const { return scene_->lines(); }
+
+void CurveView::restyle(double pixel_ratio) { scene_->setStyle(theme(), pixel_ratio); }
+
+void CurveView::prepareFrame() { scene_->update(); }
+
+void CurveView::mouseMoveEvent(QMouseEvent* event) {
+  const QPointF at = event->position() * pixelRatio();
+  if (const auto text = scene_->textAt(at.x(), height() * pixelRatio() - at.y()))
+    QToolTip::showText(event->globalPosition().toPoint(), *text, this);
+  else
+    QToolTip::hideText();
+}
+
+void CurveView::leaveEvent(QEvent*) { QToolTip::hideText(); }
 
 }  // namespace fieldtrue

@@ -24,9 +24,17 @@ constexpr double kLargestArc_rad = 1.9 * std::numbers::pi;
 constexpr double kRad = std::numbers::pi / 180.0;
 constexpr double kArcStep_rad = 10.0 * kRad;
 
+constexpr double kFaintest = 0.12;
+
 double length_mm(const FieldArrow& arrow) { return 1000.0 * arrow.error_m.norm(); }
 
 }  // namespace
+
+double opacityOf(double uncertainty_mm, const OpacityRange& range) {
+  if (!std::isfinite(uncertainty_mm)) return 1.0;
+  const double along = (uncertainty_mm - range.opaque_mm) / std::max(range.faint_mm - range.opaque_mm, 1e-12);
+  return 1.0 - (1.0 - kFaintest) * std::clamp(along, 0.0, 1.0);
+}
 
 FieldScene::FieldScene(vtkRenderer* renderer)
     : renderer_(renderer),
@@ -37,6 +45,10 @@ FieldScene::FieldScene(vtkRenderer* renderer)
       halo_(renderer, Symbol::kThickCircle),
       arrows_(renderer),
       arcs_(addFlatActor(renderer)),
+      holes_part_(renderer),
+      slice_part_(renderer),
+      iso_part_(renderer),
+      folds_part_(renderer),
       overlay_(addOverlay(renderer)) {}
 
 void FieldScene::setField(const ErrorField& field) {
@@ -87,6 +99,41 @@ void FieldScene::setUnit(LengthUnit unit) {
   overlay_changed_ = true;
 }
 
+void FieldScene::setVolume(const VolumeField& volume) {
+  volume_ = volume;
+  volume_changed_ = true;
+}
+
+void FieldScene::setSlice(const std::optional<SlicePlane>& plane) {
+  slice_ = plane;
+  volume_changed_ = true;
+}
+
+void FieldScene::setIso(const std::optional<double>& value_mm) {
+  iso_mm_ = value_mm;
+  volume_changed_ = true;
+}
+
+void FieldScene::setHoles(const std::vector<SceneCell>& holes) {
+  holes_ = holes;
+  volume_changed_ = true;
+}
+
+void FieldScene::setFolds(const std::vector<SceneCell>& cells) {
+  folds_ = cells;
+  volume_changed_ = overlay_changed_ = true;
+}
+
+void FieldScene::setOpacityRange(const std::optional<OpacityRange>& range) {
+  opacity_ = range;
+  changed_ = true;
+}
+
+void FieldScene::setLegendShown(bool shown) {
+  legend_shown_ = shown;
+  overlay_changed_ = true;
+}
+
 void FieldScene::setStyle(const Theme& theme, double ratio) {
   theme_ = &theme;
   ratio_ = ratio;
@@ -105,7 +152,9 @@ double FieldScene::angleScaleMax_deg() const {
   return largest > 0.0 ? largest : 1.0;
 }
 
-QMargins FieldScene::legendMargins() { return {64, 44, 116, 52}; }
+QMargins FieldScene::legendMargins(bool legend_shown) {
+  return legend_shown ? QMargins{64, 44, 116, 52} : QMargins{58, 24, 24, 48};
+}
 
 void FieldScene::update() {
   if (changed_) {
@@ -116,8 +165,24 @@ void FieldScene::update() {
     updateArrows();
     arcs_changed_ = true;
   }
+  if (changed_ || volume_changed_) updateVolume();
   if (changed_ || overlay_changed_) updateOverlay();
-  changed_ = overlay_changed_ = false;
+  changed_ = volume_changed_ = overlay_changed_ = false;
+}
+
+void FieldScene::updateVolume() {
+  slice_part_.build(volume_, slice_, scale_max_mm_, *theme_, ratio_);
+  iso_part_.build(volume_, iso_mm_, scale_max_mm_);
+  holes_part_.build(holes_, *theme_);
+  folds_part_.build(folds_, *theme_, ratio_);
+}
+
+QColor FieldScene::colorOf(const FieldArrow& arrow) const {
+  QColor color = arrow.better_mm ? differenceColor(*arrow.better_mm / scale_max_mm_)
+                                 : magnitudeColor(length_mm(arrow) / scale_max_mm_);
+  if (opacity_ && arrow.uncertainty_mm)
+    color.setAlpha(static_cast<int>(std::lround(255.0 * opacityOf(*arrow.uncertainty_mm, *opacity_))));
+  return color;
 }
 
 void FieldScene::updateArrows() {
@@ -125,8 +190,7 @@ void FieldScene::updateArrows() {
   arrows.reserve(field_.arrows.size());
   for (const FieldArrow& arrow : field_.arrows)
     if (arrow.error_m.allFinite())
-      arrows.push_back({arrow.from_m, arrow.from_m + magnification_ * arrow.error_m,
-                        magnitudeColor(length_mm(arrow) / scale_max_mm_)});
+      arrows.push_back({arrow.from_m, arrow.from_m + magnification_ * arrow.error_m, colorOf(arrow)});
   const double pitch = space_.pitch_m.minCoeff();
   arrows_.setEdge(theme_->dark ? theme_->text_muted : theme_->text);
   arrows_.setArrows(arrows, kShaftRadius * pitch);
@@ -187,6 +251,7 @@ void FieldScene::updateOverlay() {
   content.title = field_.title.toStdString();
   content.axes = space_;
   content.labels = transmitter_part_.labels();
+  for (const SceneLabel& label : folds_part_.labels()) content.labels.push_back(label);
   const auto exceeds = [this](const FieldArrow& arrow) { return length_mm(arrow) > scale_max_mm_ * (1.0 + 1e-9); };
   const bool exceeded = std::any_of(field_.arrows.begin(), field_.arrows.end(), exceeds);
   const std::string times = "\xC3\x97" + shortNumber(magnification_);
@@ -198,6 +263,7 @@ void FieldScene::updateOverlay() {
     });
     content.scales.push_back({"turn (\xC2\xB0)", maximum, wide, "arcs " + times});
   }
+  if (!legend_shown_) content.scales.clear();
   content.symbols.clear();
   if (std::any_of(field_.arrows.begin(), field_.arrows.end(), [](const FieldArrow& arrow) { return arrow.validation; }))
     content.symbols = {{Symbol::kDot, theme_->text_muted, "fit"}, {Symbol::kSquare, theme_->text, "validation"}};
@@ -212,10 +278,14 @@ std::vector<std::string> FieldScene::describe(std::size_t index) const {
   const QString name = arrow.name.isEmpty() ? QStringLiteral("place %1").arg(arrow.node) : arrow.name;
   const auto millimetres = [](double metres) { return formatLength(metres, LengthUnit::kMillimetre).toStdString(); };
   std::vector<std::string> lines = {name.toStdString() + (arrow.validation ? " (validation)" : ""),
-                                    "error " + millimetres(arrow.error_m.norm())};
+                                    (arrow.better_mm ? "difference " : "error ") + millimetres(arrow.error_m.norm())};
   if (arrow.error_m.allFinite())
     lines.push_back("x " + millimetres(arrow.error_m.x()) + "   y " + millimetres(arrow.error_m.y()) + "   z " +
                     millimetres(arrow.error_m.z()));
+  if (arrow.better_mm)
+    lines.push_back((*arrow.better_mm < 0.0 ? "A is better by " : "B is better by ") +
+                    millimetres(std::abs(*arrow.better_mm) / 1000.0));
+  if (arrow.uncertainty_mm) lines.push_back("SD " + millimetres(*arrow.uncertainty_mm / 1000.0));
   if (arrow.angle_deg) lines.push_back("turn " + shortNumber(*arrow.angle_deg) + "\xC2\xB0");
   return lines;
 }

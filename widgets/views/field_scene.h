@@ -7,6 +7,7 @@
 
 #include "widgets/views/error_field.h"
 #include "widgets/views/room_parts.h"
+#include "widgets/views/volume_parts.h"
 
 namespace fieldtrue {
 
@@ -23,6 +24,13 @@ class FieldScene {
   void setSelected(std::optional<int> node);
   void setHovered(std::optional<int> index);
   void setUnit(LengthUnit unit);
+  void setVolume(const VolumeField& volume);
+  void setSlice(const std::optional<SlicePlane>& plane);
+  void setIso(const std::optional<double>& value_mm);
+  void setHoles(const std::vector<SceneCell>& holes);
+  void setFolds(const std::vector<SceneCell>& cells);
+  void setOpacityRange(const std::optional<OpacityRange>& range);
+  void setLegendShown(bool shown);
   void setStyle(const Theme& theme, double ratio);
 
   const SceneSpace& space() const { return space_; }
@@ -31,7 +39,8 @@ class FieldScene {
   std::vector<std::string> describe(std::size_t index) const;
 
   /// What axis labels and legends take of the picture at each side [logical pixels].
-  static QMargins legendMargins();
+  static QMargins legendMargins(bool legend_shown = true);
+  bool legendShown() const { return legend_shown_; }
 
   void update();
   /// Turns marks and arcs to the camera of the moment.
@@ -41,7 +50,9 @@ class FieldScene {
   void updateArrows();
   void updateMarks();
   void updateArcs(const Eigen::Matrix3d& world_from_view);
+  void updateVolume();
   void updateOverlay();
+  QColor colorOf(const FieldArrow& arrow) const;
   double angleScaleMax_deg() const;
   bool arcsShown() const;
 
@@ -51,6 +62,10 @@ class FieldScene {
   MarkLayer places_, validation_, halo_;
   ArrowLayer arrows_;
   vtkSmartPointer<vtkActor> arcs_;
+  HolePart holes_part_;
+  SlicePart slice_part_;
+  IsoPart iso_part_;
+  FoldPart folds_part_;
   vtkSmartPointer<Overlay> overlay_;
 
   ErrorField field_;
@@ -60,9 +75,15 @@ class FieldScene {
   bool show_orientation_ = false;
   std::optional<double> angle_scale_max_deg_;
   std::optional<int> selected_, hovered_;
+  VolumeField volume_;
+  std::optional<SlicePlane> slice_;
+  std::optional<double> iso_mm_;
+  std::vector<SceneCell> holes_, folds_;
+  std::optional<OpacityRange> opacity_;
+  bool legend_shown_ = true;
   const Theme* theme_ = &Theme::of(false);
   double ratio_ = 1.0;
-  bool changed_ = true, arcs_changed_ = true, overlay_changed_ = true;
+  bool changed_ = true, volume_changed_ = true, arcs_changed_ = true, overlay_changed_ = true;
   Eigen::Matrix3d arcs_view_ = Eigen::Matrix3d::Zero();
 };
 

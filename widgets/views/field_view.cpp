@@ -52,6 +52,41 @@ void FieldView::setLengthUnit(LengthUnit unit) {
   requestRender();
 }
 
+void FieldView::setVolume(const VolumeField& volume) {
+  scene_->setVolume(volume);
+  requestRender();
+}
+
+void FieldView::setSlice(const std::optional<SlicePlane>& plane) {
+  scene_->setSlice(plane);
+  requestRender();
+}
+
+void FieldView::setIso(const std::optional<double>& value_mm) {
+  scene_->setIso(value_mm);
+  requestRender();
+}
+
+void FieldView::setHoles(const std::vector<SceneCell>& holes) {
+  scene_->setHoles(holes);
+  requestRender();
+}
+
+void FieldView::setFolds(const std::vector<SceneCell>& cells) {
+  scene_->setFolds(cells);
+  requestRender();
+}
+
+void FieldView::setOpacityRange(const std::optional<OpacityRange>& range) {
+  scene_->setOpacityRange(range);
+  requestRender();
+}
+
+void FieldView::setLegendShown(bool shown) {
+  scene_->setLegendShown(shown);
+  requestRender();
+}
+
 void FieldView::restyle(double pixel_ratio) { scene_->setStyle(theme(), pixel_ratio); }
 
 void FieldView::prepareFrame() {
@@ -60,7 +95,7 @@ void FieldView::prepareFrame() {
   OrbitView::prepareFrame();
 }
 
-QMargins FieldView::legendMargins() const { return FieldScene::legendMargins(); }
+QMargins FieldView::legendMargins() const { return FieldScene::legendMargins(scene_->legendShown()); }
 
 std::vector<Eigen::Vector3d> FieldView::pickPoints_m() const {
   std::vector<Eigen::Vector3d> points;

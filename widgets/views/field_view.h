@@ -7,6 +7,7 @@
 #include "widgets/views/error_field.h"
 #include "widgets/views/orbit_view.h"
 #include "widgets/views/theme.h"
+#include "widgets/views/volume_field.h"
 
 namespace fieldtrue {
 
@@ -29,6 +30,20 @@ class FieldView : public OrbitView {
   void setAngleScaleMax_deg(double scale_max_deg);
   void setSelected(std::optional<int> node);
   void setLengthUnit(LengthUnit unit);
+  /// A volume to cut and to draw a surface in; an empty one takes both away.
+  void setVolume(const VolumeField& volume);
+  /// Where the volume is cut; none draws no plane.
+  void setSlice(const std::optional<SlicePlane>& plane);
+  /// The value whose surface is drawn [mm]; none draws none.
+  void setIso(const std::optional<double>& value_mm);
+  /// Parts of the region no place is near.
+  void setHoles(const std::vector<SceneCell>& holes);
+  /// Cells in which the map is not one-to-one.
+  void setFolds(const std::vector<SceneCell>& cells);
+  /// Arrows whose SD is known fade with it; none draws all of them opaque.
+  void setOpacityRange(const std::optional<OpacityRange>& range);
+  /// Off where a legend beside the view serves several views.
+  void setLegendShown(bool shown);
 
  signals:
   void nodeClicked(int node);

@@ -214,9 +214,9 @@ void ArrowLayer::place(vtkActor* glyphs, std::span<const Arrow> arrows, double s
   directions->SetName("direction");
   scales->SetName("scale");
   colors->SetName("color");
-  for (vtkDataArray* array :
-       {static_cast<vtkDataArray*>(directions), static_cast<vtkDataArray*>(scales), static_cast<vtkDataArray*>(colors)})
-    array->SetNumberOfComponents(3);
+  directions->SetNumberOfComponents(3);
+  scales->SetNumberOfComponents(3);
+  colors->SetNumberOfComponents(4);
   for (const Arrow& arrow : arrows) {
     const double length = (arrow.to_m - arrow.from_m).norm();
     if (!(length > 0.0)) continue;
@@ -232,7 +232,7 @@ void ArrowLayer::place(vtkActor* glyphs, std::span<const Arrow> arrows, double s
     points->InsertNextPoint(at.data());
     directions->InsertNextTuple(along.data());
     scales->InsertNextTuple3(reach, width, width);
-    colors->InsertNextTuple3(arrow.color.red(), arrow.color.green(), arrow.color.blue());
+    colors->InsertNextTuple4(arrow.color.red(), arrow.color.green(), arrow.color.blue(), arrow.color.alpha());
   }
   vtkNew<vtkPolyData> data;
   data->SetPoints(points);
@@ -246,7 +246,16 @@ void ArrowLayer::place(vtkActor* glyphs, std::span<const Arrow> arrows, double s
 void ArrowLayer::setArrows(std::span<const Arrow> arrows, double shaft_radius_m) {
   place(shaft_, arrows, shaft_radius_m, false, 0.0);
   place(head_, arrows, shaft_radius_m, true, 0.0);
-  const std::span<const Arrow> edged = arrows.size() <= kMostEdged ? arrows : std::span<const Arrow>();
+  const bool translucent =
+      std::any_of(arrows.begin(), arrows.end(), [](const Arrow& arrow) { return arrow.color.alpha() < 255; });
+  for (vtkActor* glyphs : {shaft_.Get(), head_.Get()}) {
+    // Glyphs do not look at the alpha of their colours to tell whether they are translucent.
+    glyphs->SetForceTranslucent(translucent);
+    glyphs->SetForceOpaque(!translucent);
+    glyphs->GetProperty()->SetBackfaceCulling(translucent);
+  }
+  const bool with_edge = arrows.size() <= kMostEdged && !translucent;
+  const std::span<const Arrow> edged = with_edge ? arrows : std::span<const Arrow>();
   place(shaft_edge_, edged, shaft_radius_m, false, kEdgeShare);
   place(head_edge_, edged, shaft_radius_m, true, kEdgeShare);
 }

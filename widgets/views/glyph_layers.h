@@ -51,10 +51,11 @@ class ArrowLayer {
  public:
   struct Arrow {
     Eigen::Vector3d from_m, to_m;
-    QColor color;
+    QColor color;  ///< Its alpha makes the arrow translucent.
   };
 
   explicit ArrowLayer(vtkRenderer* renderer);
+  /// Translucent arrows have no edge, which would show through them.
   /// @param shaft_radius_m of arrows long enough for it; short ones are thinner
   void setArrows(std::span<const Arrow> arrows, double shaft_radius_m);
   void setEdge(const QColor& color);

@@ -16,6 +16,7 @@
 #include <vtkTextProperty.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "calib/core/error.h"
@@ -52,16 +53,14 @@ void setText(vtkTextProperty* text, const QColor& color, bool bold = false) {
 }  // namespace
 
 QColor seriesColor(std::size_t series, const Theme& theme) {
-  switch (series) {
-    case 0:
-      return theme.dark ? QColor(0x84, 0x91, 0x9e) : QColor(0x8b, 0x97, 0xa3);
-    case 1:
-      return theme.accent;
-    case 2:
-      return theme.done;
-    default:
-      return theme.dark ? QColor(0xd0, 0x93, 0xe0) : QColor(0x8a, 0x4a, 0xa0);
-  }
+  if (series == 0) return theme.dark ? QColor(0x84, 0x91, 0x9e) : QColor(0x8b, 0x97, 0xa3);
+  // Neighbours differ in lightness as well as in hue.
+  static const std::array<QRgb, 11> light = {0x0a63c2, 0x13744f, 0xc65a00, 0x8a4aa0, 0x4aa3df, 0x7d6200,
+                                             0xc2407a, 0x3b3f8f, 0x5a9a1e, 0x8c3b1e, 0x2a8f8f};
+  static const std::array<QRgb, 11> dark = {0x5aaeff, 0x4fc78f, 0xf59b4a, 0xd093e0, 0xa8dcff, 0xd8c15a,
+                                            0xff8fbd, 0x9aa0ff, 0xb4e07a, 0xe09a7a, 0x7fdede};
+  const std::size_t k = (series - 1) % light.size();
+  return QColor(theme.dark ? dark[k] : light[k]);
 }
 
 Histogram histogramOf(const std::vector<std::vector<double>>& values_mm) {
@@ -90,9 +89,12 @@ HistogramScene::HistogramScene(vtkRenderer* renderer)
 HistogramScene::~HistogramScene() = default;
 
 void HistogramScene::setSeries(const std::vector<QString>& names, const std::vector<std::vector<double>>& values_mm,
-                               const QString& axis_title) {
-  FT_CHECK(names.size() == values_mm.size());
+                               const QString& axis_title, const std::vector<std::size_t>& colors) {
+  FT_CHECK(names.size() == values_mm.size() && (colors.empty() || colors.size() == names.size()));
   names_ = names;
+  colors_ = colors;
+  if (colors_.empty())
+    for (std::size_t series = 0; series < names.size(); ++series) colors_.push_back(series);
   axis_title_ = axis_title;
   histogram_ = histogramOf(values_mm);
   changed_ = true;
@@ -128,7 +130,7 @@ void HistogramScene::rebuild() {
     vtkPlot* bars = chart_->AddPlot(vtkChart::BAR);
     bars->SetInputData(table, 0, 1);
     bars->SetLabel(names_[series].toStdString());
-    const auto [red, green, blue] = bytes(seriesColor(series, *theme_));
+    const auto [red, green, blue] = bytes(seriesColor(colors_[series], *theme_));
     bars->SetColor(red, green, blue, 255);
     bars->GetPen()->SetLineType(vtkPen::NO_PEN);
   }

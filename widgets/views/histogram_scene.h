@@ -23,7 +23,7 @@ struct Histogram {
 /// Bins of a round width, at most 30, from 0 to the largest value; values that are not finite are left out.
 Histogram histogramOf(const std::vector<std::vector<double>>& values_mm);
 
-/// The colour of the n-th series of every chart: before, after, then further ones.
+/// The colour of the n-th series of every chart: 0 is before correction, then the methods; there are twelve.
 QColor seriesColor(std::size_t series, const Theme& theme);
 
 /// What HistogramView and renderHistogramPicture draw.
@@ -32,8 +32,9 @@ class HistogramScene {
   explicit HistogramScene(vtkRenderer* renderer);
   ~HistogramScene();
 
+  /// @param colors index of each series' colour; by default those of before, after and so on
   void setSeries(const std::vector<QString>& names, const std::vector<std::vector<double>>& values_mm,
-                 const QString& axis_title);
+                 const QString& axis_title, const std::vector<std::size_t>& colors = {});
   void setStyle(const Theme& theme, double ratio);
   void update();
 
@@ -49,6 +50,7 @@ class HistogramScene {
   vtkSmartPointer<vtkContextActor> actor_;
   vtkSmartPointer<vtkChartXY> chart_;
   std::vector<QString> names_;
+  std::vector<std::size_t> colors_;
   QString axis_title_;
   Histogram histogram_;
   const Theme* theme_ = &Theme::of(false);

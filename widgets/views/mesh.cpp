@@ -103,6 +103,24 @@ void Mesh::addArrow(const Eigen::Vector3d& from, const Eigen::Vector3d& to, doub
   addCone(neck, to, kHeadRadius * shaft_radius_m);
 }
 
+void Mesh::addBall(const Eigen::Vector3d& center, double radius_m, int sides) {
+  const int rings = sides / 2;
+  const auto corner = [&](int ring, int side) {
+    const double polar_rad = std::numbers::pi * ring / rings, around_rad = sideAngle_rad(side, sides);
+    const Eigen::Vector3d normal(std::sin(polar_rad) * std::cos(around_rad), std::sin(polar_rad) * std::sin(around_rad),
+                                 std::cos(polar_rad));
+    return Corner{center + radius_m * normal, normal};
+  };
+  for (int ring = 0; ring < rings; ++ring) {
+    for (int side = 0; side < sides; ++side) {
+      const Corner a = corner(ring, side), b = corner(ring, side + 1);
+      const Corner c = corner(ring + 1, side + 1), d = corner(ring + 1, side);
+      if (ring > 0) add(a, d, b);
+      if (ring + 1 < rings) add(b, d, c);
+    }
+  }
+}
+
 void Mesh::addSector(const Eigen::Vector3d& center, const Eigen::Vector3d& u, const Eigen::Vector3d& v, double inner_m,
                      double outer_m, double from_rad, double to_rad, int steps) {
   const Eigen::Vector3d normal = u.cross(v);

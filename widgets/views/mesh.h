@@ -28,6 +28,7 @@ class Mesh {
   void addCone(const Eigen::Vector3d& base, const Eigen::Vector3d& tip, double radius_m, int sides = 20);
   /// A shaft with a head: the head is a fifth of the whole, at most 7 shaft radii.
   void addArrow(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double shaft_radius_m);
+  void addBall(const Eigen::Vector3d& center, double radius_m, int sides = 24);
   /// Part of a flat ring in the plane of the unit vectors u and v.
   void addSector(const Eigen::Vector3d& center, const Eigen::Vector3d& u, const Eigen::Vector3d& v, double inner_m,
                  double outer_m, double from_rad, double to_rad, int steps);

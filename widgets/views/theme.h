@@ -59,6 +59,11 @@ QStringList iconNames();
 /// @source viridis control colours, S. van der Walt and N. Smith 2015
 QColor magnitudeColor(double fraction);
 
+/// Colour of a difference on a diverging scale that colour-blind people tell apart: blue below 0, grey at 0, orange
+/// above.
+/// @param fraction of the scale's end; beyond -1 and 1 clamp; NaN gives a neutral grey
+QColor differenceColor(double fraction);
+
 /// Unit in which places are told to the operator. Errors are always in mm.
 enum class LengthUnit { kMetre, kMillimetre, kFoot, kInch };
 

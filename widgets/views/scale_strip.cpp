@@ -1,0 +1,148 @@
+#include "widgets/views/scale_strip.h"
+
+#include <QPainter>
+#include <algorithm>
+#include <cmath>
+
+#include "widgets/views/field_scene.h"
+#include "widgets/views/overlay.h"
+#include "widgets/views/theme.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr int kHeight = 44;
+constexpr int kMargin = 12;
+constexpr int kGap = 24;
+constexpr int kBarTop = 8;
+constexpr int kBarHeight = 12;
+constexpr int kOpacityWidth = 96;
+constexpr int kWidestBar = 420;
+
+QString number(double value) { return QString::fromStdString(shortNumber(value)); }
+
+}  // namespace
+
+ScaleStrip::ScaleStrip(QWidget* parent) : QWidget(parent) {
+  setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Fixed);
+  setAccessibleName(tr("Legend"));
+  changed();
+}
+
+void ScaleStrip::setScale(Scale scale, double maximum_mm, bool exceeded) {
+  scale_ = scale;
+  maximum_mm_ = maximum_mm;
+  exceeded_ = exceeded;
+  changed();
+}
+
+void ScaleStrip::setEnds(const QString& low_name, const QString& high_name) {
+  low_name_ = low_name;
+  high_name_ = high_name;
+  changed();
+}
+
+void ScaleStrip::setMagnification(double magnification) {
+  magnification_ = magnification;
+  changed();
+}
+
+void ScaleStrip::setOpacityRange(const std::optional<OpacityRange>& range) {
+  opacity_ = range;
+  changed();
+}
+
+void ScaleStrip::changed() {
+  setAccessibleDescription(text());
+  setToolTip(text());
+  update();
+}
+
+QString ScaleStrip::text() const {
+  const QString more = exceeded_ ? tr(" and more") : QString();
+  QString words = scale_ == Scale::kMagnitude ? tr("Colours: error from 0 to %1 mm%2.").arg(number(maximum_mm_), more)
+                                              : tr("Colours: from %1 better by %3 mm to %2 better by %3 mm%4.")
+                                                    .arg(low_name_, high_name_, number(maximum_mm_), more);
+  words += tr(" Arrows are drawn %1 times as long as they are.").arg(number(magnification_));
+  if (opacity_)
+    words += tr(" Faint arrows are uncertain: full colour up to an SD of %1 mm, faintest from %2 mm.")
+                 .arg(number(opacity_->opaque_mm), number(opacity_->faint_mm));
+  return words;
+}
+
+QSize ScaleStrip::sizeHint() const { return {600, kHeight}; }
+QSize ScaleStrip::minimumSizeHint() const { return {280, kHeight}; }
+
+int ScaleStrip::paintColors(QPainter& painter, int left, int width) const {
+  const Theme& colors = theme();
+  const bool difference = scale_ == Scale::kDifference;
+  const QString title = difference ? tr("difference (mm)") : tr("error (mm)");
+  QFont bold = painter.font();
+  bold.setBold(true);
+  painter.setFont(bold);
+  painter.setPen(colors.text);
+  const int title_width = painter.fontMetrics().horizontalAdvance(title);
+  painter.drawText(QRect(left, kBarTop - 3, title_width, kBarHeight + 6), Qt::AlignVCenter, title);
+  bold.setBold(false);
+  painter.setFont(bold);
+  const int bar_left = left + title_width + 16;
+  const int bar = std::max(60, std::min(kWidestBar, width - title_width - 32));
+  for (int x = 0; x < bar; ++x) {
+    const double share = (x + 0.5) / bar;
+    painter.fillRect(bar_left + x, kBarTop, 1, kBarHeight,
+                     difference ? differenceColor(2.0 * share - 1.0) : magnitudeColor(share));
+  }
+  painter.setPen(colors.line);
+  painter.drawRect(bar_left, kBarTop, bar - 1, kBarHeight - 1);
+  const auto tick = [&](double share, const QString& label) {
+    const int x = bar_left + static_cast<int>(share * (bar - 1));
+    painter.setPen(colors.text_muted);
+    painter.drawLine(x, kBarTop + kBarHeight, x, kBarTop + kBarHeight + 3);
+    painter.setPen(colors.text);
+    painter.drawText(QRect(x - 60, kBarTop + kBarHeight + 3, 120, 18), Qt::AlignHCenter | Qt::AlignTop, label);
+  };
+  const QString plus = exceeded_ ? QStringLiteral("+") : QString();
+  if (difference) {
+    tick(0.0, number(maximum_mm_) + plus);
+    tick(0.5, QStringLiteral("0"));
+    tick(1.0, number(maximum_mm_) + plus);
+    painter.setPen(colors.text_muted);
+    const QRect below(bar_left + 24, kBarTop + kBarHeight + 3, bar - 48, 18);
+    painter.drawText(below, Qt::AlignLeft, QStringLiteral("  ") + low_name_);
+    painter.drawText(below, Qt::AlignRight, high_name_ + QStringLiteral("  "));
+  } else {
+    for (const double value : scaleTicks(maximum_mm_))
+      tick(value / maximum_mm_, number(value) + (value == maximum_mm_ ? plus : QString()));
+  }
+  return bar_left + bar;
+}
+
+void ScaleStrip::paintOpacity(QPainter& painter, int left, int width) const {
+  const Theme& colors = theme();
+  for (int x = 0; x < width; ++x) {
+    const double uncertainty_mm =
+        opacity_->opaque_mm + (opacity_->faint_mm - opacity_->opaque_mm) * x / static_cast<double>(width);
+    QColor color = colors.text;
+    color.setAlpha(static_cast<int>(std::lround(255.0 * opacityOf(uncertainty_mm, *opacity_))));
+    painter.fillRect(left + x, kBarTop, 1, kBarHeight, color);
+  }
+  painter.setPen(colors.text);
+  painter.drawText(QRect(left - 10, kBarTop + kBarHeight + 3, width + 20, 18), Qt::AlignHCenter | Qt::AlignTop,
+                   tr("SD %1 to %2 mm").arg(number(opacity_->opaque_mm), number(opacity_->faint_mm)));
+}
+
+void ScaleStrip::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  const Theme& colors = theme();
+  painter.fillRect(rect(), colors.surface);
+  const QString arrows = tr("arrows \u00d7%1").arg(number(magnification_));
+  const int arrows_width = painter.fontMetrics().horizontalAdvance(arrows);
+  const int right = width() - kMargin - arrows_width;
+  painter.setPen(colors.text);
+  painter.drawText(QRect(right, kBarTop - 3, arrows_width, kBarHeight + 6), Qt::AlignVCenter, arrows);
+  const int opacity_room = opacity_ ? kOpacityWidth + kGap + 16 : 0;
+  const int bar_end = paintColors(painter, kMargin, right - kGap - opacity_room - kMargin);
+  if (opacity_) paintOpacity(painter, bar_end + kGap + 8, kOpacityWidth);
+}
+
+}  // namespace fieldtrue
