@@ -11,14 +11,28 @@
 #include "calib/correctors/registry.h"
 
 #include "calib/correctors/affine.h"
+#include "calib/correctors/automatic.h"
+#include "calib/correctors/bspline.h"
+#include "calib/correctors/gaussian_process.h"
+#include "calib/correctors/hexahedral_shape.h"
 #include "calib/correctors/hmq.h"
 #include "calib/correctors/hmq_matrix.h"
+#include "calib/correctors/local_briggs.h"
+#include "calib/correctors/local_bump.h"
+#include "calib/correctors/local_kindratenko.h"
+#include "calib/correctors/local_linear.h"
+#include "calib/correctors/local_quaternion.h"
 #include "calib/correctors/none.h"
 #include "calib/correctors/orientation_none.h"
 #include "calib/correctors/orientation_rigid.h"
 #include "calib/correctors/polynomial.h"
 #include "calib/correctors/polynomial_quaternion.h"
+#include "calib/correctors/rbf.h"
 #include "calib/correctors/rigid.h"
+#include "calib/correctors/slerp_trilinear.h"
+#include "calib/correctors/tetrahedral.h"
+#include "calib/correctors/tetrahedral_quaternion.h"
+#include "calib/correctors/trilinear.h"
 
 namespace fieldtrue {
 namespace {
@@ -37,14 +51,24 @@ Result<const CorrectionMethod<Model>*> findMethod(std::span<const CorrectionMeth
 }  // namespace
 
 std::span<const PositionMethod> positionMethods() {
-  static const std::vector<PositionMethod> methods = {nonePosition(), rigidPosition(), affinePosition(),
-                                                      polynomialPosition(), hmqPosition()};
+  static const std::vector<PositionMethod> methods = {
+      nonePosition(),        rigidPosition(),           affinePosition(),
+      trilinearPosition(),   hexahedralShapePosition(), tetrahedralPosition(),
+      localLinearPosition(), localBumpPosition(),       localKindratenkoPosition(),
+      localBriggsPosition(), polynomialPosition(),      hmqPosition(),
+      rbfPosition(),         gaussianProcessPosition(), bsplinePosition(),
+      automaticPosition()};
   return methods;
 }
 
 std::span<const OrientationMethod> orientationMethods() {
-  static const std::vector<OrientationMethod> methods = {noneOrientation(), rigidOrientation(),
-                                                         polynomialQuaternionOrientation(), hmqMatrixOrientation()};
+  static const std::vector<OrientationMethod> methods = {noneOrientation(),
+                                                         rigidOrientation(),
+                                                         slerpTrilinearOrientation(),
+                                                         tetrahedralQuaternionOrientation(),
+                                                         localQuaternionOrientation(),
+                                                         polynomialQuaternionOrientation(),
+                                                         hmqMatrixOrientation()};
   return methods;
 }
 

@@ -49,8 +49,22 @@ struct Recovery {
   bool everywhere = true;
 };
 const std::map<std::string, Recovery> kPositionRecoveries = {
-    {"none", {nothing_m}},     {"rigid", {rigid_m}},      {"affine", {affine_m}},
-    {"polynomial", {cubic_m}}, {"hmq", {cubic_m, false}},
+    {"none", {nothing_m}},
+    {"rigid", {rigid_m}},
+    {"affine", {affine_m}},
+    {"polynomial", {cubic_m}},
+    {"hmq", {cubic_m, false}},
+    {"trilinear", {cubic_m, false}},
+    {"hexahedral_shape", {cubic_m, false}},
+    {"tetrahedral", {cubic_m, false}},
+    {"local_linear", {cubic_m, false}},
+    {"local_bump", {cubic_m, false}},
+    {"local_kindratenko", {cubic_m, false}},
+    {"local_briggs", {cubic_m, false}},
+    {"rbf", {affine_m}},
+    {"gaussian_process", {affine_m}},
+    {"bspline", {affine_m}},
+    {"auto", {cubic_m}},
 };
 
 struct RotationRecovery {
@@ -62,11 +76,19 @@ const std::map<std::string, RotationRecovery> kOrientationRecoveries = {
     {"rigid", {constantError}},
     {"polynomial_quaternion", {quadraticVectorPart}},
     {"hmq_matrix", {smoothError, false}},
+    {"slerp_trilinear", {smoothError, false}},
+    {"tetrahedral_quaternion", {smoothError, false}},
+    {"local_quaternion", {smoothError, false}},
 };
 
-std::vector<Eigen::Vector3d> usualPlaces() { return shakenGrid({5, 5, 4}, 0.2, 0.02); }
+/// Methods that ask for a rectilinear grid in tracked space.
+const std::set<std::string> kNeedTrackedGrid = {"trilinear", "local_briggs"};
 
-FitData usualData() { return fitDataOf(usualPlaces(), cubic_m, smoothError); }
+std::vector<Eigen::Vector3d> usualPlaces(const std::string& id = {}) {
+  return shakenGrid({5, 5, 4}, 0.2, kNeedTrackedGrid.contains(id) ? 0.0 : 0.02);
+}
+
+FitData usualData(const std::string& id = {}) { return fitDataOf(usualPlaces(id), cubic_m, smoothError); }
 
 /// Bad data by name, and the codes a method may answer with. No code at all: it must fit and stay finite.
 struct BadCase {
@@ -165,7 +187,7 @@ class CorrectorContractTest : public QObject {
   void positionRecovers() {
     QFETCH(QString, id);
     const Recovery& recovery = kPositionRecoveries.at(id.toStdString());
-    const FitData data = fitDataOf(usualPlaces(), recovery.displacement_m);
+    const FitData data = fitDataOf(usualPlaces(id.toStdString()), recovery.displacement_m);
     const auto model = fitPosition(id.toStdString(), data);
     FT_VERIFY_OK(model);
     for (const Eigen::Vector3d& p_m : recovery.everywhere ? randomPoints(200) : data.p_tracked_m)
@@ -191,8 +213,8 @@ class CorrectorContractTest : public QObject {
   void positionIsTheSameTwiceAndAfterReloading_data() { addPositionRows(); }
   void positionIsTheSameTwiceAndAfterReloading() {
     QFETCH(QString, id);
-    const auto first = fitPosition(id.toStdString(), usualData());
-    const auto second = fitPosition(id.toStdString(), usualData());
+    const auto first = fitPosition(id.toStdString(), usualData(id.toStdString()));
+    const auto second = fitPosition(id.toStdString(), usualData(id.toStdString()));
     FT_VERIFY_OK(first);
     FT_VERIFY_OK(second);
     QVERIFY((*first)->parameters() == (*second)->parameters());
@@ -230,7 +252,7 @@ class CorrectorContractTest : public QObject {
   void batchAndJacobianAgreeWithTheDisplacement_data() { addPositionRows(); }
   void batchAndJacobianAgreeWithTheDisplacement() {
     QFETCH(QString, id);
-    const auto model = fitPosition(id.toStdString(), usualData());
+    const auto model = fitPosition(id.toStdString(), usualData(id.toStdString()));
     FT_VERIFY_OK(model);
     const std::vector<Eigen::Vector3d> points_m = randomPoints(1000);
     std::vector<Eigen::Vector3d> apart_m(points_m.size());
@@ -252,7 +274,7 @@ class CorrectorContractTest : public QObject {
   void resultsAreFinite_data() { addPositionRows(); }
   void resultsAreFinite() {
     QFETCH(QString, id);
-    const auto model = fitPosition(id.toStdString(), usualData());
+    const auto model = fitPosition(id.toStdString(), usualData(id.toStdString()));
     FT_VERIFY_OK(model);
     for (const double far_m : {0.0, 1.0, 1e3, 1e6}) {
       QVERIFY((*model)->displacement_m({far_m, -far_m, 0.5 * far_m}).allFinite());
@@ -317,7 +339,7 @@ class CorrectorContractTest : public QObject {
   void damagedParametersAreRefused() {
     for (const PositionMethod& method : positionMethods()) {
       if (method.id == "none") continue;
-      const nlohmann::json whole = fitPosition(method.id, usualData()).value()->parameters();
+      const nlohmann::json whole = fitPosition(method.id, usualData(method.id)).value()->parameters();
       for (const auto& [key, value] : whole.items()) {
         nlohmann::json damaged = whole;
         damaged.erase(key);
