@@ -1,5 +1,7 @@
 #include "calib/evaluation/candidate.h"
 
+#include <algorithm>
+
 namespace fieldtrue {
 namespace {
 
@@ -48,23 +50,44 @@ double evaluateOnce(const OrientationModel& model, const Pose& tracked) {
 }
 
 template <class Model>
+FittedCandidate fittedCandidate(std::unique_ptr<Model> owned) {
+  const std::shared_ptr<const Model> model = std::move(owned);
+  return {[model](const Node& node, const Alignment& alignment) { return scoreOf(*model, node, alignment); },
+          [model](const Node& node) {
+            return model->covers(node.tracker_from_sensor.position_m) ? evaluateOnce(*model, node.tracker_from_sensor)
+                                                                      : 0.0;
+          },
+          model->note()};
+}
+
+template <class Model>
+FitWithout fitWithout(std::unique_ptr<HoldOutFits<Model>> owned) {
+  const std::shared_ptr<const HoldOutFits<Model>> fits = std::move(owned);
+  return [fits](std::span<const std::size_t> rows, const Pose& fold_from_data) {
+    return fits->without(rows, fold_from_data).map(fittedCandidate<Model>);
+  };
+}
+
+bool isAuto(const SettingValue& value) {
+  const auto* text = std::get_if<std::string>(&value);
+  return text != nullptr && *text == "auto";
+}
+
+template <class Model>
 Candidate makeCandidate(const CorrectionMethod<Model>& method, Settings settings) {
   Candidate candidate;
   candidate.id = method.id;
   candidate.settings = settings;
   candidate.is_position = std::is_same_v<Model, PositionModel>;
-  candidate.fit = [&method, settings = std::move(settings)](const FitData& data,
-                                                            const RunControl& control) -> Result<FittedCandidate> {
-    auto fitted = method.fit(data, settings, control);
-    if (!fitted) return tl::unexpected(fitted.error());
-    const std::shared_ptr<const Model> model = *std::move(fitted);
-    return FittedCandidate{
-        [model](const Node& node, const Alignment& alignment) { return scoreOf(*model, node, alignment); },
-        [model](const Node& node) {
-          return model->covers(node.tracker_from_sensor.position_m) ? evaluateOnce(*model, node.tracker_from_sensor)
-                                                                    : 0.0;
-        },
-        model->note()};
+  candidate.most_folds = method.most_folds;
+  candidate.chooses_settings =
+      std::any_of(settings.begin(), settings.end(), [](const auto& setting) { return isAuto(setting.second); });
+  if (method.hold_out)
+    candidate.hold_out = [&method, settings](const FitData& data, const RunControl& control) {
+      return method.hold_out(data, settings, control).map(fitWithout<Model>);
+    };
+  candidate.fit = [&method, settings = std::move(settings)](const FitData& data, const RunControl& control) {
+    return method.fit(data, settings, control).map(fittedCandidate<Model>);
   };
   return candidate;
 }

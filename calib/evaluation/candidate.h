@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "calib/core/run_control.h"
@@ -24,12 +25,19 @@ struct FittedCandidate {
   std::string note;
 };
 
+/// Fits of one candidate that leave rows out. @see HoldOutFits
+using FitWithout =
+    std::function<Result<FittedCandidate>(std::span<const std::size_t> rows, const Pose& fold_from_data)>;
+
 /// A method with its settings, of either kind.
 struct Candidate {
   std::string id;
   Settings settings;
   bool is_position = true;
   std::function<Result<FittedCandidate>(const FitData&, const RunControl&)> fit;
+  std::function<Result<FitWithout>(const FitData&, const RunControl&)> hold_out;  ///< Empty without a closed form.
+  int most_folds = 0;                                                             ///< @see CorrectionMethod::most_folds
+  bool chooses_settings = false;  ///< One of its settings is found from the data it is fitted to.
 };
 
 /// The candidates that texts name; all of the registry with default settings when there are none.

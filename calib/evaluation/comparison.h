@@ -95,7 +95,7 @@ struct Verdict {
   double gain_without_worst_place = 0;
   GainTest position;     ///< Of the best position method.
   GainTest orientation;  ///< Of the best orientation method.
-  /// Held-out RMS of the best position method, or of the error before where nothing beats it, over the places that have
+  /// Held-out RMS of what the verdict recommends (the best position method, or no correction) over the places that have
   /// others on all sides, and over the outermost ones; none where there are no such places.
   std::optional<double> inside_mm;
   std::optional<double> edge_mm;
@@ -111,6 +111,16 @@ struct Trueness {
   double after_position_mm = 0;                  ///< Of the best position method; as before where nothing beats it.
   std::optional<double> before_orientation_deg;  ///< None without orientation.
   std::optional<double> after_orientation_deg;
+};
+
+/// What bringing the measured errors to other positions costs by itself, by leaving each place out in turn; the other
+/// places stand twice as far as for a node between them.
+struct ResamplingError {
+  std::string method;         ///< Id of a RegridMethod.
+  double rms_mm = 0;          ///< Over the places with support.
+  int n_scored = 0;           ///< Places with support.
+  int n_without_support = 0;  ///< Not extrapolated.
+  double excess_mm = 0;       ///< Above the noise floor.
 };
 
 /// sqrt(max(0, rms^2 - floor^2)).
@@ -141,6 +151,7 @@ struct Comparison {
   std::optional<Coverage> coverage;   ///< These need ComparisonOptions::with_surroundings.
   std::optional<FoldBack> fold_back;  ///< With the best position method fitted to all rows it may see.
   std::optional<OrientationDependence> orientation_dependence;  ///< None without orientation.
+  std::vector<ResamplingError> resampling;                      ///< Empty for places in one plane.
   std::vector<std::string> notes;                               ///< E.g. that the nodes lie in one plane.
 };
 

@@ -20,6 +20,8 @@ json statsToJson(const ErrorStats& stats) {
 /// What cannot be stated is null, never absent and never zero.
 json nullUnless(bool stated, const json& value) { return stated ? value : json(nullptr); }
 
+json optionalToJson(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
+
 json scoreToJson(const MethodScore& score, const char* stats_key, bool is_position) {
   const bool used = !score.skipped;
   json to = {{"method", score.method},
@@ -29,6 +31,11 @@ json scoreToJson(const MethodScore& score, const char* stats_key, bool is_positi
              {"fit_s", nullUnless(used, score.fit_s)},
              {"eval_ns", nullUnless(used, score.eval_ns)},
              {is_position ? "in_sample_rms_mm" : "in_sample_rms_deg", nullUnless(used, score.in_sample_rms)},
+             {"rms_to_best", nullUnless(used, score.rms_to_best)},
+             {"rms_to_best_low90", nullUnless(used, score.rms_to_best_low90)},
+             {"rms_to_best_high90", nullUnless(used, score.rms_to_best_high90)},
+             {"n_folds", nullUnless(used, score.n_folds)},
+             {"closed_form", nullUnless(used, score.closed_form)},
              {"notes", score.notes},
              {"skipped", nullUnless(!used, score.skipped.value_or(""))}};
   if (is_position) to["rms_common_mm"] = nullUnless(used, score.rms_common_mm);
@@ -52,7 +59,41 @@ json verdictToJson(const Verdict& verdict) {
           {"gain_without_worst_place", verdict.gain_without_worst_place},
           {"position", testToJson(verdict.position)},
           {"orientation", testToJson(verdict.orientation)},
+          {"inside_mm", optionalToJson(verdict.inside_mm)},
+          {"edge_mm", optionalToJson(verdict.edge_mm)},
+          {"worst_place", nullUnless(verdict.worst_node >= 0, verdict.worst_node)},
+          {"worst_mm", nullUnless(verdict.worst_node >= 0, verdict.worst_mm)},
+          {"limited_by", nullUnless(!verdict.limited_by.empty(), verdict.limited_by)},
           {"text", verdict.text}};
+}
+
+/// Systematic error apart from the floor; null where no floor is stated, because then nothing is known apart.
+json truenessToJson(const Comparison& comparison) {
+  const Trueness& trueness = comparison.trueness;
+  const bool position = comparison.floor_position_mm > 0.0;
+  const bool orientation = comparison.floor_orientation_deg > 0.0;
+  return {{"before",
+           {{"position_mm", nullUnless(position, trueness.before_position_mm)},
+            {"orientation_deg", nullUnless(orientation, optionalToJson(trueness.before_orientation_deg))}}},
+          {"after",
+           {{"position_mm", nullUnless(position, trueness.after_position_mm)},
+            {"orientation_deg", nullUnless(orientation, optionalToJson(trueness.after_orientation_deg))}}}};
+}
+
+json resamplingToJson(const std::vector<ResamplingError>& errors) {
+  json list = json::array();
+  for (const ResamplingError& error : errors)
+    list.push_back({{"method", error.method},
+                    {"rms_mm", nullUnless(error.n_scored > 0, error.rms_mm)},
+                    {"excess_mm", nullUnless(error.n_scored > 0, error.excess_mm)},
+                    {"n_scored", error.n_scored},
+                    {"n_without_support", error.n_without_support}});
+  return list;
+}
+
+template <class Part>
+json partToJson(const std::optional<Part>& part) {
+  return part ? toJson(*part) : json(nullptr);
 }
 
 }  // namespace
@@ -81,6 +122,11 @@ json toJson(const Comparison& comparison) {
           {"orientation", std::move(orientation)},
           {"best", {{"position", comparison.best_position}, {"orientation", comparison.best_orientation}}},
           {"verdict", verdictToJson(comparison.verdict)},
+          {"trueness", truenessToJson(comparison)},
+          {"coverage", partToJson(comparison.coverage)},
+          {"fold_back", partToJson(comparison.fold_back)},
+          {"orientation_dependence", partToJson(comparison.orientation_dependence)},
+          {"resampling", resamplingToJson(comparison.resampling)},
           {"notes", comparison.notes}};
 }
 

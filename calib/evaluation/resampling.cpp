@@ -63,6 +63,24 @@ PairedGain pairedGain(std::span<const double> before, std::span<const double> af
   return {gain_of(all), interval.low, interval.high};
 }
 
+PairedDifference pairedDifference(std::span<const double> errors, std::span<const double> of_best, std::uint64_t seed) {
+  FT_CHECK(errors.size() == of_best.size() && !errors.empty());
+  const auto difference_of = [&](std::span<const std::size_t> drawn) {
+    double squares = 0.0;
+    double best_squares = 0.0;
+    for (const std::size_t i : drawn) {
+      squares += errors[i] * errors[i];
+      best_squares += of_best[i] * of_best[i];
+    }
+    const auto n = static_cast<double>(drawn.size());
+    return std::sqrt(squares / n) - std::sqrt(best_squares / n);
+  };
+  std::vector<std::size_t> all(errors.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const Interval interval = bootstrapInterval90(errors.size(), seed, difference_of);
+  return {difference_of(all), interval.low, interval.high};
+}
+
 std::size_t worstPlace(std::span<const double> before, std::span<const double> after) {
   FT_CHECK(before.size() == after.size() && !before.empty());
   const double before_squares = std::inner_product(before.begin(), before.end(), before.begin(), 0.0);

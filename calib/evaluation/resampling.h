@@ -42,6 +42,16 @@ struct PairedGain {
 /// @param before, after errors of the same places, same order and unit
 PairedGain pairedGain(std::span<const double> before, std::span<const double> after, std::uint64_t seed);
 
+/// RMS of one method minus that of another on the same places, with its paired 90 % interval.
+struct PairedDifference {
+  double difference = 0.0;
+  double low90 = 0.0;
+  double high90 = 0.0;
+};
+
+/// @param errors, of_best of the same places, same order and unit
+PairedDifference pairedDifference(std::span<const double> errors, std::span<const double> of_best, std::uint64_t seed);
+
 /// The place whose removal lowers the gain most.
 std::size_t worstPlace(std::span<const double> before, std::span<const double> after);
 

@@ -1,11 +1,10 @@
 #include "calib/evaluation/verdict.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 
 #include "calib/correctors/method_text.h"
+#include "calib/evaluation/figures.h"
 #include "calib/evaluation/resampling.h"
 
 namespace fieldtrue {
@@ -15,20 +14,6 @@ constexpr double kNeededGain = 0.10;
 constexpr std::size_t kFewestPlaces = 3;
 /// Differences of the last bits are not a win: a millionth of a millimetre or of a degree.
 constexpr double kTie = 1e-6;
-
-/// Independent of the locale, which a desktop program sets and which may write a decimal comma.
-std::string fixedText(double value, int decimals) {
-  std::array<char, 64> buffer;
-  const auto written =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::fixed, decimals);
-  return written.ec == std::errc() ? std::string(buffer.data(), written.ptr) : std::string("?");
-}
-
-std::string errorText(double value) {
-  return fixedText(value, value >= 9.95 ? (value >= 99.5 ? 0 : 1) : (value >= 0.0995 ? 2 : 4));
-}
-
-std::string percentText(double fraction) { return fixedText(100.0 * fraction, std::abs(fraction) < 0.2 ? 1 : 0); }
 
 /// The id; with its settings where the same method was tried with several.
 std::string nameOf(const std::vector<MethodScore>& scores, std::size_t row) {
@@ -47,6 +32,23 @@ std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, doubl
     best = row;
   }
   return best;
+}
+
+/// Fills in each method's RMS minus that of the best, or of the least wrong where none beats the error before, with
+/// the interval over the same resampled places.
+void tellDistanceToBest(std::vector<MethodScore>& scores, std::optional<std::size_t> best_row, std::uint64_t seed,
+                        const RunControl& control) {
+  const auto best = best_row ? best_row : bestRow(scores, HUGE_VAL);
+  if (!best) return;
+  const std::vector<double> of_best = scores[*best].place_errors;
+  control.parallel_for(scores.size(), [&](std::size_t row) {
+    MethodScore& score = scores[row];
+    if (score.skipped || control.stop.stop_requested()) return;
+    const PairedDifference difference = pairedDifference(score.place_errors, of_best, seed);
+    score.rms_to_best = difference.difference;
+    score.rms_to_best_low90 = difference.low90;
+    score.rms_to_best_high90 = difference.high90;
+  });
 }
 
 std::string intervalText(const GainTest& test) {
@@ -87,6 +89,17 @@ std::string positionText(const Comparison& comparison, const std::string& do_not
          whyNot(test, n_places);
 }
 
+/// "; expect 1.2 mm inside the region and 3.4 mm near its edge, 5.6 mm at worst (place 17), limited by ..."
+std::string expectationText(const Comparison& comparison) {
+  const Verdict& verdict = comparison.verdict;
+  if (verdict.worst_node < 0) return {};
+  std::string text = "; expect ";
+  if (verdict.inside_mm) text += errorText(*verdict.inside_mm) + " mm inside the region";
+  if (verdict.edge_mm) text += (verdict.inside_mm ? " and " : "") + errorText(*verdict.edge_mm) + " mm near its edge";
+  text += ", " + errorText(verdict.worst_mm) + " mm at worst (place " + std::to_string(verdict.worst_node) + ")";
+  return verdict.limited_by.empty() ? text : text + ", limited by " + verdict.limited_by;
+}
+
 std::string orientationText(const Comparison& comparison) {
   if (!comparison.before_orientation_deg) return {};
   const GainTest& test = comparison.verdict.orientation;
@@ -124,21 +137,34 @@ GainTest testGain(const std::vector<int>& places, const std::vector<double>& bef
   return test;
 }
 
-void judge(Comparison& comparison, std::uint64_t seed) {
+double excessError(double rms, double floor) { return std::sqrt(std::max(0.0, rms * rms - floor * floor)); }
+
+void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& control) {
   Verdict& verdict = comparison.verdict;
+  Trueness& trueness = comparison.trueness;
   comparison.best_position_row = bestRow(comparison.position, comparison.before_position_mm.rms);
+  trueness.before_position_mm = excessError(comparison.before_position_mm.rms, comparison.floor_position_mm);
+  trueness.after_position_mm = trueness.before_position_mm;
   if (const auto row = comparison.best_position_row) {
-    comparison.best_position = comparison.position[*row].method;
-    verdict.position =
-        testGain(comparison.places, comparison.before_place_mm, comparison.position[*row].place_errors, seed);
+    const MethodScore& best = comparison.position[*row];
+    comparison.best_position = best.method;
+    verdict.position = testGain(comparison.places, comparison.before_place_mm, best.place_errors, seed);
+    trueness.after_position_mm = excessError(best.stats.rms, comparison.floor_position_mm);
   }
-  if (comparison.before_orientation_deg)
+  if (comparison.before_orientation_deg) {
     comparison.best_orientation_row = bestRow(comparison.orientation, comparison.before_orientation_deg->rms);
-  if (const auto row = comparison.best_orientation_row) {
-    comparison.best_orientation = comparison.orientation[*row].method;
-    verdict.orientation =
-        testGain(comparison.places, comparison.before_place_deg, comparison.orientation[*row].place_errors, seed);
+    trueness.before_orientation_deg =
+        excessError(comparison.before_orientation_deg->rms, comparison.floor_orientation_deg);
+    trueness.after_orientation_deg = trueness.before_orientation_deg;
   }
+  if (const auto row = comparison.best_orientation_row) {
+    const MethodScore& best = comparison.orientation[*row];
+    comparison.best_orientation = best.method;
+    verdict.orientation = testGain(comparison.places, comparison.before_place_deg, best.place_errors, seed);
+    trueness.after_orientation_deg = excessError(best.stats.rms, comparison.floor_orientation_deg);
+  }
+  tellDistanceToBest(comparison.position, comparison.best_position_row, seed, control);
+  tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, seed, control);
   verdict.apply_position = verdict.position.apply;
   verdict.apply_orientation = verdict.orientation.apply;
   verdict.gain_low90 = verdict.position.low90;
@@ -146,9 +172,14 @@ void judge(Comparison& comparison, std::uint64_t seed) {
   verdict.gain_without_worst_place = verdict.position.gain_without_worst_place;
   if (comparison.before_position_mm.rms <= comparison.floor_position_mm)
     comparison.notes.push_back("The position error before correction is no larger than noise and jig tolerance make.");
+}
+
+void writeVerdictText(Comparison& comparison) {
+  Verdict& verdict = comparison.verdict;
   const std::string do_not_apply =
       verdict.apply_orientation ? "Do not apply a position correction: " : "Do not apply: ";
-  verdict.text = positionText(comparison, do_not_apply) + orientationText(comparison) + ".";
+  verdict.text =
+      positionText(comparison, do_not_apply) + expectationText(comparison) + orientationText(comparison) + ".";
 }
 
 }  // namespace fieldtrue

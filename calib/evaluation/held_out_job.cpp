@@ -1,0 +1,71 @@
+#include <algorithm>
+#include <numeric>
+
+#include "calib/evaluation/held_out.h"
+
+namespace fieldtrue {
+namespace {
+
+Result<std::vector<Candidate>> candidatesOf(const ComparisonOptions& options) {
+  auto position = positionCandidates(options.position_methods);
+  if (!position) return tl::unexpected(position.error());
+  auto orientation = orientationCandidates(options.orientation_methods);
+  if (!orientation) return tl::unexpected(orientation.error());
+  std::vector<Candidate> candidates = *std::move(position);
+  std::move(orientation->begin(), orientation->end(), std::back_inserter(candidates));
+  return candidates;
+}
+
+}  // namespace
+
+Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOptions& options) {
+  HeldOutJob job;
+  job.metadata = table.metadata;
+  job.seed = options.seed;
+  std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(job.nodes),
+               [](const Node& node) { return node.role != NodeRole::kSkipped; });
+  if (job.nodes.empty())
+    return fail(ErrorCode::kTooFewNodes, table.nodes.empty()
+                                             ? "The table has no rows to compare methods on"
+                                             : "Every row of the table is skipped; nothing is left to compare");
+  auto candidates = candidatesOf(options);
+  if (!candidates) return tl::unexpected(candidates.error());
+  job.candidates = *std::move(candidates);
+  job.validation = options.validation.value_or(defaultValidation(table));
+  job.align = options.align.value_or(defaultAlignMode(table.metadata));
+  job.has_orientation =
+      std::all_of(job.nodes.begin(), job.nodes.end(), [](const Node& node) { return node.has_orientation; });
+  auto folds = makeFolds(job.nodes, job.validation, options.seed);
+  if (!folds) return tl::unexpected(folds.error());
+  job.folds = *std::move(folds);
+  if (job.validation.kind == ValidationKind::kRole) {
+    job.fitted = job.folds.front().fitted;
+  } else {
+    job.fitted.resize(job.nodes.size());
+    std::iota(job.fitted.begin(), job.fitted.end(), std::size_t{0});
+  }
+  for (const Fold& fold : job.folds) job.scored.insert(job.scored.end(), fold.scored.begin(), fold.scored.end());
+  std::sort(job.scored.begin(), job.scored.end());
+  return job;
+}
+
+std::vector<Node> rowsOf(const HeldOutJob& job, std::span<const std::size_t> rows) {
+  std::vector<Node> nodes;
+  nodes.reserve(rows.size());
+  for (const std::size_t row : rows) nodes.push_back(job.nodes[row]);
+  return nodes;
+}
+
+Result<Alignment> alignmentOf(const HeldOutJob& job, std::span<const Node> nodes) {
+  return job.align == AlignMode::kRigid ? fitAlignment(nodes) : Result<Alignment>(Alignment{});
+}
+
+std::vector<RowScore> scoreRows(std::span<const Node> nodes, const Alignment& alignment,
+                                const std::function<RowScore(const Node&, const Alignment&)>& score) {
+  std::vector<RowScore> scores;
+  scores.reserve(nodes.size());
+  for (const Node& node : nodes) scores.push_back(score(node, alignment));
+  return scores;
+}
+
+}  // namespace fieldtrue

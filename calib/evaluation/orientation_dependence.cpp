@@ -1,0 +1,104 @@
+#include "calib/evaluation/orientation_dependence.h"
+
+#include <nlohmann/json.hpp>
+
+#include "calib/evaluation/figures.h"
+#include "calib/evaluation/orientation_rows.h"
+#include "calib/evaluation/resampling.h"
+
+namespace fieldtrue {
+namespace {
+
+using Answer = OrientationDependence::Answer;
+
+constexpr int kFewestPlaces = 20;
+constexpr std::size_t kFewestOrientations = 3;
+/// Below so many orientations none can be held out: the others do not tell how the error goes on between them.
+constexpr std::size_t kEnoughToHoldOut = 6;
+/// A dependence that takes less than this off the error does not matter.
+constexpr double kMatters = 0.10;
+
+void judge(const NestedErrors& errors, std::uint64_t seed, OrientationDependence& dependence) {
+  if (errors.place_only_deg.size() < 3) return;
+  const PairedGain gain = pairedGain(errors.place_only_deg, errors.with_orientation_deg, seed);
+  dependence.place_only_deg = rootMeanSquare(errors.place_only_deg);
+  dependence.with_orientation_deg = rootMeanSquare(errors.with_orientation_deg);
+  dependence.gain_low90 = gain.low90;
+  dependence.gain_high90 = gain.high90;
+  dependence.answer = gain.low90 > 0.0 ? Answer::kYes : gain.high90 < kMatters ? Answer::kNo : Answer::kCannotTell;
+}
+
+std::string figuresText(const OrientationDependence& dependence) {
+  return errorText(dependence.place_only_deg) + " degrees are left by a function of the place alone, " +
+         errorText(dependence.with_orientation_deg) + " with the orientation (held out; 90 % interval of the gain " +
+         percentText(dependence.gain_low90) + " to " + percentText(dependence.gain_high90) + " %)";
+}
+
+std::string answerText(const OrientationDependence& dependence) {
+  switch (dependence.answer) {
+    case Answer::kYes:
+      return "The orientation error depends on the orientation as well as on the place: " + figuresText(dependence);
+    case Answer::kNo:
+      return "The orientation error does not depend on the orientation, only on the place: " + figuresText(dependence);
+    case Answer::kCannotTell:
+      break;
+  }
+  return "Whether the orientation error depends on the orientation cannot be told from these places: " +
+         figuresText(dependence);
+}
+
+std::string tooFewText(const OrientationRows& rows, int n_places) {
+  return "Whether the orientation error depends on the orientation cannot be told: it needs at least 3 orientations at "
+         "20 places, and there are " +
+         countText(static_cast<std::size_t>(n_places), "place", "places") + " with 3 or more (" +
+         countText(rows.n_groups, "orientation", "orientations") + " in all at " +
+         countText(rows.n_places, "place", "places") + ").";
+}
+
+}  // namespace
+
+Result<OrientationDependence> orientationDependence(const CalibrationTable& table, std::uint64_t seed,
+                                                    const RunControl& control) {
+  const auto rows = orientationRows(table);
+  if (!rows) return tl::unexpected(rows.error());
+  OrientationDependence dependence;
+  dependence.n_places = placesWithThreeOrientations(*rows);
+  const bool has_visits = dependence.n_places >= kFewestPlaces;
+  const bool has_neighbours =
+      rows->n_groups >= kFewestOrientations && rows->n_places >= static_cast<std::size_t>(kFewestPlaces);
+  if (!has_visits && !has_neighbours) {
+    dependence.text = tooFewText(*rows, dependence.n_places);
+    return dependence;
+  }
+  dependence.by_neighbours = !has_visits;
+  const bool hold_out_orientations = rows->n_groups >= kEnoughToHoldOut;
+  judge(has_visits ? nestedModelErrors(*rows, hold_out_orientations, seed) : neighbourErrors(*rows, seed), seed,
+        dependence);
+  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
+  dependence.text = answerText(dependence);
+  if (dependence.by_neighbours)
+    dependence.text += ", judged by neighbours in position and orientation, which is weaker than visits of one place";
+  else if (!hold_out_orientations)
+    dependence.text += "; with " + countText(rows->n_groups, "orientation", "orientations") +
+                       " only places were held out, and a fixture that holds one of them wrong would look the same";
+  dependence.text += ".";
+  return dependence;
+}
+
+nlohmann::json toJson(const OrientationDependence& dependence) {
+  const char* answer = dependence.answer == Answer::kYes  ? "yes"
+                       : dependence.answer == Answer::kNo ? "no"
+                                                          : "cannot tell";
+  const bool judged = dependence.place_only_deg > 0.0;
+  const auto number = [&](double value) { return judged ? nlohmann::json(value) : nlohmann::json(nullptr); };
+  return {{"answer", answer},
+          {"by_neighbours", dependence.by_neighbours},
+          {"places", dependence.n_places},
+          {"place_only_deg", number(dependence.place_only_deg)},
+          {"with_orientation_deg", number(dependence.with_orientation_deg)},
+          {"gain_low90", number(dependence.gain_low90)},
+          {"gain_high90", number(dependence.gain_high90)},
+          {"text", dependence.text}};
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,82 @@
+#include "calib/evaluation/orientation_rows.h"
+
+#include <algorithm>
+#include <map>
+#include <numbers>
+
+#include "calib/correctors/corrector.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
+constexpr double kAlike_rad = 10.0 / kDegreesPerRadian;
+constexpr std::size_t kMostGroups = 8;
+
+/// Groups around orientations picked farthest from those picked before, until all are within the tolerance or there
+/// are enough groups.
+void groupOrientations(OrientationRows& rows) {
+  rows.group.assign(rows.size(), 0);
+  std::vector<double> nearest_rad(rows.size(), 10.0);
+  std::size_t next = 0;
+  for (std::size_t g = 0; g < kMostGroups; ++g) {
+    const Eigen::Quaterniond center = rows.q_true[next];
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double angle_rad = angleBetween_rad(center, rows.q_true[i]);
+      if (angle_rad >= nearest_rad[i]) continue;
+      nearest_rad[i] = angle_rad;
+      rows.group[i] = g;
+    }
+    rows.n_groups = g + 1;
+    next = static_cast<std::size_t>(std::max_element(nearest_rad.begin(), nearest_rad.end()) - nearest_rad.begin());
+    if (nearest_rad[next] <= kAlike_rad) break;
+  }
+}
+
+}  // namespace
+
+Result<OrientationRows> orientationRows(const CalibrationTable& table) {
+  std::vector<Node> nodes;
+  std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(nodes),
+               [](const Node& node) { return node.role != NodeRole::kSkipped; });
+  const auto n_without = std::count_if(nodes.begin(), nodes.end(), [](const Node& n) { return !n.has_orientation; });
+  if (nodes.empty() || n_without > 0)
+    return fail(ErrorCode::kUnsupported,
+                "Whether orientation errors depend on orientation needs an orientation in every row, and " +
+                    std::to_string(n_without) + " of " + std::to_string(nodes.size()) + " rows have none");
+  Alignment alignment;
+  if (defaultAlignMode(table.metadata) == AlignMode::kRigid) {
+    const auto fitted = fitAlignment(nodes);
+    if (!fitted) return tl::unexpected(fitted.error());
+    alignment = *fitted;
+  }
+  FitData data = makeFitData(nodes, table.metadata, alignment);
+  OrientationRows rows;
+  std::map<int, std::size_t> number_of_place;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const Eigen::Quaterniond q_error = data.q_tracked[i] * data.q_true[i].conjugate();
+    rows.error_deg.push_back(kDegreesPerRadian * rotationVector_rad(q_error));
+    rows.place.push_back(number_of_place.try_emplace(data.node[i], number_of_place.size()).first->second);
+  }
+  rows.n_places = number_of_place.size();
+  rows.dimension = data.dimension;
+  rows.node = std::move(data.node);
+  rows.p_tracked_m = std::move(data.p_tracked_m);
+  rows.q_true = std::move(data.q_true);
+  groupOrientations(rows);
+  return rows;
+}
+
+int placesWithThreeOrientations(const OrientationRows& rows) {
+  std::vector<std::vector<Eigen::Quaterniond>> distinct(rows.n_places);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::vector<Eigen::Quaterniond>& seen = distinct[rows.place[i]];
+    const bool is_known = std::any_of(seen.begin(), seen.end(), [&](const Eigen::Quaterniond& q) {
+      return angleBetween_rad(q, rows.q_true[i]) <= kAlike_rad;
+    });
+    if (!is_known) seen.push_back(rows.q_true[i]);
+  }
+  return static_cast<int>(std::count_if(distinct.begin(), distinct.end(), [](const auto& q) { return q.size() >= 3; }));
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <mutex>
+
+namespace fieldtrue {
+
+/// Adds up the shares of tasks that end on any thread, so that the fraction told never falls.
+class ProgressMeter {
+ public:
+  /// @param tell is called one thread at a time
+  /// @param from, to part of the whole that this meter covers
+  ProgressMeter(const std::function<void(double)>& tell, double from, double to, double total)
+      : tell_(tell), from_(from), to_(to), total_(total) {}
+
+  void add(double share) {
+    const std::lock_guard lock(mutex_);
+    done_ += share;
+    tell_(from_ + (to_ - from_) * std::min(1.0, total_ > 0.0 ? done_ / total_ : 1.0));
+  }
+
+ private:
+  const std::function<void(double)>& tell_;
+  double from_;
+  double to_;
+  double total_;
+  double done_ = 0.0;
+  std::mutex mutex_;
+};
+
+}  // namespace fieldtrue

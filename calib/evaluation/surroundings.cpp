@@ -1,0 +1,82 @@
+#include "calib/evaluation/surroundings.h"
+
+#include "calib/correctors/corrector.h"
+#include "calib/correctors/fit_checks.h"
+#include "calib/correctors/regrid_error.h"
+#include "calib/evaluation/figures.h"
+#include "calib/evaluation/limits.h"
+#include "calib/evaluation/region_lattice.h"
+
+namespace fieldtrue {
+namespace {
+
+Result<void> unlessStopped(const RunControl& control, double done) {
+  control.progress(done);
+  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
+  return {};
+}
+
+/// The best position method fitted to all rows it may see; none where that fails.
+Result<std::optional<FoldBack>> foldBack(const Comparison& comparison, const HeldOutJob& job,
+                                         const RunControl& control) {
+  CorrectorChoice choice;
+  if (const auto row = comparison.best_position_row) {
+    choice.position_id = comparison.position[*row].method;
+    choice.position_settings = comparison.position[*row].settings;
+  }
+  const auto corrector = Corrector::fit(rowsOf(job, job.fitted), job.metadata, choice, job.align, control);
+  if (!corrector && corrector.error().code == ErrorCode::kCancelled) return tl::unexpected(corrector.error());
+  if (!corrector) return std::optional<FoldBack>();
+  return std::optional(foldBackOf(*corrector));
+}
+
+/// What each way to bring the measured errors to a grid costs by itself.
+std::vector<ResamplingError> resamplingErrors(const Comparison& comparison, const HeldOutJob& job,
+                                              const RunControl& control) {
+  const std::vector<Node> fitted = rowsOf(job, job.fitted);
+  const auto alignment = alignmentOf(job, fitted);
+  if (!alignment) return {};
+  const FitData data = makeFitData(fitted, job.metadata, *alignment);
+  if (data.dimension < 3) return {};
+  std::vector<ResamplingError> errors;
+  for (const RegridMethod method : {RegridMethod::kBriggs, RegridMethod::kLivingston, RegridMethod::kCzernuszenko}) {
+    RegridOptions options;
+    options.method = method;
+    options.pitch_m = medianSpacing_m(mergePlaces(data).p_tracked_m);
+    const RegridError error = regridError(data, options, control);
+    if (control.stop.stop_requested()) return {};
+    errors.push_back({regridMethodId(method), error.rms_mm, static_cast<int>(error.n_scored),
+                      static_cast<int>(error.n_without_support),
+                      excessError(error.rms_mm, comparison.floor_position_mm)});
+  }
+  return errors;
+}
+
+}  // namespace
+
+Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& table, const HeldOutJob& job,
+                             const RunControl& control) {
+  RunControl quiet = control;
+  quiet.progress = [](double) {};
+  comparison.coverage = coverageOf(table);
+  if (auto going = unlessStopped(control, 0.1); !going) return going;
+  auto fold_back = foldBack(comparison, job, quiet);
+  if (!fold_back) return tl::unexpected(fold_back.error());
+  comparison.fold_back = *std::move(fold_back);
+  if (auto going = unlessStopped(control, 0.4); !going) return going;
+  if (job.has_orientation) {
+    auto dependence = orientationDependence({job.metadata, job.nodes}, job.seed, quiet);
+    if (!dependence && dependence.error().code == ErrorCode::kCancelled) return tl::unexpected(dependence.error());
+    if (dependence) comparison.orientation_dependence = *std::move(dependence);
+  }
+  if (auto going = unlessStopped(control, 0.6); !going) return going;
+  comparison.resampling = resamplingErrors(comparison, job, quiet);
+  if (auto going = unlessStopped(control, 0.8); !going) return going;
+  const auto with_half_mm = comparison.verdict.apply_position ? rmsWithHalf_mm(comparison, job, quiet)
+                                                              : Result<std::optional<double>>(std::nullopt);
+  if (!with_half_mm) return tl::unexpected(with_half_mm.error());
+  comparison.verdict.limited_by = limitedBy(comparison, job, *with_half_mm);
+  return unlessStopped(control, 1.0);
+}
+
+}  // namespace fieldtrue
