@@ -1,0 +1,163 @@
+#include "calib/correctors/automatic.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+#include "calib/correctors/automatic_choice.h"
+#include "calib/correctors/json_values.h"
+#include "calib/correctors/rbf_system.h"
+
+namespace fieldtrue {
+namespace {
+
+const std::string kName = "Automatic choice";
+
+class AutomaticModel : public PositionModel {
+ public:
+  /// @param table what was chosen and from what; `model` is filled in from the model itself
+  AutomaticModel(std::unique_ptr<PositionModel> model, nlohmann::json table)
+      : model_(std::move(model)), table_(std::move(table)), note_(table_.at("note").get<std::string>()) {}
+
+  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
+    return model_->displacement_m(p_tracked_m);
+  }
+  void correct(std::span<const Eigen::Vector3d> p_tracked_m, std::span<Eigen::Vector3d> p_corrected_m) const override {
+    model_->correct(p_tracked_m, p_corrected_m);
+  }
+  Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const override { return model_->jacobian(p_tracked_m); }
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
+    return model_->uncertainty_m(p_tracked_m);
+  }
+  bool covers(const Eigen::Vector3d& p_tracked_m) const override { return model_->covers(p_tracked_m); }
+  std::string note() const override {
+    const std::string own = model_->note();
+    return note_ + (own.empty() ? "" : " " + own);
+  }
+  nlohmann::json parameters() const override {
+    nlohmann::json json = table_;
+    json["model"] = model_->parameters();
+    return json;
+  }
+
+ private:
+  std::unique_ptr<PositionModel> model_;
+  nlohmann::json table_;
+  std::string note_;
+};
+
+std::string inMm(double value_m) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g mm", 1000.0 * value_m);
+  return text.data();
+}
+
+nlohmann::json tableOf(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    nlohmann::json row = {{"method", candidates[i].text}, {"inner_rms_mm", nullptr}, {"skipped", nullptr}};
+    if (scores[i].skipped)
+      row["skipped"] = *scores[i].skipped;
+    else
+      row["inner_rms_mm"] = 1000.0 * scores[i].rms_m();
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& candidates,
+                   const std::vector<InnerScore>& scores, std::size_t chosen, std::size_t n_folds) {
+  const auto n_scored =
+      std::count_if(scores.begin(), scores.end(), [](const InnerScore& score) { return !score.skipped; });
+  // Every other model says so itself.
+  const std::string plane = chosen == 0 ? planeNote(data, "nothing is claimed off it") : "";
+  std::string note = plane + (plane.empty() ? "" : " ") + "Chosen: " + candidates[chosen].text + ", held-out RMS " +
+                     inMm(scores[chosen].rms_m());
+  note += chosen == 0 ? ", since nothing else lowers it clearly"
+                      : " against " + inMm(scores.front().rms_m()) + " without correction";
+  return note + "; " + std::to_string(n_scored) + " candidates over the same " + std::to_string(n_folds) + " folds.";
+}
+
+CandidateSet candidateSetOf(const Settings& settings) {
+  const std::string& text = choiceSetting(settings, "candidates");
+  return text == "survey" ? CandidateSet::kSurvey : text == "ours" ? CandidateSet::kOurs : CandidateSet::kAll;
+}
+
+/// The data must span a plane at least, in tracked positions too.
+Result<void> checkSpread(const FitData& data) {
+  const auto places = smoothFitPlaces(data, kName);
+  if (!places) return tl::unexpected(places.error());
+  const FieldFrame frame = FieldFrame::around(places->p_tracked_m, data.dimension, rmsSpread_m(places->p_tracked_m));
+  if (!TailProjection::of(frame.tail(places->p_tracked_m)))
+    return tl::unexpected(degenerateTail(kName, places->size()));
+  return {};
+}
+
+Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const Settings& settings,
+                                                    const RunControl& control) {
+  if (auto checked = checkSpread(data); !checked) return tl::unexpected(checked.error());
+  const std::vector<AutomaticCandidate> candidates = automaticCandidates(candidateSetOf(settings));
+  const auto folds = innerFolds(data);
+  RunControl inner = control;
+  inner.progress = [](double) {};
+  std::vector<InnerScore> scores;
+  for (const AutomaticCandidate& candidate : candidates) {
+    auto score = scoreCandidate(candidate, data, folds, inner);
+    if (!score) return tl::unexpected(score.error());
+    scores.push_back(*std::move(score));
+    control.progress(static_cast<double>(scores.size()) / static_cast<double>(candidates.size() + 1));
+  }
+  const std::size_t chosen = chooseCandidate(candidates, scores);
+  const AutomaticCandidate& winner = candidates[chosen];
+  auto model = winner.method->fit(data, winner.settings, inner);
+  if (!model) return tl::unexpected(model.error());
+  control.progress(1.0);
+  nlohmann::json table = {{"method", winner.method->id},
+                          {"settings", toJson(winner.settings)},
+                          {"candidates", tableOf(candidates, scores)},
+                          {"note", noteOf(data, candidates, scores, chosen, folds.size())}};
+  return std::make_unique<AutomaticModel>(*std::move(model), std::move(table));
+}
+
+Result<std::unique_ptr<PositionModel>> loadAutomatic(const nlohmann::json& parameters) {
+  return guarded<std::unique_ptr<PositionModel>>("parameters of auto", [&]() -> Result<std::unique_ptr<PositionModel>> {
+    const auto method = findPositionMethod(parameters.at("method").get<std::string>());
+    if (!method) return tl::unexpected(method.error());
+    if ((*method)->id == "auto") throwMalformed("an automatic choice cannot have chosen itself");
+    auto settings = settingsFromJson((*method)->id, (*method)->settings, parameters.at("settings"));
+    if (!settings) return tl::unexpected(settings.error());
+    if (!parameters.at("candidates").is_array()) throwMalformed("a list of candidates is needed");
+    auto model = (*method)->load(parameters.at("model"));
+    if (!model) return tl::unexpected(model.error());
+    nlohmann::json table = {{"method", (*method)->id},
+                            {"settings", toJson(*settings)},
+                            {"candidates", parameters.at("candidates")},
+                            {"note", parameters.at("note").get<std::string>()}};
+    return std::make_unique<AutomaticModel>(*std::move(model), std::move(table));
+  });
+}
+
+}  // namespace
+
+PositionMethod automaticPosition() {
+  PositionMethod method;
+  method.id = "auto";
+  method.label = "Automatic choice";
+  method.source = "Nested cross-validation: Stone 1974; one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984";
+  method.settings = {{.key = "candidates",
+                      .label = "Candidates",
+                      .type = SettingType::kChoice,
+                      .unit = "",
+                      .min = 0.0,
+                      .max = 0.0,
+                      .default_value = std::string("all"),
+                      .choices = {"survey", "ours", "all"},
+                      .help = "Methods to choose from: the survey's, those that came after it, or all; no correction, "
+                              "a rigid motion and an affine map are always among them."}};
+  method.fit = fitAutomatic;
+  method.load = loadAutomatic;
+  method.most_folds = 5;
+  return method;
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,207 @@
+#include "calib/correctors/automatic_choice.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <random>
+
+namespace fieldtrue {
+namespace {
+
+constexpr std::size_t kFolds = 10;
+constexpr std::size_t kPlacesForFolds = 20;
+constexpr double kLeastGain = 0.05;
+constexpr double kOneSided95 = 1.645;
+
+enum class Origin { kBaseline, kSurvey, kOurs };
+
+struct ListedCandidate {
+  const char* text;
+  Origin origin;
+  int complexity;
+};
+
+constexpr int kSmoothing = 10;
+constexpr int kInterpolating = 20;
+
+constexpr std::array<ListedCandidate, 23> kListed = {{
+    {"none", Origin::kBaseline, 0},
+    {"rigid", Origin::kBaseline, 1},
+    {"affine", Origin::kBaseline, 2},
+    {"polynomial:degree=2", Origin::kSurvey, 3},
+    {"polynomial:degree=3", Origin::kSurvey, 4},
+    {"polynomial:degree=4", Origin::kSurvey, 5},
+    {"polynomial:degree=5", Origin::kSurvey, 6},
+    {"gaussian_process", Origin::kOurs, kSmoothing},
+    {"bspline", Origin::kOurs, kSmoothing},
+    {"rbf", Origin::kOurs, kSmoothing},
+    {"rbf:kernel=thin_plate", Origin::kOurs, kSmoothing},
+    {"harmonic_field", Origin::kOurs, kSmoothing},
+    {"hmq:r2_cm2=10", Origin::kSurvey, kInterpolating},
+    {"hmq:r2_cm2=100", Origin::kSurvey, kInterpolating},
+    {"hmq:r2_cm2=1000", Origin::kSurvey, kInterpolating},
+    {"trilinear", Origin::kSurvey, kInterpolating},
+    {"hexahedral_shape", Origin::kSurvey, kInterpolating},
+    {"tetrahedral", Origin::kSurvey, kInterpolating},
+    {"local_linear", Origin::kSurvey, kInterpolating},
+    {"local_bump", Origin::kSurvey, kInterpolating},
+    {"local_kindratenko", Origin::kSurvey, kInterpolating},
+    {"local_briggs", Origin::kSurvey, kInterpolating},
+    {"divergence_aware", Origin::kOurs, kSmoothing},
+}};
+
+double meanOf(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// Mean of a - b, and its standard error.
+struct PairedDifference {
+  double mean = 0.0;
+  double standard_error = 0.0;
+
+  PairedDifference(const std::vector<double>& a, const std::vector<double>& b) {
+    const auto n = static_cast<double>(a.size());
+    for (std::size_t i = 0; i < a.size(); ++i) mean += (a[i] - b[i]) / n;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) squares += (a[i] - b[i] - mean) * (a[i] - b[i] - mean);
+    standard_error = n > 1.0 ? std::sqrt(squares / (n * (n - 1.0))) : HUGE_VAL;
+  }
+};
+
+/// Places as slots 0, 1, ... in order of first appearance, by row.
+std::vector<std::size_t> slotsOf(const FitData& data) {
+  std::map<int, std::size_t> slot_of_node;
+  std::vector<std::size_t> slots;
+  for (const int node : data.node) slots.push_back(slot_of_node.emplace(node, slot_of_node.size()).first->second);
+  return slots;
+}
+
+double squaredError_m2(const PositionModel& model, const FitData& data, std::size_t row) {
+  const Eigen::Vector3d& p_m = data.p_tracked_m[row];
+  const Eigen::Vector3d corrected_m = model.covers(p_m) ? Eigen::Vector3d(p_m + model.displacement_m(p_m)) : p_m;
+  return (corrected_m - data.p_true_m[row]).squaredNorm();
+}
+
+using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const std::vector<std::size_t>& held_out)>;
+
+/// How a candidate's models without some rows are made: downdated from one fit, or fitted anew.
+Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData& data, const RunControl& control) {
+  if (candidate.method->hold_out != nullptr) {
+    auto fits = candidate.method->hold_out(data, candidate.settings, control);
+    if (!fits) return tl::unexpected(fits.error());
+    return [shared = std::shared_ptr<const HoldOutFits<PositionModel>>(*std::move(fits))](
+               const std::vector<std::size_t>& held_out) { return shared->without(held_out, Pose{}); };
+  }
+  return [&candidate, &data, &control](const std::vector<std::size_t>& held_out) {
+    std::vector<std::size_t> kept;
+    for (std::size_t row = 0; row < data.size(); ++row)
+      if (!std::binary_search(held_out.begin(), held_out.end(), row)) kept.push_back(row);
+    return candidate.method->fit(rowsOfFitData(data, kept), candidate.settings, control);
+  };
+}
+
+bool isIn(Origin origin, CandidateSet set) {
+  if (origin == Origin::kBaseline || set == CandidateSet::kAll) return true;
+  return (origin == Origin::kSurvey) == (set == CandidateSet::kSurvey);
+}
+
+}  // namespace
+
+std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set) {
+  std::vector<AutomaticCandidate> candidates;
+  for (const ListedCandidate& listed : kListed) {
+    if (!isIn(listed.origin, set)) continue;
+    const auto text = parseMethodText(listed.text);
+    FT_CHECK(text.has_value());
+    const auto method = findPositionMethod(text->id);
+    if (!method) continue;
+    auto settings = resolveSettings(text->id, (*method)->settings, text->given);
+    FT_CHECK(settings.has_value());
+    candidates.push_back({*method, *std::move(settings), listed.text, listed.complexity});
+  }
+  return candidates;
+}
+
+double InnerScore::rms_m() const { return std::sqrt(meanOf(squares_m2)); }
+
+std::vector<std::vector<std::size_t>> innerFolds(const FitData& data) {
+  const std::vector<std::size_t> slots = slotsOf(data);
+  const std::size_t n_places = 1 + *std::max_element(slots.begin(), slots.end());
+  std::vector<std::size_t> order(n_places);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::mt19937_64 generator(1);
+  for (std::size_t i = n_places - 1; i > 0; --i) std::swap(order[i], order[generator() % (i + 1)]);
+  const std::size_t n_folds = n_places < kPlacesForFolds ? n_places : kFolds;
+  std::vector<std::size_t> fold_of_place(n_places);
+  for (std::size_t i = 0; i < n_places; ++i) fold_of_place[order[i]] = i % n_folds;
+  std::vector<std::vector<std::size_t>> folds(n_folds);
+  for (std::size_t row = 0; row < data.size(); ++row) folds[fold_of_place[slots[row]]].push_back(row);
+  return folds;
+}
+
+FitData rowsOfFitData(const FitData& data, const std::vector<std::size_t>& rows) {
+  FitData part;
+  part.jig_sd_m = data.jig_sd_m;
+  part.dimension = data.dimension;
+  for (const std::size_t row : rows) {
+    part.p_tracked_m.push_back(data.p_tracked_m[row]);
+    part.p_true_m.push_back(data.p_true_m[row]);
+    part.node.push_back(data.node[row]);
+    if (!data.q_tracked.empty()) part.q_tracked.push_back(data.q_tracked[row]);
+    if (!data.q_true.empty()) part.q_true.push_back(data.q_true[row]);
+    if (!data.index.empty()) part.index.push_back(data.index[row]);
+    if (!data.noise_m2.empty()) part.noise_m2.push_back(data.noise_m2[row]);
+  }
+  return part;
+}
+
+Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
+                                  const std::vector<std::vector<std::size_t>>& folds, const RunControl& control) {
+  const auto cancelled = [] { return fail(ErrorCode::kCancelled, "Stopped on request"); };
+  if (control.stop.stop_requested()) return cancelled();
+  InnerScore score;
+  const auto model_without = modelsOf(candidate, data, control);
+  if (!model_without) {
+    if (model_without.error().code == ErrorCode::kCancelled) return tl::unexpected(model_without.error());
+    score.skipped = model_without.error().message;
+    return score;
+  }
+  const std::vector<std::size_t> slots = slotsOf(data);
+  std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
+  for (const std::size_t slot : slots) n_rows[slot] += 1.0;
+  score.squares_m2.assign(n_rows.size(), 0.0);
+  for (const std::vector<std::size_t>& fold : folds) {
+    if (control.stop.stop_requested()) return cancelled();
+    const auto model = (*model_without)(fold);
+    if (!model && model.error().code == ErrorCode::kCancelled) return tl::unexpected(model.error());
+    if (!model) return InnerScore{{}, model.error().message};
+    for (const std::size_t row : fold)
+      score.squares_m2[slots[row]] += squaredError_m2(**model, data, row) / n_rows[slots[row]];
+  }
+  if (!std::isfinite(meanOf(score.squares_m2))) return InnerScore{{}, "its errors at held-out places are not finite"};
+  return score;
+}
+
+std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores) {
+  FT_CHECK(candidates.size() == scores.size() && !scores.empty() && !scores.front().skipped);
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < scores.size(); ++i)
+    if (!scores[i].skipped && meanOf(scores[i].squares_m2) < meanOf(scores[best].squares_m2)) best = i;
+  std::size_t chosen = best;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    if (scores[i].skipped) continue;
+    const PairedDifference excess(scores[i].squares_m2, scores[best].squares_m2);
+    if (excess.mean > excess.standard_error) continue;
+    const bool is_simpler = candidates[i].complexity < candidates[chosen].complexity;
+    const bool is_as_simple = candidates[i].complexity == candidates[chosen].complexity;
+    if (is_simpler || (is_as_simple && scores[i].rms_m() < scores[chosen].rms_m())) chosen = i;
+  }
+  const PairedDifference gain(scores.front().squares_m2, scores[chosen].squares_m2);
+  const bool is_worth_it = scores[chosen].rms_m() <= (1.0 - kLeastGain) * scores.front().rms_m() &&
+                           gain.mean > kOneSided95 * gain.standard_error;
+  return is_worth_it ? chosen : 0;
+}
+
+}  // namespace fieldtrue

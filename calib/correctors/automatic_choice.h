@@ -1,0 +1,55 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/core/run_control.h"
+#include "calib/correctors/registry.h"
+
+namespace fieldtrue {
+
+/// Which methods an automatic choice looks at.
+enum class CandidateSet {
+  kSurvey,  ///< The survey's methods.
+  kOurs,    ///< Those that came after it.
+  kAll
+};
+
+/// A method with settings that may be chosen.
+struct AutomaticCandidate {
+  const PositionMethod* method = nullptr;
+  Settings settings;
+  std::string text;    ///< As a person writes it, settings that differ from the defaults only.
+  int complexity = 0;  ///< Rank: none, rigid, affine, polynomials by degree, smoothing fits, interpolations.
+};
+
+/// The candidates of a set that the registry has; the baselines none, rigid and affine are in every set. A method that
+/// chooses by itself is never one.
+std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set);
+
+/// What inner cross-validation found about one candidate.
+struct InnerScore {
+  std::vector<double> squares_m2;      ///< Held-out squared error of each place; empty when skipped.
+  std::optional<std::string> skipped;  ///< Why it cannot be used here.
+  double rms_m() const;
+};
+
+/// Rows in folds by place, the same for every candidate: ten, or one a place below twenty places.
+std::vector<std::vector<std::size_t>> innerFolds(const FitData& data);
+
+/// Scores a candidate on places its fits did not see: in closed form where the method has one, by refits otherwise.
+/// @error kCancelled only; what a method cannot do is in the score
+Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
+                                  const std::vector<std::vector<std::size_t>>& folds, const RunControl& control);
+
+/// The simplest candidate whose mean squared error exceeds the least by no more than one standard error of the
+/// difference (paired by place), the better one among equally simple ones; and the first, which must be none, unless
+/// that lowers its RMS by 5 % at least and its mean square by 1.645 standard errors (one-sided 95 %).
+/// @source the one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984, section 3.4.3
+std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores);
+
+/// The rows of fit data that are wanted. @param rows ascending
+FitData rowsOfFitData(const FitData& data, const std::vector<std::size_t>& rows);
+
+}  // namespace fieldtrue
