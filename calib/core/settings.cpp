@@ -51,7 +51,7 @@ std::string needed(const Setting& setting) {
     case SettingType::kBool:
       return "true or false";
     case SettingType::kAutoNumber:
-      return "auto or a number" + range + unit;
+      return (setting.whole ? "auto or a whole number" : "auto or a number") + range + unit;
     case SettingType::kChoice:
       return setting.choices.empty() ? "a text" : "one of " + joined(setting.choices);
   }
@@ -71,6 +71,7 @@ std::optional<bool> parseBool(std::string_view text) {
 std::optional<SettingValue> parseNumber(const Setting& setting, std::string_view text) {
   const std::optional<double> value = wholeNumber<double>(text);
   if (!value || !inRange(setting, *value)) return std::nullopt;
+  if (setting.whole && *value != std::floor(*value)) return std::nullopt;
   return SettingValue(*value);
 }
 

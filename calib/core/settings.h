@@ -30,6 +30,7 @@ struct Setting {
   SettingValue default_value = 0.0;
   std::vector<std::string> choices;  ///< For kChoice; empty = any text.
   std::string help;                  ///< One sentence.
+  bool whole = false;                ///< An auto-number that takes whole numbers only.
 };
 
 /// Resolved values, one for every declared key.

@@ -5,8 +5,16 @@
 namespace fieldtrue {
 namespace {
 
+const std::string kName = "Affine fit";
+const PolynomialDegree kLinear{1, {}};
+
 Result<std::unique_ptr<PositionModel>> fitAffine(const FitData& data, const Settings&, const RunControl&) {
-  return fitPolynomialPosition(data, 1, "Affine fit");
+  return fitPolynomialPosition(data, kLinear, kName);
+}
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutAffine(const FitData& data, const Settings&,
+                                                                  const RunControl&) {
+  return holdOutPolynomialPosition(data, kLinear, kName);
 }
 
 Result<std::unique_ptr<PositionModel>> loadAffine(const nlohmann::json& parameters) {
@@ -16,7 +24,8 @@ Result<std::unique_ptr<PositionModel>> loadAffine(const nlohmann::json& paramete
 }  // namespace
 
 PositionMethod affinePosition() {
-  return {"affine", "Affine", "Survey by Kindratenko, section 3.4, eq. 14 with r = 1", {}, fitAffine, loadAffine};
+  return {"affine",   "Affine",     "Survey by Kindratenko, section 3.4, eq. 14 with r = 1", {}, fitAffine,
+          loadAffine, holdOutAffine};
 }
 
 }  // namespace fieldtrue

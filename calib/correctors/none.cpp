@@ -14,9 +14,29 @@ class NoPositionCorrection : public PositionModel {
   nlohmann::json parameters() const override { return nlohmann::json::object(); }
 };
 
+/// Nothing is fitted, so nothing changes but whether there is anything left to fit to.
+class NothingHeldOut : public HoldOutFits<PositionModel> {
+ public:
+  explicit NothingHeldOut(std::size_t n_rows) : n_rows_(n_rows) {}
+
+  Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows, const Pose&) const override {
+    if (rows.size() >= n_rows_) return fail(ErrorCode::kTooFewNodes, "No correction needs measured places, got none");
+    return std::make_unique<NoPositionCorrection>();
+  }
+
+ private:
+  std::size_t n_rows_;
+};
+
 Result<std::unique_ptr<PositionModel>> fitNone(const FitData& data, const Settings&, const RunControl&) {
   if (auto checked = checkPositions(data, "No correction"); !checked) return tl::unexpected(checked.error());
   return std::make_unique<NoPositionCorrection>();
+}
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutNone(const FitData& data, const Settings&,
+                                                                const RunControl&) {
+  if (auto checked = checkPositions(data, "No correction"); !checked) return tl::unexpected(checked.error());
+  return std::make_unique<NothingHeldOut>(data.size());
 }
 
 Result<std::unique_ptr<PositionModel>> loadNone(const nlohmann::json&) {
@@ -26,7 +46,8 @@ Result<std::unique_ptr<PositionModel>> loadNone(const nlohmann::json&) {
 }  // namespace
 
 PositionMethod nonePosition() {
-  return {"none", "No correction", "The tracker as it is, after the alignment if one is fitted", {}, fitNone, loadNone};
+  return {"none",   "No correction", "The tracker as it is, after the alignment if one is fitted", {}, fitNone,
+          loadNone, holdOutNone};
 }
 
 }  // namespace fieldtrue

@@ -1,14 +1,32 @@
 #include "calib/correctors/polynomial.h"
 
+#include "calib/correctors/fit_checks.h"
+#include "calib/correctors/polynomial_choice.h"
 #include "calib/correctors/polynomial_position.h"
 #include "calib/correctors/shared_settings.h"
 
 namespace fieldtrue {
 namespace {
 
-Result<std::unique_ptr<PositionModel>> fitPolynomial(const FitData& data, const Settings& settings, const RunControl&) {
-  const int degree = static_cast<int>(integerSetting(settings, "degree"));
-  return fitPolynomialPosition(data, degree, "Polynomial of degree " + std::to_string(degree));
+const std::string kLabel = "Polynomial";
+
+Result<PolynomialDegree> degreeOf(const FitData& data, const Settings& settings, const RunControl& control) {
+  if (auto checked = checkPositions(data, kLabel); !checked) return tl::unexpected(checked.error());
+  return degreeFor({kLabel, data, displacements_m(data)}, settings, control);
+}
+
+Result<std::unique_ptr<PositionModel>> fitPolynomial(const FitData& data, const Settings& settings,
+                                                     const RunControl& control) {
+  const auto degree = degreeOf(data, settings, control);
+  if (!degree) return tl::unexpected(degree.error());
+  return fitPolynomialPosition(data, *degree, degreeName(kLabel, degree->degree));
+}
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomial(const FitData& data, const Settings& settings,
+                                                                      const RunControl& control) {
+  const auto degree = degreeOf(data, settings, control);
+  if (!degree) return tl::unexpected(degree.error());
+  return holdOutPolynomialPosition(data, *degree, degreeName(kLabel, degree->degree));
 }
 
 Result<std::unique_ptr<PositionModel>> loadPolynomial(const nlohmann::json& parameters) {
@@ -23,7 +41,8 @@ PositionMethod polynomialPosition() {
           "Kindratenko 1999; Ikits, Brederson, Hansen, Hollerbach 2001; survey by Kindratenko, section 3.4, eq. 14-15",
           {degreeSetting()},
           fitPolynomial,
-          loadPolynomial};
+          loadPolynomial,
+          holdOutPolynomial};
 }
 
 }  // namespace fieldtrue

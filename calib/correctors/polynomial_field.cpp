@@ -91,6 +91,13 @@ Eigen::Vector3d PolynomialField::localCoordinates(const Eigen::Vector3d& p_m) co
   return (axes_.transpose() * (p_m - center_m_)).cwiseQuotient(scale_m_);
 }
 
+Eigen::MatrixXd PolynomialField::designMatrix(std::span<const Eigen::Vector3d> p_m) const {
+  Eigen::MatrixXd design(static_cast<Eigen::Index>(p_m.size()), termCount(dimension_, degree_));
+  for (Eigen::Index i = 0; i < design.rows(); ++i)
+    design.row(i) = monomials(localCoordinates(p_m[static_cast<std::size_t>(i)]), dimension_, degree_).transpose();
+  return design;
+}
+
 Result<PolynomialField> PolynomialField::fit(const PolynomialProblem& problem) {
   FT_CHECK(problem.value.size() == problem.p_m.size());
   FT_CHECK(problem.degree >= 0 && problem.degree <= kMaxDegree);
@@ -102,13 +109,9 @@ Result<PolynomialField> PolynomialField::fit(const PolynomialProblem& problem) {
   field.placeCoordinates(problem);
   const auto n_rows = static_cast<Eigen::Index>(problem.p_m.size());
   const Eigen::Index n_terms = termCount(problem.dimension, problem.degree);
-  Eigen::MatrixXd design(n_rows, n_terms);
+  const Eigen::MatrixXd design = field.designMatrix(problem.p_m);
   Eigen::Matrix<double, Eigen::Dynamic, 3> values(n_rows, 3);
-  for (Eigen::Index i = 0; i < n_rows; ++i) {
-    const auto row = static_cast<std::size_t>(i);
-    design.row(i) = monomials(field.localCoordinates(problem.p_m[row]), field.dimension_, field.degree_).transpose();
-    values.row(i) = problem.value[row].transpose();
-  }
+  for (Eigen::Index i = 0; i < n_rows; ++i) values.row(i) = problem.value[static_cast<std::size_t>(i)].transpose();
 
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
   qr.setThreshold(kRankThreshold);

@@ -42,6 +42,7 @@ class PolynomialField {
   std::optional<double> standardError(const Eigen::Vector3d& p_m) const;
 
   int dimension() const { return dimension_; }
+  int degree() const { return degree_; }
   /// Ratio of smallest to largest pivot: near 1 well determined, below 1e-3 poorly.
   double pivotRatio() const { return pivot_ratio_; }
 
@@ -50,9 +51,13 @@ class PolynomialField {
   static PolynomialField fromJson(const nlohmann::json& json);
 
  private:
+  friend class PolynomialHoldOut;
+
   PolynomialField() = default;
   void placeCoordinates(const PolynomialProblem& problem);
   Eigen::Vector3d localCoordinates(const Eigen::Vector3d& p_m) const;
+  /// One row a position, one column a monomial.
+  Eigen::MatrixXd designMatrix(std::span<const Eigen::Vector3d> p_m) const;
 
   int dimension_ = 3;
   int degree_ = 0;

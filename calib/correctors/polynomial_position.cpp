@@ -2,28 +2,49 @@
 
 #include "calib/correctors/fit_checks.h"
 #include "calib/correctors/json_values.h"
+#include "calib/correctors/polynomial_hold_out.h"
 
 namespace fieldtrue {
 namespace {
 
 class PolynomialPosition : public PositionModel {
  public:
-  explicit PolynomialPosition(PolynomialField field) : field_(std::move(field)) {}
+  explicit PolynomialPosition(ChosenPolynomial polynomial) : polynomial_(std::move(polynomial)) {}
 
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
-    return field_.value(p_tracked_m);
+    return polynomial_.field.value(p_tracked_m);
   }
   Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const override {
-    return Eigen::Matrix3d::Identity() + field_.gradient(p_tracked_m);
+    return Eigen::Matrix3d::Identity() + polynomial_.field.gradient(p_tracked_m);
   }
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
-    return field_.standardError(p_tracked_m);
+    return polynomial_.field.standardError(p_tracked_m);
   }
-  std::string note() const override { return polynomialNote(field_); }
-  nlohmann::json parameters() const override { return field_.toJson(); }
+  std::string note() const override { return polynomial_.note(); }
+  nlohmann::json parameters() const override { return polynomial_.toJson(); }
 
  private:
-  PolynomialField field_;
+  ChosenPolynomial polynomial_;
+};
+
+class PolynomialPositionHoldOut : public HoldOutFits<PositionModel> {
+ public:
+  PolynomialPositionHoldOut(PolynomialHoldOut fits, std::string degree_note)
+      : fits_(std::move(fits)), degree_note_(std::move(degree_note)) {}
+
+  Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
+                                                 const Pose& fold_from_data) const override {
+    // d = R q + t - p with q = p + d' of the data: R d' + (R - I) p + t.
+    const Eigen::Matrix3d R = fold_from_data.orientation.toRotationMatrix();
+    const ValueChange change{R, R - Eigen::Matrix3d::Identity(), fold_from_data.position_m};
+    return fits_.without(rows, change).map([this](PolynomialField field) -> std::unique_ptr<PositionModel> {
+      return std::make_unique<PolynomialPosition>(ChosenPolynomial{std::move(field), degree_note_});
+    });
+  }
+
+ private:
+  PolynomialHoldOut fits_;
+  std::string degree_note_;
 };
 
 }  // namespace
@@ -38,23 +59,41 @@ std::string polynomialNote(const PolynomialField& field) {
   return note;
 }
 
-Result<std::unique_ptr<PositionModel>> fitPolynomialPosition(const FitData& data, int degree, const std::string& name) {
-  if (auto checked = checkPositions(data, name); !checked) return tl::unexpected(checked.error());
+std::vector<Eigen::Vector3d> displacements_m(const FitData& data) {
   // Section 3.4 fits v = p - q and subtracts it; here d = q - p is fitted and added.
-  std::vector<Eigen::Vector3d> displacements_m(data.size());
-  for (std::size_t i = 0; i < data.size(); ++i) displacements_m[i] = data.p_true_m[i] - data.p_tracked_m[i];
-  const PolynomialProblem problem{name,   data.p_tracked_m, displacements_m,
-                                  degree, data.dimension,   mergePlaces(data).size()};
-  return PolynomialField::fit(problem).map([](PolynomialField field) -> std::unique_ptr<PositionModel> {
-    return std::make_unique<PolynomialPosition>(std::move(field));
+  std::vector<Eigen::Vector3d> d_m(data.size());
+  for (std::size_t i = 0; i < data.size(); ++i) d_m[i] = data.p_true_m[i] - data.p_tracked_m[i];
+  return d_m;
+}
+
+Result<std::unique_ptr<PositionModel>> fitPolynomialPosition(const FitData& data, const PolynomialDegree& degree,
+                                                             const std::string& name) {
+  if (auto checked = checkPositions(data, name); !checked) return tl::unexpected(checked.error());
+  const std::vector<Eigen::Vector3d> d_m = displacements_m(data);
+  const PolynomialProblem problem{name, data.p_tracked_m, d_m, degree.degree, data.dimension, mergePlaces(data).size()};
+  return PolynomialField::fit(problem).map([&](PolynomialField field) -> std::unique_ptr<PositionModel> {
+    return std::make_unique<PolynomialPosition>(ChosenPolynomial{std::move(field), degree.note});
   });
+}
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomialPosition(const FitData& data,
+                                                                              const PolynomialDegree& degree,
+                                                                              const std::string& name) {
+  if (auto checked = checkPositions(data, name); !checked) return tl::unexpected(checked.error());
+  const std::vector<Eigen::Vector3d> d_m = displacements_m(data);
+  Places places = mergePlaces(data);
+  const PolynomialProblem problem{name, data.p_tracked_m, d_m, degree.degree, data.dimension, places.size()};
+  return PolynomialHoldOut::make(problem, std::move(places))
+      .map([&](PolynomialHoldOut fits) -> std::unique_ptr<HoldOutFits<PositionModel>> {
+        return std::make_unique<PolynomialPositionHoldOut>(std::move(fits), degree.note);
+      });
 }
 
 Result<std::unique_ptr<PositionModel>> loadPolynomialPosition(const nlohmann::json& parameters,
                                                               const std::string& name) {
   return guarded<std::unique_ptr<PositionModel>>(
       "parameters of " + name, [&]() -> Result<std::unique_ptr<PositionModel>> {
-        return std::make_unique<PolynomialPosition>(PolynomialField::fromJson(parameters));
+        return std::make_unique<PolynomialPosition>(ChosenPolynomial::fromJson(parameters));
       });
 }
 

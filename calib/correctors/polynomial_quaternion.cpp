@@ -7,7 +7,7 @@
 #include "calib/correctors/error_rotation.h"
 #include "calib/correctors/fit_checks.h"
 #include "calib/correctors/json_values.h"
-#include "calib/correctors/polynomial_position.h"
+#include "calib/correctors/polynomial_choice.h"
 #include "calib/correctors/shared_settings.h"
 
 namespace fieldtrue {
@@ -19,14 +19,14 @@ constexpr double kDirectLimit_rad = 1.5707963267948966;
 
 class PolynomialErrorRotation : public ErrorRotationModel {
  public:
-  PolynomialErrorRotation(ErrorFrame frame, const Eigen::Quaterniond& q_reference, PolynomialField vector_part)
+  PolynomialErrorRotation(ErrorFrame frame, const Eigen::Quaterniond& q_reference, ChosenPolynomial vector_part)
       : ErrorRotationModel(frame), q_reference_(q_reference), vector_part_(std::move(vector_part)) {}
 
-  std::string note() const override { return polynomialNote(vector_part_); }
+  std::string note() const override { return vector_part_.note(); }
 
  protected:
   Eigen::Quaterniond errorRotation(const Eigen::Vector3d& p_tracked_m) const override {
-    const Eigen::Vector3d v = vector_part_.value(p_tracked_m);
+    const Eigen::Vector3d v = vector_part_.field.value(p_tracked_m);
     // Far outside the places the polynomial can leave the unit ball; there the nearest rotation is a half turn.
     const double w = std::sqrt(std::max(0.0, 1.0 - v.squaredNorm()));
     return (q_reference_ * Eigen::Quaterniond(w, v.x(), v.y(), v.z())).normalized();
@@ -37,14 +37,13 @@ class PolynomialErrorRotation : public ErrorRotationModel {
 
  private:
   Eigen::Quaterniond q_reference_;
-  PolynomialField vector_part_;
+  ChosenPolynomial vector_part_;
 };
 
 Result<std::unique_ptr<OrientationModel>> fitPolynomialQuaternion(const FitData& data, const Settings& settings,
-                                                                  const RunControl&) {
-  const int degree = static_cast<int>(integerSetting(settings, "degree"));
-  const std::string name = "Quaternion polynomial of degree " + std::to_string(degree);
-  if (auto checked = checkOrientations(data, name); !checked) return tl::unexpected(checked.error());
+                                                                  const RunControl& control) {
+  const std::string label = "Quaternion polynomial";
+  if (auto checked = checkOrientations(data, label); !checked) return tl::unexpected(checked.error());
   const ErrorFrame frame = errorFrame(settings);
   const std::vector<Eigen::Quaterniond> q_error = errorRotations(data, frame);
   const bool direct = std::all_of(q_error.begin(), q_error.end(), [](const Eigen::Quaterniond& q) {
@@ -53,11 +52,10 @@ Result<std::unique_ptr<OrientationModel>> fitPolynomialQuaternion(const FitData&
   const Eigen::Quaterniond q_reference = direct ? Eigen::Quaterniond::Identity() : canonical(meanRotation(q_error));
   std::vector<Eigen::Vector3d> vector_parts(data.size());
   for (std::size_t i = 0; i < data.size(); ++i) vector_parts[i] = canonical(q_reference.conjugate() * q_error[i]).vec();
-  const PolynomialProblem problem{name,   data.p_tracked_m, vector_parts,
-                                  degree, data.dimension,   mergePlaces(data).size()};
-  return PolynomialField::fit(problem).map([&](PolynomialField field) -> std::unique_ptr<OrientationModel> {
-    return std::make_unique<PolynomialErrorRotation>(frame, q_reference, std::move(field));
-  });
+  return fitChosenPolynomial({label, data, std::move(vector_parts)}, settings, control)
+      .map([&](ChosenPolynomial polynomial) -> std::unique_ptr<OrientationModel> {
+        return std::make_unique<PolynomialErrorRotation>(frame, q_reference, std::move(polynomial));
+      });
 }
 
 Result<std::unique_ptr<OrientationModel>> loadPolynomialQuaternion(const nlohmann::json& parameters) {
@@ -65,7 +63,7 @@ Result<std::unique_ptr<OrientationModel>> loadPolynomialQuaternion(const nlohman
       "parameters of polynomial_quaternion", [&]() -> Result<std::unique_ptr<OrientationModel>> {
         return std::make_unique<PolynomialErrorRotation>(errorFrameFrom(parameters),
                                                          quaternionFrom(parameters.at("q_reference_wxyz")),
-                                                         PolynomialField::fromJson(parameters.at("vector_part")));
+                                                         ChosenPolynomial::fromJson(parameters.at("vector_part")));
       });
 }
 

@@ -7,27 +7,30 @@ namespace fieldtrue {
 Setting degreeSetting() {
   return {.key = "degree",
           .label = "Degree",
-          .type = SettingType::kInteger,
+          .type = SettingType::kAutoNumber,
           .unit = "",
           .min = 1,
           .max = PolynomialField::kMaxDegree,
-          .default_value = std::int64_t{3},
+          .default_value = 3.0,
           .choices = {},
-          .help = "Highest total power of x, y and z; each axis needs one level of places more than the degree."};
+          .help =
+              "Highest total power of x, y and z; each axis needs one level of places more than the degree. auto: "
+              "the lowest degree that predicts left-out places as well as the best one.",
+          .whole = true};
 }
 
 Setting r2Setting() {
   return {.key = "r2_cm2",
           .label = "R squared",
-          .type = SettingType::kNumber,
+          .type = SettingType::kAutoNumber,
           .unit = "cm2",
           .min = 10.0,
           .max = 1000.0,
           .default_value = 100.0,
           .choices = {},
           .help =
-              "Smoothness of the multiquadric: larger is smoother. The survey gives 10 to 1000 without a unit; read as "
-              "cm2."};
+              "Smoothness of the multiquadric: larger is smoother; auto takes what predicts left-out places best. The "
+              "survey gives 10 to 1000 without a unit; read as cm2."};
 }
 
 Setting errorFrameSetting() {

@@ -12,18 +12,46 @@
 namespace fieldtrue {
 namespace {
 
-constexpr int kDecimals = 4;
+constexpr int kFewestDecimals = 4;
+constexpr int kMostDecimals = 12;
+constexpr double kUnbounded = 1e9;
+constexpr double kWide = 1e3;  ///< From this ratio of range to smallest value on, steps follow the value's size.
+constexpr const char* kGiven = "given_value";
+constexpr const char* kShown = "shown_value";
+
+/// Decimals that show the smallest number a setting starts or ends with to three figures.
+int decimalsOf(const Setting& setting, double value) {
+  int decimals = kFewestDecimals;
+  for (const double number : {setting.min, value})
+    if (number != 0.0 && std::isfinite(number))
+      decimals = std::max(decimals, 2 - static_cast<int>(std::floor(std::log10(std::abs(number)))));
+  return std::min(decimals, kMostDecimals);
+}
 
 QDoubleSpinBox* makeNumber(const Setting& setting, double value, bool may_be_automatic) {
   auto* box = new QDoubleSpinBox;
-  box->setDecimals(kDecimals);
-  const double step = std::pow(10.0, std::floor(std::log10(std::max(1e-3, setting.max - setting.min))) - 1.0);
-  box->setRange(may_be_automatic ? setting.min - step : setting.min, setting.max);
+  const bool bounded = setting.min != 0.0 || setting.max != 0.0;
+  const double low = bounded ? setting.min : -kUnbounded, high = bounded ? setting.max : kUnbounded;
+  box->setDecimals(setting.whole ? 0 : decimalsOf(setting, value));
+  double step = setting.whole ? 1.0 : std::pow(10.0, std::floor(std::log10(std::max(1e-3, high - low))) - 1.0);
+  if (!setting.whole && (!bounded || (low > 0.0 && high / low > kWide))) {
+    box->setStepType(QAbstractSpinBox::AdaptiveDecimalStepType);
+    step = std::pow(10.0, -box->decimals());
+  }
+  box->setRange(may_be_automatic ? low - step : low, high);
   box->setSingleStep(step);
   if (!setting.unit.empty()) box->setSuffix(QStringLiteral(" ") + QString::fromStdString(setting.unit));
   if (may_be_automatic) box->setSpecialValueText(QObject::tr("automatic"));
   box->setValue(value);
+  // What nobody edits is given back to the last bit.
+  box->setProperty(kGiven, value);
+  box->setProperty(kShown, box->value());
   return box;
+}
+
+double numberOf(const QDoubleSpinBox* box) {
+  const double value = box->value();
+  return value == box->property(kShown).toDouble() ? box->property(kGiven).toDouble() : value;
 }
 
 SettingValue readEditor(const Setting& setting, QWidget* editor) {
@@ -33,11 +61,11 @@ SettingValue readEditor(const Setting& setting, QWidget* editor) {
     case SettingType::kInteger:
       return std::int64_t{static_cast<QSpinBox*>(editor)->value()};
     case SettingType::kNumber:
-      return static_cast<QDoubleSpinBox*>(editor)->value();
+      return numberOf(static_cast<QDoubleSpinBox*>(editor));
     case SettingType::kAutoNumber: {
       auto* box = static_cast<QDoubleSpinBox*>(editor);
-      if (box->value() < setting.min) return std::string("auto");
-      return box->value();
+      if (box->value() <= box->minimum()) return std::string("auto");
+      return numberOf(box);
     }
     case SettingType::kChoice:
       if (auto* combo = qobject_cast<QComboBox*>(editor)) return combo->currentText().toStdString();
@@ -93,7 +121,7 @@ QWidget* SettingsForm::makeEditor(const Setting& setting, const SettingValue& va
     case SettingType::kNumber:
     case SettingType::kAutoNumber: {
       const double* number = std::get_if<double>(&value);
-      auto* box = makeNumber(setting, number ? *number : setting.min - 1.0, setting.type == SettingType::kAutoNumber);
+      auto* box = makeNumber(setting, number ? *number : -2.0 * kUnbounded, setting.type == SettingType::kAutoNumber);
       connect(box, &QDoubleSpinBox::valueChanged, this, &SettingsForm::changed);
       return box;
     }

@@ -103,6 +103,18 @@ class SettingsTest : public QObject {
     QCOMPARE(choiceSetting(*settings, "column"), std::string("tip x [mm]"));
   }
 
+  void anAutoNumberMayTakeWholeNumbersOnly() {
+    Setting degree = setting("degree", SettingType::kAutoNumber, 3.0, 1, 6);
+    degree.whole = true;
+    const std::vector<Setting> whole{degree};
+    QCOMPARE(numberSetting(resolveSettings("poly", whole, {{"degree", "4"}}).value(), "degree"), 4.0);
+    QCOMPARE(choiceSetting(resolveSettings("poly", whole, {{"degree", "auto"}}).value(), "degree"),
+             std::string("auto"));
+    const auto half = resolveSettings("poly", whole, {{"degree", "2.5"}});
+    QVERIFY(!half);
+    FT_VERIFY_MATCH(holdsAll(half.error().message, {"degree must be auto or a whole number from 1 to 6, got '2.5'"}));
+  }
+
   void refusesValues_data() {
     QTest::addColumn<QString>("key");
     QTest::addColumn<QString>("value");

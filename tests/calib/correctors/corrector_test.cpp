@@ -285,7 +285,7 @@ class CorrectorTest : public QObject {
   void choicesAreParsedAndChecked() {
     const auto choice = parseCorrectorChoice("polynomial:degree=5", "hmq_matrix:r2_cm2=50,error_frame=sensor");
     FT_VERIFY_OK(choice);
-    QCOMPARE(integerSetting(choice->position_settings, "degree"), std::int64_t{5});
+    QCOMPARE(numberSetting(choice->position_settings, "degree"), 5.0);
     QCOMPARE(numberSetting(choice->orientation_settings, "r2_cm2"), 50.0);
     QCOMPARE(QString::fromStdString(choiceSetting(choice->orientation_settings, "error_frame")), QString("sensor"));
     for (const auto& [position, orientation] :
