@@ -15,6 +15,7 @@
 #include <cmath>
 
 #include "calib/core/file_io.h"
+#include "calib/effects/closed_loop.h"
 #include "calib/effects/compact_metal.h"
 #include "calib/effects/metal_plane.h"
 #include "calib/effects/object_reader.h"
@@ -97,7 +98,7 @@ nlohmann::json toJson(const EffectParameter& parameter) {
 }  // namespace
 
 std::span<const Effect> effects() {
-  static const std::array kEffects{compactMetalEffect(), metalPlaneEffect()};
+  static const std::array kEffects{compactMetalEffect(), metalPlaneEffect(), closedLoopEffect()};
   return kEffects;
 }
 

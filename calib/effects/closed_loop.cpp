@@ -1,0 +1,115 @@
+#include "calib/effects/closed_loop.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "calib/core/file_io.h"
+#include "calib/effects/parameters.h"
+
+namespace fieldtrue {
+
+namespace {
+
+/// Distance from a place to the wire of a ring about the origin.
+double fromWire_m(const Eigen::Vector3d& from_center_m, const Eigen::Vector3d& axis, double radius_m) {
+  const double z_m = axis.dot(from_center_m);
+  const double rho_m = (from_center_m - z_m * axis).norm();
+  return std::hypot(rho_m - radius_m, z_m);
+}
+
+class ClosedLoop final : public CouplingDistortion {
+ public:
+  ClosedLoop(const Eigen::Vector3d& center_m, const Eigen::Vector3d& axis, double radius_m, double wire_radius_m,
+             double strength)
+      : center_m_(center_m), axis_(axis), radius_m_(radius_m), wire_radius_m_(wire_radius_m) {
+    const double inductance_m = radius_m * (std::log(8.0 * radius_m / wire_radius_m) - 2.0);
+    current_m_ = -strength * 4.0 * std::numbers::pi / inductance_m * ringField_per_m(-center_m, axis, radius_m);
+  }
+
+  Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
+                              double /*time_s*/) const override {
+    return dipole_constant_m3 * ringField_per_m(p_sensor_m - center_m_, axis_, radius_m_) * current_m_.transpose();
+  }
+
+  bool admits(const Eigen::Vector3d& p_sensor_m) const override {
+    return fromWire_m(p_sensor_m - center_m_, axis_, radius_m_) > wire_radius_m_;
+  }
+
+ private:
+  Eigen::Vector3d center_m_;
+  Eigen::Vector3d axis_;
+  double radius_m_;
+  double wire_radius_m_;
+  Eigen::Vector3d current_m_;  ///< Induced by each transmitter coil, for C = 1 [1/m^2].
+};
+
+Result<std::unique_ptr<CouplingDistortion>> make(const nlohmann::json& parameters) {
+  const Eigen::Vector3d center_m = vectorOf(parameters, "center_m");
+  const Eigen::Vector3d normal = vectorOf(parameters, "normal");
+  const double radius_m = scalarOf(parameters, "radius_m");
+  const double wire_radius_m = scalarOf(parameters, "wire_radius_m");
+  if (normal.norm() < 1e-6) {
+    return fail(ErrorCode::kBadInput,
+                "closed_loop: normal is " + textOf(normal) + "; it must point along the axis of the loop.");
+  }
+  if (wire_radius_m > 0.25 * radius_m) {
+    return fail(ErrorCode::kBadInput, "closed_loop: wire_radius_m is " + formatNumber(wire_radius_m) +
+                                          "; it must be at most a quarter of radius_m, which is " +
+                                          formatNumber(radius_m) + ".");
+  }
+  const Eigen::Vector3d axis = normal.normalized();
+  if (fromWire_m(-center_m, axis, radius_m) <= wire_radius_m) {
+    return fail(ErrorCode::kBadInput, "closed_loop: center_m " + textOf(center_m) +
+                                          " puts the transmitter inside the wire of the loop; move the loop.");
+  }
+  return std::make_unique<ClosedLoop>(center_m, axis, radius_m, wire_radius_m, scalarOf(parameters, "strength"));
+}
+
+}  // namespace
+
+Eigen::Vector3d ringField_per_m(const Eigen::Vector3d& from_center_m, const Eigen::Vector3d& axis, double radius_m) {
+  const double z_m = axis.dot(from_center_m);
+  const Eigen::Vector3d across_m = from_center_m - z_m * axis;
+  const double rho_m = across_m.norm();
+  const double on_axis_m2 = radius_m * radius_m + z_m * z_m;
+  // Close to the axis the two elliptic integrals cancel; the series' next term is below 1e-8 of it there.
+  if (rho_m * rho_m < 1e-8 * on_axis_m2) {
+    const double along = radius_m * radius_m / (2.0 * on_axis_m2 * std::sqrt(on_axis_m2));
+    return along * axis + 1.5 * z_m / on_axis_m2 * along * across_m;
+  }
+  const double far_m2 = (radius_m + rho_m) * (radius_m + rho_m) + z_m * z_m;
+  const double near_m2 = (radius_m - rho_m) * (radius_m - rho_m) + z_m * z_m;
+  const double modulus = std::sqrt(4.0 * radius_m * rho_m / far_m2);
+  const double K = std::comp_ellint_1(modulus);
+  const double E = std::comp_ellint_2(modulus);
+  const double scale_per_m = 1.0 / (2.0 * std::numbers::pi * std::sqrt(far_m2));
+  const double along = scale_per_m * (K + (radius_m * radius_m - rho_m * rho_m - z_m * z_m) / near_m2 * E);
+  const double outward =
+      scale_per_m * z_m / rho_m * ((radius_m * radius_m + rho_m * rho_m + z_m * z_m) / near_m2 * E - K);
+  return along * axis + outward / rho_m * across_m;
+}
+
+Effect closedLoopEffect() {
+  Effect effect;
+  effect.id = "closed_loop";
+  effect.label = "Closed conducting loop";
+  effect.source = "Jackson 1999, Classical Electrodynamics, section 5.5; inductance: Maxwell 1873, art. 704";
+  effect.parameters = {
+      {"center_m", "m", "vector3", {1.0, 0.0, -1.0}, -100.0, 100.0, "Middle of the loop, tracker frame.", {}},
+      {"normal", "", "vector3", {0.0, 0.0, 1.0}, 0.0, 0.0, "Axis of the loop, tracker frame; any length.", {}},
+      {"radius_m", "m", "scalar", 0.3, 0.01, 10.0, "Of the loop.", {}},
+      {"wire_radius_m", "m", "scalar", 0.005, 1e-4, 0.5, "Of the wire or tube it is made of.", {}},
+      {"strength",
+       "",
+       "scalar",
+       1.0,
+       0.0,
+       1.0,
+       "Share of the current a loop without resistance would carry; below 1 for thin wire, bad joints or a low "
+       "carrier.",
+       {}}};
+  effect.make = make;
+  return effect;
+}
+
+}  // namespace fieldtrue
