@@ -2,11 +2,14 @@
 
 #include <Eigen/SVD>
 #include <array>
+#include <cstdio>
+#include <numbers>
 
 #include "calib/core/statistics.h"
 #include "calib/correctors/error_rotation.h"
 #include "calib/correctors/fit_checks.h"
 #include "calib/correctors/hmq_field.h"
+#include "calib/correctors/hmq_r2.h"
 #include "calib/correctors/json_values.h"
 #include "calib/correctors/shared_settings.h"
 
@@ -52,6 +55,14 @@ class HmqErrorRotation : public ErrorRotationModel {
   std::string note_;
 };
 
+/// For small angles the nine elements of two rotations differ, as a vector, by the square root of two times their
+/// angle.
+std::string textInDegrees(double rms_elements) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g deg", 180.0 / std::numbers::pi * rms_elements / std::numbers::sqrt2);
+  return text;
+}
+
 /// Error rotations of the visits of each place averaged, as matrix elements row after row.
 Eigen::MatrixXd placeElements(const Places& places, const std::vector<Eigen::Quaterniond>& q_error) {
   Eigen::MatrixXd elements(static_cast<Eigen::Index>(places.size()), 9);
@@ -74,11 +85,14 @@ Result<std::unique_ptr<OrientationModel>> fitHmqMatrix(const FitData& data, cons
     return fail(ErrorCode::kDegenerate, name + " needs places that span a plane or a volume, and these " +
                                             std::to_string(places.size()) + " lie " +
                                             (data.dimension == 1 ? "on one line" : "at one point"));
-  auto field =
-      MultiquadricField::fit(name, places.p_tracked_m, places.node, placeElements(places, errorRotations(data, frame)),
-                             1e-4 * numberSetting(settings, "r2_cm2"), control);
+  const Eigen::MatrixXd elements = placeElements(places, errorRotations(data, frame));
+  const auto r2 = chooseR2(name, places, elements, settings, textInDegrees, control);
+  if (!r2) return tl::unexpected(r2.error());
+  auto field = MultiquadricField::fit(name, places.p_tracked_m, places.node, elements, r2->r2_m2, control);
   if (!field) return tl::unexpected(field.error());
-  return std::make_unique<HmqErrorRotation>(frame, *std::move(field), planeNote(data, "nothing is claimed off it"));
+  std::string note = planeNote(data, "nothing is claimed off it");
+  note += (note.empty() || r2->note.empty() ? "" : " ") + r2->note;
+  return std::make_unique<HmqErrorRotation>(frame, *std::move(field), note);
 }
 
 Result<std::unique_ptr<OrientationModel>> loadHmqMatrix(const nlohmann::json& parameters) {

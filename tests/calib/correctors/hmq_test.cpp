@@ -1,4 +1,5 @@
 #include <Eigen/Dense>
+#include <QRegularExpression>
 #include <QTest>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -28,13 +29,30 @@ Eigen::VectorXd solveAndEvaluate(const std::vector<Eigen::Vector3d>& centers_m, 
       W(i, j) = std::sqrt((p_i - centers_m[static_cast<std::size_t>(j)]).squaredNorm() + r2_m2);
     w[i] = std::sqrt((p_m - p_i).squaredNorm() + r2_m2);
   }
-  return W.fullPivLu().solve(values).transpose() * w;
+  return W.partialPivLu().solve(values).transpose() * w;
 }
 
 Eigen::MatrixXd truthOf(const FitData& data) {
   Eigen::MatrixXd values(static_cast<Eigen::Index>(data.size()), 3);
   for (std::size_t i = 0; i < data.size(); ++i) values.row(static_cast<Eigen::Index>(i)) = data.p_true_m[i].transpose();
   return values;
+}
+
+/// RMS over places of what fits to all other places miss it by.
+double refittedRms_m(const FitData& data, double r2_cm2) {
+  double squares_m2 = 0.0;
+  for (std::size_t left_out = 0; left_out < data.size(); ++left_out) {
+    std::vector<Eigen::Vector3d> rest_m = data.p_tracked_m;
+    Eigen::MatrixXd truth = truthOf(data);
+    rest_m.erase(rest_m.begin() + static_cast<std::ptrdiff_t>(left_out));
+    const auto last = truth.rows() - 1;
+    const auto at = static_cast<Eigen::Index>(left_out);
+    truth.middleRows(at, last - at) = truth.bottomRows(last - at).eval();
+    const Eigen::Vector3d predicted_m =
+        solveAndEvaluate(rest_m, truth.topRows(last), 1e-4 * r2_cm2, data.p_tracked_m[left_out]);
+    squares_m2 += (predicted_m - data.p_true_m[left_out]).squaredNorm();
+  }
+  return std::sqrt(squares_m2 / static_cast<double>(data.size()));
 }
 
 }  // namespace
@@ -126,6 +144,63 @@ class HmqTest : public QObject {
       const auto settings = resolveSettings(method.id, method.settings, {{"r2_cm2", bad}});
       QVERIFY(!settings && settings.error().code == ErrorCode::kBadInput);
     }
+  }
+
+  void automaticRSquaredPredictsLeftOutPlacesBest_data() {
+    QTest::addColumn<double>("sharpness");
+    QTest::newRow("gentle bend") << 1.0;
+    QTest::newRow("sharp bend") << 6.0;
+  }
+  void automaticRSquaredPredictsLeftOutPlacesBest() {
+    QFETCH(double, sharpness);
+    const auto bend_m = [&](const Eigen::Vector3d& p) {
+      return Eigen::Vector3d(0.02 * std::sin(sharpness * p.x() + p.y()), 0.02 * std::cos(sharpness * p.y()),
+                             0.01 * std::sin(sharpness * (p.z() - p.x())));
+    };
+    const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), bend_m);
+    const auto automatic = fitPosition("hmq", data, {{"r2_cm2", "auto"}});
+    FT_VERIFY_OK(automatic);
+    const double chosen_cm2 = 1e4 * (*automatic)->parameters().at("r2_m2").get<double>();
+    const double chosen_rms_m = refittedRms_m(data, chosen_cm2);
+    for (int k = 0; k <= 8; ++k) {
+      const double tried_cm2 = std::pow(10.0, 1.0 + 0.25 * k);
+      QVERIFY2(chosen_rms_m <= 1.0005 * refittedRms_m(data, std::min(tried_cm2, 1000.0)),
+               qPrintable(QString("%1 beats the chosen %2 cm2").arg(tried_cm2).arg(chosen_cm2)));
+    }
+    const QString note = QString::fromStdString((*automatic)->note());
+    const QRegularExpressionMatch said = QRegularExpression("R squared = (\\S+) cm2.*RMS (\\S+) mm").match(note);
+    QVERIFY2(said.hasMatch(), qPrintable(note));
+    FT_VERIFY_MATCH(near(said.captured(1).toDouble(), chosen_cm2, 1e-9));
+    FT_VERIFY_MATCH(near(said.captured(2).toDouble(), 1000.0 * chosen_rms_m, 0.006 * 1000.0 * chosen_rms_m));
+    // The number that is said, given as the setting, makes the same field.
+    const auto by_hand = fitPosition("hmq", data, {{"r2_cm2", said.captured(1).toStdString()}});
+    FT_VERIFY_OK(by_hand);
+    QVERIFY((*by_hand)->parameters().at("alpha") == (*automatic)->parameters().at("alpha"));
+  }
+
+  void singlePrecisionStaysWithinWhatItStates() {
+    const FitData data = fitDataOf(shakenGrid({8, 8, 8}, 0.15, 0.01), wave_m);
+    const auto exact = fitPosition("hmq", data);
+    const auto single = fitPosition("hmq", data, {{"precision", "single"}});
+    FT_VERIFY_OK(exact);
+    FT_VERIFY_OK(single);
+    const QString note = QString::fromStdString((*single)->note());
+    const QRegularExpressionMatch said = QRegularExpression("within (\\S+) um").match(note);
+    QVERIFY2(said.hasMatch(), qPrintable(note));
+    const double stated_m = 1e-6 * said.captured(1).toDouble();
+    QVERIFY2(stated_m > 0.0 && stated_m < 1e-4, qPrintable(note));
+    double largest_m = 0.0;
+    for (const Eigen::Vector3d& p_m : randomPoints(3000, 99)) {
+      const Eigen::Vector3d from_corner_m = p_m - Eigen::Vector3d(0.4, -0.3, -0.2);
+      if (from_corner_m.minCoeff() < 0.0 || from_corner_m.maxCoeff() > 1.05) continue;
+      largest_m = std::max(largest_m, ((*single)->displacement_m(p_m) - (*exact)->displacement_m(p_m)).norm());
+    }
+    QVERIFY2(largest_m > 0.0 && largest_m <= stated_m, qPrintable(QString("%1 m").arg(largest_m)));
+    const auto reloaded = findPositionMethod("hmq").value()->load((*single)->parameters());
+    FT_VERIFY_OK(reloaded);
+    QVERIFY((*reloaded)->parameters() == (*single)->parameters());
+    for (const Eigen::Vector3d& p_m : randomPoints(100))
+      QVERIFY((*reloaded)->displacement_m(p_m) == (*single)->displacement_m(p_m));
   }
 
   void stopsWhenAsked() {
