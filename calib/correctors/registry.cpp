@@ -14,6 +14,7 @@
 #include "calib/correctors/automatic.h"
 #include "calib/correctors/bspline.h"
 #include "calib/correctors/gaussian_process.h"
+#include "calib/correctors/harmonic_field.h"
 #include "calib/correctors/hexahedral_shape.h"
 #include "calib/correctors/hmq.h"
 #include "calib/correctors/hmq_matrix.h"
@@ -52,12 +53,12 @@ Result<const CorrectionMethod<Model>*> findMethod(std::span<const CorrectionMeth
 
 std::span<const PositionMethod> positionMethods() {
   static const std::vector<PositionMethod> methods = {
-      nonePosition(),        rigidPosition(),           affinePosition(),
-      trilinearPosition(),   hexahedralShapePosition(), tetrahedralPosition(),
-      localLinearPosition(), localBumpPosition(),       localKindratenkoPosition(),
-      localBriggsPosition(), polynomialPosition(),      hmqPosition(),
-      rbfPosition(),         gaussianProcessPosition(), bsplinePosition(),
-      automaticPosition()};
+      nonePosition(),          rigidPosition(),           affinePosition(),
+      trilinearPosition(),     hexahedralShapePosition(), tetrahedralPosition(),
+      localLinearPosition(),   localBumpPosition(),       localKindratenkoPosition(),
+      localBriggsPosition(),   polynomialPosition(),      hmqPosition(),
+      rbfPosition(),           gaussianProcessPosition(), bsplinePosition(),
+      harmonicFieldPosition(), automaticPosition()};
   return methods;
 }
 

@@ -64,6 +64,7 @@ const std::map<std::string, Recovery> kPositionRecoveries = {
     {"rbf", {affine_m}},
     {"gaussian_process", {affine_m}},
     {"bspline", {affine_m}},
+    {"harmonic_field", {rigid_m}},
     {"auto", {cubic_m}},
 };
 

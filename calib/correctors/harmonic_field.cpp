@@ -1,0 +1,198 @@
+#include "calib/correctors/harmonic_field.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "calib/correctors/fit_checks.h"
+#include "calib/correctors/harmonic_field_fit.h"
+#include "calib/correctors/json_values.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr const char* kName = "The harmonic field";
+constexpr int kProbes = 7;  ///< Along each axis, for the uncertainty.
+
+/// The box of tracked positions in which the model is evaluated: beyond it the sources are near and nothing is known.
+struct TrackedBox {
+  Eigen::Vector3d low_m;
+  Eigen::Vector3d high_m;
+
+  /// The nearest point of the box, and not the transmitter itself, where the field has no value.
+  Eigen::Vector3d nearest_m(const Eigen::Vector3d& p_m) const {
+    const Eigen::Vector3d inside_m = p_m.cwiseMax(low_m).cwiseMin(high_m);
+    const double least_m = 1e-3 * (high_m - low_m).norm();
+    if (inside_m.norm() >= least_m) return inside_m;
+    return inside_m.isZero() ? Eigen::Vector3d(least_m, 0.0, 0.0) : Eigen::Vector3d(least_m * inside_m.normalized());
+  }
+
+  std::vector<Eigen::Vector3d> probes_m() const {
+    std::vector<Eigen::Vector3d> probes_m;
+    for (int i = 0; i < kProbes; ++i)
+      for (int j = 0; j < kProbes; ++j)
+        for (int k = 0; k < kProbes; ++k) {
+          const Eigen::Vector3d share = Eigen::Vector3d(i, j, k) / (kProbes - 1);
+          probes_m.push_back(nearest_m(low_m + share.cwiseProduct(high_m - low_m)));
+        }
+    return probes_m;
+  }
+};
+
+class HarmonicField : public PositionModel {
+ public:
+  HarmonicField(DisturbedField field, const Pose& field_from_truth, const TrackedBox& box, std::vector<double> sd_m,
+                std::string note)
+      : field_(std::move(field)),
+        field_from_truth_(field_from_truth),
+        truth_from_field_(inverse(field_from_truth)),
+        box_(box),
+        sd_m_(std::move(sd_m)),
+        note_(std::move(note)) {}
+
+  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
+    const Eigen::Vector3d inside_m = box_.nearest_m(p_tracked_m);
+    const Eigen::Vector3d in_field_m = p_tracked_m + (field_.truePosition_m(inside_m) - inside_m);
+    return truth_from_field_ * in_field_m - p_tracked_m;
+  }
+
+  /// Between the probes by trilinear interpolation; outside the box that of its nearest point.
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
+    const Eigen::Vector3d share =
+        (box_.nearest_m(p_tracked_m) - box_.low_m).cwiseQuotient((box_.high_m - box_.low_m).cwiseMax(1e-12));
+    std::array<std::size_t, 3> cell{};
+    Eigen::Vector3d part;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double place = std::clamp(share[axis], 0.0, 1.0) * (kProbes - 1);
+      const double start = std::min(std::floor(place), kProbes - 2.0);
+      cell[static_cast<std::size_t>(axis)] = static_cast<std::size_t>(start);
+      part[axis] = place - start;
+    }
+    double sd_m = 0.0;
+    for (std::size_t corner = 0; corner < 8; ++corner) {
+      const std::array<std::size_t, 3> up{corner >> 2U & 1U, corner >> 1U & 1U, corner & 1U};
+      double weight = 1.0;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        weight *= up[axis] == 1 ? part[static_cast<Eigen::Index>(axis)] : 1.0 - part[static_cast<Eigen::Index>(axis)];
+      sd_m += weight * sd_m_[((cell[0] + up[0]) * kProbes + cell[1] + up[1]) * kProbes + cell[2] + up[2]];
+    }
+    return sd_m;
+  }
+
+  std::string note() const override { return note_; }
+
+  nlohmann::json parameters() const override {
+    Eigen::MatrixXd sources(static_cast<Eigen::Index>(field_.sources().size()), 12);
+    for (Eigen::Index k = 0; k < sources.rows(); ++k) {
+      const FieldSource& source = field_.sources()[static_cast<std::size_t>(k)];
+      sources.row(k).head<3>() = source.at_m.transpose();
+      sources.row(k).tail<9>() = Eigen::Map<const Eigen::RowVector<double, 9>>(source.response.data());
+    }
+    return {{"sources", jsonOf(sources)},
+            {"field_from_truth", jsonOf(field_from_truth_)},
+            {"low_m", jsonOf(box_.low_m)},
+            {"high_m", jsonOf(box_.high_m)},
+            {"sd_m", sd_m_},
+            {"note", note_}};
+  }
+
+ private:
+  DisturbedField field_;
+  Pose field_from_truth_;
+  Pose truth_from_field_;
+  TrackedBox box_;
+  std::vector<double> sd_m_;
+  std::string note_;
+};
+
+Result<void> checkSpread(const FitData& data) {
+  const int dimension = std::min(data.dimension, pointSpread(data.p_tracked_m).dimension);
+  if (dimension >= 2) return {};
+  return fail(ErrorCode::kDegenerate, std::string(kName) + " needs places that span a plane or a volume, and these " +
+                                          std::to_string(data.size()) + " lie " +
+                                          (dimension == 1 ? "on one line" : "at one point"));
+}
+
+std::string noteOf(const FitData& data, const HarmonicFit& fit) {
+  const std::string plane = planeNote(data, "nothing is claimed off it");
+  if (!plane.empty() || !fit.field.sources().empty()) return plane;
+  return "No disturbance stands out from the noise: only the alignment is corrected";
+}
+
+Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Settings& settings,
+                                                   const RunControl& control) {
+  if (auto checked = checkPositions(data, kName); !checked) return tl::unexpected(checked.error());
+  if (auto checked = checkSpread(data); !checked) return tl::unexpected(checked.error());
+  TrackedBox box{data.p_tracked_m.front(), data.p_tracked_m.front()};
+  for (const Eigen::Vector3d& p_m : data.p_tracked_m) {
+    box.low_m = box.low_m.cwiseMin(p_m);
+    box.high_m = box.high_m.cwiseMax(p_m);
+  }
+  const double margin_m = 0.05 * (box.high_m - box.low_m).maxCoeff();
+  box.low_m.array() -= margin_m;
+  box.high_m.array() += margin_m;
+  const HarmonicOptions options{numberSetting(settings, "least_gain"),
+                                static_cast<std::size_t>(integerSetting(settings, "most_sources"))};
+  auto fit = fitHarmonicField(data, options, box.probes_m(), control);
+  if (!fit) return tl::unexpected(fit.error());
+  return std::make_unique<HarmonicField>(fit->field, fit->field_from_truth, box, fit->sd_m, noteOf(data, *fit));
+}
+
+Result<std::unique_ptr<PositionModel>> loadHarmonic(const nlohmann::json& parameters) {
+  using Loaded = Result<std::unique_ptr<PositionModel>>;
+  return guarded<std::unique_ptr<PositionModel>>("parameters of harmonic_field", [&]() -> Loaded {
+    const Eigen::MatrixXd rows = matrixFrom(parameters.at("sources"), 12);
+    std::vector<FieldSource> sources(static_cast<std::size_t>(rows.rows()));
+    for (Eigen::Index k = 0; k < rows.rows(); ++k) {
+      const Eigen::Matrix<double, 9, 1> response = rows.row(k).tail<9>().transpose();
+      sources[static_cast<std::size_t>(k)] = {rows.row(k).head<3>().transpose(),
+                                              Eigen::Map<const Eigen::Matrix3d>(response.data())};
+    }
+    const TrackedBox box{vectorFrom(parameters.at("low_m")), vectorFrom(parameters.at("high_m"))};
+    auto sd_m = parameters.at("sd_m").get<std::vector<double>>();
+    if (sd_m.size() != static_cast<std::size_t>(kProbes) * kProbes * kProbes)
+      throwMalformed("sd_m needs " + std::to_string(kProbes * kProbes * kProbes) + " numbers, got " +
+                     std::to_string(sd_m.size()));
+    return std::make_unique<HarmonicField>(DisturbedField(std::move(sources)),
+                                           poseFrom(parameters.at("field_from_truth")), box, std::move(sd_m),
+                                           parameters.at("note").get<std::string>());
+  });
+}
+
+}  // namespace
+
+PositionMethod harmonicFieldPosition() {
+  const Setting least_gain{.key = "least_gain",
+                           .label = "Evidence a source must add",
+                           .type = SettingType::kNumber,
+                           .unit = "nats",
+                           .min = 0.5,
+                           .max = 50.0,
+                           .default_value = 4.0,
+                           .choices = {},
+                           .help =
+                               "A further source of disturbance is believed in when it raises the logarithm of the "
+                               "marginal likelihood by this; larger is smoother."};
+  const Setting most_sources{.key = "most_sources",
+                             .label = "Most sources",
+                             .type = SettingType::kInteger,
+                             .unit = "",
+                             .min = 0,
+                             .max = 80,
+                             .default_value = std::int64_t{40},
+                             .choices = {},
+                             .help = "No more sources of disturbance than this are placed outside the region."};
+  PositionMethod method;
+  method.id = "harmonic_field";
+  method.label = "Harmonic field";
+  method.source =
+      "Jackson 1999, sections 1.8 and 5.4; Raab, Blood, Steiner, Jones 1979; sources chosen as in Tipping and Faul "
+      "2003";
+  method.settings = {least_gain, most_sources};
+  method.fit = fitHarmonic;
+  method.load = loadHarmonic;
+  method.most_folds = 10;
+  return method;
+}
+
+}  // namespace fieldtrue
