@@ -91,6 +91,19 @@ Comparison begin(const HeldOutJob& job, const std::vector<Node>& scored) {
   return comparison;
 }
 
+/// Which methods were held out from one fit, and what that means for what their fits choose.
+void noteClosedForm(Comparison& comparison) {
+  std::string names;
+  for (const auto* scores : {&comparison.position, &comparison.orientation})
+    for (const MethodScore& score : *scores)
+      if (score.closed_form && names.find(score.method) == std::string::npos)
+        names += (names.empty() ? "" : ", ") + score.method;
+  if (!names.empty())
+    comparison.notes.push_back("Held out in closed form, from one fit to all places: " + names +
+                               ". What such a fit chooses from the data (automatic settings, scales, knots) was "
+                               "chosen on all places.");
+}
+
 /// The same control, telling its progress as a part of the whole.
 RunControl partOf(const RunControl& control, double from, double to) {
   RunControl part = control;
@@ -116,6 +129,7 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
   scoreMethods(*job, *held_out, scored, comparison, control);
   if (control.stop.stop_requested()) return stoppedError();
   scoreCommonPlaces(comparison.position, comparison.places.size());
+  noteClosedForm(comparison);
   pickBest(comparison, options.seed, control);
   judgePlaces(comparison, *job);
   if (control.stop.stop_requested()) return stoppedError();

@@ -46,6 +46,7 @@ struct ComparisonOptions {
   /// Coverage, fold-back, dependence on orientation and what limits the best method, beside the scores. Without them
   /// only the scores and the rule of application are found.
   bool with_surroundings = true;
+  bool closed_form = true;  ///< False refits every fold of every method: the slow way, for checking the fast one.
 };
 
 /// One method's score on the places its fits did not see.

@@ -31,6 +31,8 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
   auto candidates = candidatesOf(options);
   if (!candidates) return tl::unexpected(candidates.error());
   job.candidates = *std::move(candidates);
+  for (Candidate& candidate : job.candidates)
+    if (!options.closed_form) candidate.hold_out = nullptr;
   job.validation = options.validation.value_or(defaultValidation(table));
   job.align = options.align.value_or(defaultAlignMode(table.metadata));
   job.has_orientation =

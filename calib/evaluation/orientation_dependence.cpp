@@ -72,9 +72,10 @@ Result<OrientationDependence> orientationDependence(const CalibrationTable& tabl
   }
   dependence.by_neighbours = !has_visits;
   const bool hold_out_orientations = rows->n_groups >= kEnoughToHoldOut;
-  judge(has_visits ? nestedModelErrors(*rows, hold_out_orientations, seed) : neighbourErrors(*rows, seed), seed,
-        dependence);
+  const NestedErrors errors =
+      has_visits ? nestedModelErrors(*rows, hold_out_orientations, seed, control) : neighbourErrors(*rows, seed);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
+  judge(errors, seed, dependence);
   dependence.text = answerText(dependence);
   if (dependence.by_neighbours)
     dependence.text += ", judged by neighbours in position and orientation, which is weaker than visits of one place";

@@ -5,22 +5,28 @@
 #include <limits>
 #include <numeric>
 
-#include "calib/core/geometry.h"
 #include "calib/evaluation/orientation_rows.h"
 #include "calib/evaluation/resampling.h"
 
 namespace fieldtrue {
 namespace {
 
-/// Functions of an orientation that vary with one and with two turns of it: the nine entries of its matrix, and the
-/// 25 entries of the matrix by which it turns symmetric, traceless tensors. The latter count less: smooth comes first.
+/// Three families of error rotations that depend on the orientation, each held back by the same ridge:
+/// - fixed to the sensor, a function of degree 0 to 2 of the direction in which it sees the transmitter (what unequal
+///   or skewed coils of the sensor do), 3 components times 9 functions;
+/// - fixed to the tracker, of degree 1 in the orientation: times the 9 entries of its matrix;
+/// - fixed to the tracker, of degree 2: times the 25 entries of the matrix by which it turns symmetric, traceless
+///   tensors. These count less: smooth comes first.
+constexpr Eigen::Index kSeen = 9;
 constexpr Eigen::Index kDegreeOne = 9;
 constexpr Eigen::Index kDegreeTwo = 25;
-constexpr Eigen::Index kTerms = kDegreeOne + kDegreeTwo + 3 * kDegreeOne;
+constexpr Eigen::Index kTerms = 3 * (kSeen + kDegreeOne + kDegreeTwo);
 constexpr double kDegreeTwoShare = 0.5;
-constexpr double kTimesPlaceShare = 0.5;
-constexpr std::array<double, 6> kRidges = {1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0};
-constexpr std::size_t kPlaceGroups = 5;
+constexpr std::array<double, 6> kRidges = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0};
+constexpr std::size_t kPlaceGroups = 3;
+/// More places than this tell no more about the orientation, and only take time.
+constexpr std::size_t kMostPlaces = 120;
+constexpr std::size_t kMostInnerCuts = 4;
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
 /// An orthonormal basis of symmetric, traceless 3x3 matrices.
@@ -37,78 +43,93 @@ std::array<Eigen::Matrix3d, 5> tracelessBasis() {
   return basis;
 }
 
-Eigen::RowVectorXd orientationTerms(const Eigen::Quaterniond& q, const Eigen::Vector3d& place) {
-  static const std::array<Eigen::Matrix3d, 5> basis = tracelessBasis();
-  const Eigen::Matrix3d R = q.toRotationMatrix();
-  Eigen::RowVectorXd terms(kTerms);
-  for (Eigen::Index i = 0; i < kDegreeOne; ++i) terms[i] = R(i / 3, i % 3);
-  for (std::size_t a = 0; a < 5; ++a)
-    for (std::size_t b = 0; b < 5; ++b)
-      terms[kDegreeOne + static_cast<Eigen::Index>(5 * a + b)] =
-          kDegreeTwoShare * basis[a].cwiseProduct(R * basis[b] * R.transpose()).sum();
-  for (Eigen::Index axis = 0; axis < 3; ++axis)
-    terms.segment(kDegreeOne + kDegreeTwo + kDegreeOne * axis, kDegreeOne) =
-        kTimesPlaceShare * place[axis] * terms.head(kDegreeOne);
-  return terms;
+/// Spherical functions of degree 0 to 2 of a direction.
+Eigen::Matrix<double, kSeen, 1> sphericalFunctions(const Eigen::Vector3d& u) {
+  Eigen::Matrix<double, kSeen, 1> values;
+  values << 1.0, u.x(), u.y(), u.z(), u.x() * u.y(), u.y() * u.z(), u.z() * u.x(),
+      0.5 * (u.x() * u.x() - u.y() * u.y()), 0.5 * (3.0 * u.z() * u.z() - 1.0);
+  return values;
 }
 
-/// What the models are fitted to: one row each.
+using TermBlock = Eigen::Matrix<double, 3, kTerms>;
+
+TermBlock termsOf(const Eigen::Quaterniond& q_true, const Eigen::Vector3d& p_tracked_m) {
+  static const std::array<Eigen::Matrix3d, 5> basis = tracelessBasis();
+  const Eigen::Matrix3d R = q_true.toRotationMatrix();
+  const auto seen = sphericalFunctions(R.transpose() * p_tracked_m.normalized());
+  TermBlock block;
+  Eigen::Index column = 0;
+  for (Eigen::Index j = 0; j < kSeen; ++j, column += 3) block.middleCols<3>(column) = seen[j] * R;
+  for (Eigen::Index i = 0; i < kDegreeOne; ++i, column += 3)
+    block.middleCols<3>(column) = R(i / 3, i % 3) * Eigen::Matrix3d::Identity();
+  for (const Eigen::Matrix3d& a : basis)
+    for (const Eigen::Matrix3d& b : basis) {
+      const double entry = kDegreeTwoShare * a.cwiseProduct(R * b * R.transpose()).sum();
+      block.middleCols<3>(column) = entry * Eigen::Matrix3d::Identity();
+      column += 3;
+    }
+  return block;
+}
+
+/// What the models are fitted to.
 struct Problem {
-  Eigen::MatrixXd terms;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> error_deg;
+  std::vector<TermBlock> terms;
+  std::vector<Eigen::Vector3d> error_deg;
   std::vector<std::size_t> place;
   std::vector<std::size_t> place_group;
   std::vector<std::size_t> group;
+  std::size_t n_places = 0;
   std::size_t n_groups = 0;
 };
 
 Problem problemOf(const OrientationRows& rows, std::uint64_t seed) {
-  const PointSpread spread = pointSpread(rows.p_tracked_m);
-  const double scale_m = std::max(spread.sd_m.x(), 1e-9);
-  Problem problem;
-  const auto n = static_cast<Eigen::Index>(rows.size());
-  problem.terms.resize(n, kTerms);
-  problem.error_deg.resize(n, 3);
-  std::vector<std::size_t> group_of_place(rows.n_places);
-  for (std::size_t p = 0; p < rows.n_places; ++p) group_of_place[p] = p % kPlaceGroups;
+  std::vector<std::size_t> rank(rows.n_places);
+  std::iota(rank.begin(), rank.end(), std::size_t{0});
   IndexSource source(seed);
-  for (std::size_t p = rows.n_places; p > 1; --p) std::swap(group_of_place[p - 1], group_of_place[source.below(p)]);
+  for (std::size_t p = rows.n_places; p > 1; --p) std::swap(rank[p - 1], rank[source.below(p)]);
+  Problem problem;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    problem.terms.row(row) = orientationTerms(rows.q_true[i], (rows.p_tracked_m[i] - spread.center_m) / scale_m);
-    problem.error_deg.row(row) = rows.error_deg[i].transpose();
-    problem.place_group.push_back(group_of_place[rows.place[i]]);
+    const std::size_t place = rank[rows.place[i]];
+    if (place >= kMostPlaces) continue;
+    problem.terms.push_back(termsOf(rows.q_true[i], rows.p_tracked_m[i]));
+    problem.error_deg.push_back(rows.error_deg[i]);
+    problem.place.push_back(place);
+    problem.place_group.push_back(place % kPlaceGroups);
+    problem.group.push_back(rows.group[i]);
   }
-  problem.place = rows.place;
-  problem.group = rows.group;
+  problem.n_places = std::min(rows.n_places, kMostPlaces);
   problem.n_groups = rows.n_groups;
   return problem;
 }
 
-/// Rows with the mean of their place's rows taken off, whatever function of the place that is.
+/// Rows with the mean of their place's rows taken off, whatever function of the place that is: three lines each.
 struct Centered {
   Eigen::MatrixXd terms;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> error_deg;
+  Eigen::VectorXd error_deg;
 };
 
 /// Takes off each row the mean over the reference rows of its place; rows whose place has none are left out.
 /// @param reference rows that the means are taken over
+/// @param used receives the rows that are there
 Centered centered(const Problem& problem, const std::vector<std::size_t>& rows,
                   const std::vector<std::size_t>& reference, std::vector<std::size_t>& used) {
-  const std::size_t n_places = *std::max_element(problem.place.begin(), problem.place.end()) + 1;
-  std::vector<std::vector<Eigen::Index>> of_place(n_places);
-  for (const std::size_t i : reference) of_place[problem.place[i]].push_back(static_cast<Eigen::Index>(i));
+  std::vector<TermBlock> mean_terms(problem.n_places, TermBlock::Zero());
+  std::vector<Eigen::Vector3d> mean_deg(problem.n_places, Eigen::Vector3d::Zero());
+  std::vector<double> n_mates(problem.n_places, 0.0);
+  for (const std::size_t i : reference) {
+    mean_terms[problem.place[i]] += problem.terms[i];
+    mean_deg[problem.place[i]] += problem.error_deg[i];
+    n_mates[problem.place[i]] += 1.0;
+  }
   for (const std::size_t i : rows)
-    if (!of_place[problem.place[i]].empty()) used.push_back(i);
-  Centered result{Eigen::MatrixXd(static_cast<Eigen::Index>(used.size()), kTerms),
-                  Eigen::Matrix<double, Eigen::Dynamic, 3>(static_cast<Eigen::Index>(used.size()), 3)};
+    if (n_mates[problem.place[i]] > 0.0) used.push_back(i);
+  const auto n_lines = 3 * static_cast<Eigen::Index>(used.size());
+  Centered result{Eigen::MatrixXd(n_lines, kTerms), Eigen::VectorXd(n_lines)};
   for (std::size_t k = 0; k < used.size(); ++k) {
-    const std::vector<Eigen::Index>& mates = of_place[problem.place[used[k]]];
-    const auto row = static_cast<Eigen::Index>(k);
-    result.terms.row(row) =
-        problem.terms.row(static_cast<Eigen::Index>(used[k])) - problem.terms(mates, Eigen::all).colwise().mean();
-    result.error_deg.row(row) = problem.error_deg.row(static_cast<Eigen::Index>(used[k])) -
-                                problem.error_deg(mates, Eigen::all).colwise().mean();
+    const std::size_t place = problem.place[used[k]];
+    const auto line = 3 * static_cast<Eigen::Index>(k);
+    result.terms.middleRows<3>(line) = problem.terms[used[k]] - mean_terms[place] / n_mates[place];
+    result.error_deg.segment<3>(line) = problem.error_deg[used[k]] - mean_deg[place] / n_mates[place];
   }
   return result;
 }
@@ -116,20 +137,22 @@ Centered centered(const Problem& problem, const std::vector<std::size_t>& rows,
 /// Ridge regressions of one training set, for every ridge from one decomposition.
 class RidgeFits {
  public:
-  explicit RidgeFits(const Centered& train)
-      : eigen_(train.terms.transpose() * train.terms),
-        moments_(eigen_.eigenvectors().transpose() * (train.terms.transpose() * train.error_deg)),
-        n_rows_(static_cast<double>(train.terms.rows())) {}
+  explicit RidgeFits(const Centered& train) : n_lines_(static_cast<double>(train.terms.rows())) {
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(kTerms, kTerms);
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(train.terms.transpose());
+    eigen_.compute(normal);
+    moments_ = eigen_.eigenvectors().transpose() * (train.terms.transpose() * train.error_deg);
+  }
 
-  Eigen::Matrix<double, Eigen::Dynamic, 3> coefficients(double ridge) const {
-    const Eigen::ArrayXd damped = eigen_.eigenvalues().array().max(0.0) + ridge * n_rows_ * 0.01;
-    return eigen_.eigenvectors() * (moments_.array().colwise() / damped).matrix();
+  Eigen::VectorXd coefficients(double ridge) const {
+    const Eigen::ArrayXd damped = eigen_.eigenvalues().array().max(0.0) + ridge * n_lines_;
+    return eigen_.eigenvectors() * (moments_.array() / damped).matrix();
   }
 
  private:
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen_;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> moments_;
-  double n_rows_;
+  Eigen::VectorXd moments_;
+  double n_lines_;
 };
 
 /// What is left out: a group of places and, unless kNone, a group of orientations.
@@ -165,19 +188,25 @@ struct CutResult {
   Eigen::MatrixXd squares_deg2;  ///< One row each, one column a ridge, the last without terms.
 };
 
+/// Sum of squares of each row's three lines.
+Eigen::VectorXd rowSquares(const Eigen::VectorXd& lines) {
+  return lines.reshaped(3, lines.size() / 3).colwise().squaredNorm().transpose();
+}
+
 CutResult scoreCut(const Problem& problem, const std::vector<std::size_t>& rows, const Cut& cut) {
   const CutRows parts = cutRows(problem, rows, cut);
   CutResult result;
   std::vector<std::size_t> trained;
   const Centered train = centered(problem, parts.fitted, parts.fitted, trained);
   const Centered test = centered(problem, parts.scored, parts.reference, result.rows);
-  result.squares_deg2.resize(test.error_deg.rows(), static_cast<Eigen::Index>(kRidges.size()) + 1);
-  result.squares_deg2.rightCols<1>() = test.error_deg.rowwise().squaredNorm();
+  result.squares_deg2.resize(static_cast<Eigen::Index>(result.rows.size()),
+                             static_cast<Eigen::Index>(kRidges.size()) + 1);
+  result.squares_deg2.colwise() = rowSquares(test.error_deg);
   if (trained.empty() || result.rows.empty()) return result;
   const RidgeFits fits(train);
   for (std::size_t r = 0; r < kRidges.size(); ++r)
     result.squares_deg2.col(static_cast<Eigen::Index>(r)) =
-        (test.error_deg - test.terms * fits.coefficients(kRidges[r])).rowwise().squaredNorm();
+        rowSquares(test.error_deg - test.terms * fits.coefficients(kRidges[r]));
   return result;
 }
 
@@ -195,8 +224,10 @@ std::vector<Cut> cutsOf(const Problem& problem, bool hold_out_orientations) {
 Eigen::Index chooseRidge(const Problem& problem, const std::vector<std::size_t>& training, const Cut& outer) {
   Eigen::RowVectorXd squares = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(kRidges.size()) + 1);
   const bool turned = outer.orientations != kNone;
-  for (std::size_t g = 0; g < (turned ? problem.n_groups : kPlaceGroups); ++g) {
+  std::size_t n_cuts = 0;
+  for (std::size_t g = 0; g < (turned ? problem.n_groups : kPlaceGroups) && n_cuts < kMostInnerCuts; ++g) {
     if (g == (turned ? outer.orientations : outer.places)) continue;
+    ++n_cuts;
     // One group of places serves as test with every orientation: the next one round.
     const Cut inner = turned ? Cut{(outer.places + 1 + g % (kPlaceGroups - 1)) % kPlaceGroups, g} : Cut{g, kNone};
     const CutResult result = scoreCut(problem, training, inner);
@@ -235,20 +266,27 @@ class PlaceSquares {
 
 }  // namespace
 
-NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orientations, std::uint64_t seed) {
+NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orientations, std::uint64_t seed,
+                               const RunControl& control) {
   const Problem problem = problemOf(rows, seed);
-  std::vector<std::size_t> all(rows.size());
+  std::vector<std::size_t> all(problem.place.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  PlaceSquares squares(rows.n_places);
-  for (const Cut& cut : cutsOf(problem, hold_out_orientations)) {
-    const Eigen::Index chosen = chooseRidge(problem, cutRows(problem, all, cut).fitted, cut);
-    const CutResult result = scoreCut(problem, all, cut);
-    for (std::size_t k = 0; k < result.rows.size(); ++k) {
+  const std::vector<Cut> cuts = cutsOf(problem, hold_out_orientations);
+  std::vector<CutResult> results(cuts.size());
+  std::vector<Eigen::Index> chosen(cuts.size(), 0);
+  control.parallel_for(cuts.size(), [&](std::size_t c) {
+    if (control.stop.stop_requested()) return;
+    chosen[c] = chooseRidge(problem, cutRows(problem, all, cuts[c]).fitted, cuts[c]);
+    results[c] = scoreCut(problem, all, cuts[c]);
+  });
+  PlaceSquares squares(problem.n_places);
+  for (std::size_t c = 0; c < cuts.size(); ++c)
+    for (std::size_t k = 0; k < results[c].rows.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(k);
-      squares.add(problem.place[result.rows[k]], result.squares_deg2(row, result.squares_deg2.cols() - 1),
-                  result.squares_deg2(row, chosen));
+      const Eigen::MatrixXd& squares_deg2 = results[c].squares_deg2;
+      squares.add(problem.place[results[c].rows[k]], squares_deg2(row, squares_deg2.cols() - 1),
+                  squares_deg2(row, chosen[c]));
     }
-  }
   return squares.errors();
 }
 

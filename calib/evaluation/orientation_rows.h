@@ -7,6 +7,7 @@
 
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
+#include "calib/core/run_control.h"
 
 namespace fieldtrue {
 
@@ -39,10 +40,11 @@ struct NestedErrors {
 };
 
 /// Within each place the mean error is free (any function of the place); the larger model adds functions of the true
-/// orientation of degree 1 and 2, those of degree 1 also times the coordinates, held back by a ridge that is chosen
-/// inside the training rows and may be infinite.
-/// @param hold_out_orientations leaves out whole orientations too, where rows scored are in neither what was fitted
-NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orientations, std::uint64_t seed);
+/// orientation up to degree 2, held back by a ridge that is chosen inside the training rows and may be infinite.
+/// @param hold_out_orientations leaves out whole orientations too: rows are scored by fits that saw neither their place
+///        nor their orientation
+NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orientations, std::uint64_t seed,
+                               const RunControl& control);
 
 /// What the nearest other places tell about each row, near in position, or in position and orientation. The scale
 /// between the two is chosen on the other half of the places.

@@ -1,0 +1,200 @@
+#include <QTest>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "calib/evaluation/comparison.h"
+#include "calib/evaluation/limits.h"
+#include "calib/evaluation/resampling.h"
+#include "tests/support/matchers.h"
+#include "tests/support/synthetic.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+CalibrationTable bentTable(double distortion_m, double placing_sd_m, std::array<int, 3> counts = {5, 5, 5}) {
+  SyntheticOptions options;
+  options.counts = counts;
+  options.smooth_distortion_m = distortion_m;
+  return syntheticTable(options, {.seed = 3, .position_sd_m = 0.0001, .placing_sd_m = placing_sd_m});
+}
+
+Comparison compared(const CalibrationTable& table, std::vector<MethodText> methods) {
+  ComparisonOptions options;
+  options.position_methods = std::move(methods);
+  options.orientation_methods = {{"none", {}}};
+  const auto comparison = compareMethods(table, options);
+  if (!comparison) qFatal("%s", comparison.error().message.c_str());
+  return *comparison;
+}
+
+double rms(const std::vector<double>& values) {
+  double squares = 0.0;
+  for (const double value : values) squares += value * value;
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+}  // namespace
+
+class VerdictTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void theBestIsNoDistanceFromItself() {
+    const Comparison comparison = compared(bentTable(0.03, 0.0), {{"none", {}}, {"affine", {}}, {"hmq", {}}});
+    QVERIFY(comparison.best_position_row.has_value());
+    const MethodScore& best = comparison.position[*comparison.best_position_row];
+    QVERIFY(best.rms_to_best == 0.0 && best.rms_to_best_low90 == 0.0 && best.rms_to_best_high90 == 0.0);
+    for (const MethodScore& score : comparison.position) {
+      FT_VERIFY_MATCH(near(score.rms_to_best, score.stats.rms - best.stats.rms, 1e-12));
+      QVERIFY(score.rms_to_best_low90 <= score.rms_to_best && score.rms_to_best <= score.rms_to_best_high90);
+    }
+    // Without a correction the error is so much larger that no resample could hide it.
+    QVERIFY(comparison.position.front().rms_to_best_low90 > 0.0);
+  }
+
+  void swappedErrorsAreAsGoodAsEachOther() {
+    // The two methods err alike with places swapped in pairs: no difference, and the interval is the same both ways.
+    std::mt19937_64 generator(4);
+    std::uniform_real_distribution<double> uniform(0.5, 3.0);
+    std::vector<double> a;
+    std::vector<double> b;
+    for (int i = 0; i < 40; ++i) {
+      const double x = uniform(generator);
+      const double y = uniform(generator);
+      a.insert(a.end(), {x, y});
+      b.insert(b.end(), {y, x});
+    }
+    const PairedDifference ab = pairedDifference(a, b, 1);
+    FT_VERIFY_MATCH(near(ab.difference, 0.0, 1e-12));
+    QVERIFY(ab.low90 < 0.0 && ab.high90 > 0.0);
+    const PairedDifference ba = pairedDifference(b, a, 1);
+    FT_VERIFY_MATCH(near(ba.low90, -ab.high90, 1e-12));
+    FT_VERIFY_MATCH(near(ba.high90, -ab.low90, 1e-12));
+  }
+
+  void pairingSeesWhatSpreadHides() {
+    // One method errs by 0.1 mm more at every place while places differ by several mm.
+    std::vector<double> a;
+    std::vector<double> b;
+    for (int i = 0; i < 60; ++i) {
+      a.push_back(1.0 + 0.1 * i);
+      b.push_back(1.1 + 0.1 * i);
+    }
+    const PairedDifference difference = pairedDifference(b, a, 1);
+    QVERIFY(difference.low90 > 0.08 && difference.high90 < 0.1);
+    QVERIFY(errorStats(a).rms_high90 > errorStats(b).rms_low90);
+  }
+
+  void insideAndEdgeAreThoseOfTheGrid() {
+    // 5 x 5 x 5: 27 places have neighbours on all sides.
+    const Comparison comparison = compared(bentTable(0.03, 0.0), {{"polynomial", {{"degree", "3"}}}});
+    QVERIFY(comparison.verdict.apply_position);
+    const MethodScore& best = comparison.position.front();
+    std::vector<double> inside;
+    std::vector<double> edge;
+    for (std::size_t i = 0; i < comparison.places.size(); ++i) {
+      const int node = comparison.places[i];
+      const auto is_inner = [](int level) { return level > 0 && level < 4; };
+      const bool is_inside = is_inner(node % 5) && is_inner(node / 5 % 5) && is_inner(node / 25);
+      (is_inside ? inside : edge).push_back(best.place_errors[i]);
+    }
+    QCOMPARE(inside.size(), std::size_t{27});
+    FT_VERIFY_MATCH(near(comparison.verdict.inside_mm.value(), rms(inside), 1e-9));
+    FT_VERIFY_MATCH(near(comparison.verdict.edge_mm.value(), rms(edge), 1e-9));
+    const auto worst = std::max_element(best.place_errors.begin(), best.place_errors.end());
+    FT_VERIFY_MATCH(near(comparison.verdict.worst_mm, *worst, 0.0));
+    QCOMPARE(comparison.verdict.worst_node,
+             comparison.places[static_cast<std::size_t>(worst - best.place_errors.begin())]);
+    FT_VERIFY_MATCH(holdsAll(comparison.verdict.text, {"Apply polynomial", "expect ", "mm inside the region and ",
+                                                       "mm near its edge", "mm at worst (place ", "limited by "}));
+  }
+
+  void outermostPlacesOfABoard() {
+    SyntheticOptions options;
+    options.counts = {4, 4, 1};
+    options.reference_from_tracker = {{0, 0, 0}, rotationFromVector({0.2, 0.5, 0.1})};
+    const CalibrationTable table = syntheticTable(options);
+    std::vector<int> places;
+    for (const Node& node : table.nodes) places.push_back(node.node);
+    const std::vector<bool> is_outermost = outermostPlaces(table.nodes, table.nodes, places);
+    QCOMPARE(std::count(is_outermost.begin(), is_outermost.end(), false), 4);
+    for (const std::size_t inner : {5U, 6U, 9U, 10U}) QVERIFY(!is_outermost[inner]);
+  }
+
+  void aGoodCorrectionIsLimitedByTheJig() {
+    // 5 mm a place and axis: after the smooth part is gone, 8.7 mm are left, and the floor says so.
+    const Comparison comparison = compared(bentTable(0.04, 0.005, {7, 7, 7}), {{"polynomial", {{"degree", "4"}}}});
+    QVERIFY(comparison.verdict.apply_position);
+    FT_VERIFY_MATCH(near(comparison.floor_position_mm, 5.0 * std::sqrt(3.0), 1e-9));
+    FT_VERIFY_MATCH(
+        holdsAll(comparison.verdict.limited_by, {"how exactly the places themselves are known", "jig tolerance"}));
+  }
+
+  void oneWrongPlaceIsNamed() {
+    CalibrationTable table = bentTable(0.03, 0.0);
+    table.nodes[62].reference_from_sensor.position_m.z() += 0.04;  // The middle place.
+    const Comparison comparison = compared(table, {{"polynomial", {{"degree", "3"}}}});
+    QCOMPARE(comparison.verdict.worst_node, table.nodes[62].node);
+    FT_VERIFY_MATCH(holdsAll(comparison.verdict.limited_by, {"place 62 alone"}));
+  }
+
+  void morePlacesWouldHelpWhereTheFieldIsCoarselySampled() {
+    // A wave over the grid, hardly any noise, and no more places than needed: hmq interpolates, and half the places do
+    // much worse. The edge is made as good as the inside by judging inner places only.
+    CalibrationTable table = bentTable(0.05, 0.0, {6, 6, 6});
+    for (Node& node : table.nodes) {
+      const auto is_inner = [](int level) { return level > 0 && level < 5; };
+      if (is_inner((*node.index)[0]) && is_inner((*node.index)[1]) && is_inner((*node.index)[2]) &&
+          ((*node.index)[0] + (*node.index)[1] + (*node.index)[2]) % 3 == 0)
+        node.role = NodeRole::kValidation;
+    }
+    const Comparison comparison = compared(table, {{"hmq", {}}});
+    QVERIFY(comparison.verdict.apply_position && !comparison.verdict.edge_mm);
+    FT_VERIFY_MATCH(holdsAll(comparison.verdict.limited_by, {"detail of the field", "more places would help"}));
+  }
+
+  void truenessIsWhatTheFloorDoesNotExplain() {
+    FT_VERIFY_MATCH(near(excessError(5.0, 3.0), 4.0, 1e-12));
+    FT_VERIFY_MATCH(near(excessError(3.0, 5.0), 0.0, 0.0));
+    const Comparison comparison = compared(bentTable(0.03, 0.002), {{"none", {}}, {"hmq", {}}});
+    const double floor_mm = 2.0 * std::sqrt(3.0);
+    const double before_mm = comparison.before_position_mm.rms;
+    FT_VERIFY_MATCH(
+        near(comparison.trueness.before_position_mm, std::sqrt(before_mm * before_mm - floor_mm * floor_mm), 1e-9));
+    const nlohmann::json json = nlohmann::json::parse(toJson(comparison).dump());
+    QVERIFY(json.at("trueness").at("before").at("position_mm").is_number());
+    QVERIFY(json.at("trueness").at("after").at("position_mm") < json.at("trueness").at("before").at("position_mm"));
+    // The table states no tolerance of orientation and no noise: nothing is known apart.
+    QVERIFY(json.at("trueness").at("before").at("orientation_deg").is_null());
+  }
+
+  void surroundingsAreToldOnlyWhenAskedFor() {
+    ComparisonOptions options;
+    options.position_methods = {{"none", {}}, {"affine", {}}};
+    options.with_surroundings = false;
+    const auto bare = compareMethods(bentTable(0.03, 0.0), options);
+    FT_VERIFY_OK(bare);
+    const nlohmann::json without = toJson(*bare);
+    for (const char* key : {"coverage", "fold_back", "orientation_dependence"})
+      QVERIFY2(without.at(key).is_null(), key);
+    options.with_surroundings = true;
+    const auto whole = compareMethods(bentTable(0.03, 0.0), options);
+    FT_VERIFY_OK(whole);
+    const nlohmann::json with = toJson(*whole);
+    for (const char* key : {"coverage", "fold_back", "orientation_dependence"}) QVERIFY2(with.at(key).is_object(), key);
+    QCOMPARE(with.at("resampling").size(), std::size_t{3});
+    for (const char* key : {"method", "rms_mm", "excess_mm", "n_scored", "n_without_support"})
+      QVERIFY2(with.at("resampling").at(0).contains(key), key);
+    for (const char* key : {"rms_to_best", "rms_to_best_low90", "rms_to_best_high90", "n_folds", "closed_form"})
+      QVERIFY2(with.at("position").at(0).contains(key), key);
+    for (const char* key : {"inside_mm", "edge_mm", "worst_place", "worst_mm", "limited_by"})
+      QVERIFY2(with.at("verdict").contains(key), key);
+    // The scores themselves are the same.
+    for (std::size_t i = 0; i < 2; ++i) QCOMPARE(whole->position[i].place_errors, bare->position[i].place_errors);
+  }
+};
+
+QTEST_GUILESS_MAIN(VerdictTest)
+#include "verdict_test.moc"
