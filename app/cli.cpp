@@ -129,6 +129,7 @@ int main(int argc, char** argv) {
   fieldtrue::cli::addAcquireCommand(line);
   fieldtrue::cli::addEmulateCommand(line);
   fieldtrue::cli::addFitCommands(line);
+  fieldtrue::cli::addResampleCommand(line);
   fieldtrue::cli::addListCommands(line);
   return line.run(argc, argv);
 }

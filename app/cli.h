@@ -89,11 +89,12 @@ class CommandLine {
   std::function<Outcome()> run_;
 };
 
-void addDataCommands(CommandLine& line);    ///< simulate, tables, import, export
-void addApplyCommand(CommandLine& line);    ///< apply
-void addFitCommands(CommandLine& line);     ///< fit, compare, report
-void addAcquireCommand(CommandLine& line);  ///< acquire
-void addEmulateCommand(CommandLine& line);  ///< emulate
-void addListCommands(CommandLine& line);    ///< methods, effects, devices, formats
+void addDataCommands(CommandLine& line);     ///< simulate, tables, import, export
+void addApplyCommand(CommandLine& line);     ///< apply
+void addFitCommands(CommandLine& line);      ///< fit, compare, report
+void addAcquireCommand(CommandLine& line);   ///< acquire
+void addEmulateCommand(CommandLine& line);   ///< emulate
+void addResampleCommand(CommandLine& line);  ///< resample
+void addListCommands(CommandLine& line);     ///< methods, effects, devices, formats
 
 }  // namespace fieldtrue::cli
