@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calib/core/statistics.h"
+#include "calib/correctors/baked_lattice_maker.h"
 #include "calib/correctors/fit_checks.h"
 #include "calib/correctors/registry.h"
 
@@ -109,6 +110,25 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
     std::vector<std::string>& notes = corrector.report_.notes;
     if (!note.empty() && std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
   }
+  return corrector;
+}
+
+Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& control) const {
+  if (!(max_deviation_m > 0.0) || !std::isfinite(max_deviation_m))
+    return fail(ErrorCode::kBadInput, "A lattice needs a largest deviation above 0 to be baked to");
+  if (is_baked_)
+    return fail(ErrorCode::kUnsupported,
+                "This calibration is baked already; bake anew from the one that was fitted, or fit it again");
+  std::vector<Eigen::Vector3d> places_m;
+  for (const Node& node : table_.nodes) places_m.push_back(node.tracker_from_sensor.position_m);
+  auto lattice = bakeLattice(*position_, region_, places_m, max_deviation_m, control);
+  if (!lattice) return tl::unexpected(lattice.error());
+  Corrector corrector = *this;
+  corrector.is_baked_ = true;
+  corrector.position_ = *std::move(lattice);
+  corrector.report_ = reportOf(table_.nodes, corrector);
+  corrector.report_.notes = report_.notes;
+  corrector.report_.notes.push_back(corrector.position_->note());
   return corrector;
 }
 

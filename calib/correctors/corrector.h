@@ -81,6 +81,15 @@ class Corrector {
   bool covers(const Eigen::Vector3d& p_tracked_m) const;
   Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
 
+  /// The same calibration with its position part baked to a dense lattice: 64 coefficients a sample whatever the method
+  /// was, and it needs nothing else. Covers what it covered, up to a cell more at holes and edges of a local method.
+  /// The report holds the lattice's figures, and the largest deviation that was seen as a note.
+  /// @param max_deviation_m bound of the distance between both corrected positions inside the region, positive [m]
+  /// @error kBadInput for a bound that is not positive; kUnsupported when baked already, or when no lattice within the
+  ///        memory allowed stays within the bound; kDegenerate without a region; kCancelled
+  Result<Corrector> baked(double max_deviation_m, const RunControl& control = {}) const;
+  bool isBaked() const { return is_baked_; }
+
   const CorrectorChoice& choice() const { return choice_; }
   AlignMode align() const { return align_; }
   const Alignment& alignment() const { return alignment_; }
@@ -101,6 +110,7 @@ class Corrector {
   AlignMode align_ = AlignMode::kNone;
   Alignment alignment_;
   std::shared_ptr<const PositionModel> position_;
+  bool is_baked_ = false;  ///< position_ is a lattice, not the method's own model.
   std::shared_ptr<const OrientationModel> orientation_;
   Region region_;
   FitReport report_;

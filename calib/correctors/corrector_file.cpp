@@ -1,6 +1,8 @@
 #include <charconv>
+#include <type_traits>
 
 #include "calib/core/file_io.h"
+#include "calib/correctors/baked_lattice.h"
 #include "calib/correctors/checksum.h"
 #include "calib/correctors/corrector.h"
 #include "calib/correctors/json_values.h"
@@ -13,7 +15,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view kSchemaName = "fieldtrue.ftcal/";
-constexpr int kSchemaVersion = 1;
+/// Version 2 has `baked` in place of the position part's `parameters`. What is not baked is still written as version 1.
+constexpr int kSchemaVersion = 2;
 constexpr std::string_view kChecksumKind = "fnv1a64:";
 
 /// Metadata may hold bytes that are not UTF-8; they become replacement characters rather than an exception.
@@ -51,8 +54,16 @@ template <class Model>
 struct LoadedPart {
   std::string id;
   Settings settings;
+  bool is_baked = false;
   std::shared_ptr<const Model> model;
 };
+
+template <class Model>
+Result<std::unique_ptr<Model>> loadModel(const CorrectionMethod<Model>& method, const json& part, bool is_baked) {
+  if constexpr (std::is_same_v<Model, PositionModel>)
+    if (is_baked) return BakedLattice::load(part.at("baked"));
+  return method.load(part.at("parameters"));
+}
 
 template <class Model>
 Result<LoadedPart<Model>> loadPart(const json& part, Result<const CorrectionMethod<Model>*> (*find)(std::string_view)) {
@@ -60,10 +71,16 @@ Result<LoadedPart<Model>> loadPart(const json& part, Result<const CorrectionMeth
   loaded.id = part.at("method").get<std::string>();
   const auto method = find(loaded.id);
   if (!method) return tl::unexpected(method.error());
-  auto settings = settingsFromJson(loaded.id, (*method)->settings, part.at("settings"));
+  // A setting that came to the method after the file was written stands at its default, as it did without it.
+  json stored_settings = part.at("settings");
+  const json defaults = toJson(resolveSettings(loaded.id, (*method)->settings, {}).value());
+  if (stored_settings.is_object())
+    for (const auto& [key, value] : defaults.items()) stored_settings.emplace(key, value);
+  auto settings = settingsFromJson(loaded.id, (*method)->settings, stored_settings);
   if (!settings) return tl::unexpected(settings.error());
   loaded.settings = *std::move(settings);
-  auto model = (*method)->load(part.at("parameters"));
+  if constexpr (std::is_same_v<Model, PositionModel>) loaded.is_baked = part.contains("baked");
+  auto model = loadModel(**method, part, loaded.is_baked);
   if (!model) return tl::unexpected(model.error());
   loaded.model = *std::move(model);
   return loaded;
@@ -94,7 +111,7 @@ Result<void> checkEnvelope(const json& content, const std::string& name) {
 
 std::string Corrector::toText() const {
   json content = {
-      {"schema", std::string(kSchemaName) + std::to_string(kSchemaVersion)},
+      {"schema", std::string(kSchemaName) + std::to_string(is_baked_ ? kSchemaVersion : 1)},
       {"software", "Fieldtrue " FIELDTRUE_VERSION},
       {"direction", "tracker_from_sensor as tracked -> reference_from_sensor as corrected"},
       {"units", "m, rad; quaternions w x y z"},
@@ -105,7 +122,7 @@ std::string Corrector::toText() const {
       {"position",
        {{"method", choice_.position_id},
         {"settings", toJson(choice_.position_settings)},
-        {"parameters", position_->parameters()}}},
+        {is_baked_ ? "baked" : "parameters", position_->parameters()}}},
       {"orientation",
        {{"method", choice_.orientation_id},
         {"settings", toJson(choice_.orientation_settings)},
@@ -150,6 +167,7 @@ Result<Corrector> Corrector::fromText(const std::string& text, const std::string
     corrector.alignment_.reference_from_tracker = poseFrom(content.at("alignment").at("reference_from_tracker"));
     corrector.alignment_.sensor_from_mount = quaternionFrom(content.at("alignment").at("sensor_from_mount_wxyz"));
     corrector.position_ = position->model;
+    corrector.is_baked_ = position->is_baked;
     corrector.orientation_ = orientation->model;
     corrector.region_ = *std::move(region);
     corrector.report_ = reportFromJson(content.at("report"));

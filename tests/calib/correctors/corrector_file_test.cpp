@@ -73,6 +73,8 @@ class CorrectorFileTest : public QObject {
     QTest::newRow("affine") << QByteArray("affine") << QByteArray("rigid:error_frame=sensor");
     QTest::newRow("polynomial") << QByteArray("polynomial") << QByteArray("polynomial_quaternion:degree=2");
     QTest::newRow("multiquadric") << QByteArray("hmq:r2_cm2=33.3") << QByteArray("hmq_matrix");
+    QTest::newRow("multiquadric, automatic and single")
+        << QByteArray("hmq:r2_cm2=auto,precision=single") << QByteArray("hmq_matrix:r2_cm2=auto");
   }
   void reloadsToTheSameBits() {
     QFETCH(QByteArray, position);
@@ -123,6 +125,15 @@ class CorrectorFileTest : public QObject {
     QVERIFY(content.at("align") == "rigid");
   }
 
+  void aSettingThatCameLaterStandsAtItsDefault() {
+    const Corrector original = fitted("hmq", "none");
+    const std::string before_the_setting =
+        rewritten(original.toText(), [](json& j) { j["position"]["settings"].erase("precision"); });
+    const auto loaded = Corrector::fromText(before_the_setting, "old.ftcal.json");
+    FT_VERIFY_OK(loaded);
+    QCOMPARE(QByteArray::fromStdString(loaded->toText()), QByteArray::fromStdString(original.toText()));
+  }
+
   void changesOfLayoutDoNoHarm() {
     const std::string text = fitted("affine", "none").toText();
     FT_VERIFY_OK(Corrector::fromText(json::parse(text).dump(2), "indented.ftcal.json"));
@@ -165,7 +176,7 @@ class CorrectorFileTest : public QObject {
     row("other file", "{\"schema\": \"fieldtrue.gap/1\"}", ErrorCode::kBadInput, "not a Fieldtrue calibration");
     row("no schema", "{}", ErrorCode::kBadInput, "not a Fieldtrue calibration");
     row("not an object", "[1, 2]", ErrorCode::kBadInput, "not a Fieldtrue calibration");
-    row("newer", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/2"; }), ErrorCode::kNewerVersion,
+    row("newer", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/3"; }), ErrorCode::kNewerVersion,
         "newer version");
     row("odd version", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/one"; }), ErrorCode::kBadInput,
         "not a number");
