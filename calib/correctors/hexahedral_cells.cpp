@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "calib/correctors/cell_json.h"
+#include "calib/correctors/face_pairs.h"
 
 namespace fieldtrue {
 namespace {
@@ -25,12 +26,6 @@ double overshoot(const Eigen::Vector3d& natural) {
 constexpr std::array<std::array<std::size_t, 4>, 6> kFaces = {
     {{0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 5, 7, 6}}};
 
-struct Face {
-  std::uint64_t key = 0;
-  std::size_t cell = 0;
-  std::size_t face = 0;
-};
-
 /// In a grid a face is known by its lowest corner and the one across.
 std::uint64_t faceKey(const HexahedralCells::Corners& cell, const std::array<std::size_t, 4>& face) {
   std::size_t lowest = 0;
@@ -40,30 +35,13 @@ std::uint64_t faceKey(const HexahedralCells::Corners& cell, const std::array<std
          static_cast<std::uint64_t>(cell[face[(lowest + 2) % 4]]);
 }
 
-/// All faces of all cells; those that two cells share stand side by side.
-std::vector<Face> sortedFaces(const std::vector<HexahedralCells::Corners>& cells) {
-  std::vector<Face> faces;
-  faces.reserve(6 * cells.size());
-  for (std::size_t cell = 0; cell < cells.size(); ++cell)
-    for (std::size_t face = 0; face < 6; ++face) faces.push_back({faceKey(cells[cell], kFaces[face]), cell, face});
-  std::sort(faces.begin(), faces.end(),
-            [](const Face& a, const Face& b) { return a.key != b.key ? a.key < b.key : a.cell < b.cell; });
-  return faces;
-}
-
-/// Numbers of the cells that have a face which no other cell has.
-std::vector<std::size_t> outerCells(const std::vector<HexahedralCells::Corners>& cells) {
-  const std::vector<Face> faces = sortedFaces(cells);
-  std::vector<bool> is_outer(cells.size(), false);
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    const bool like_last = i > 0 && faces[i - 1].key == faces[i].key;
-    const bool like_next = i + 1 < faces.size() && faces[i + 1].key == faces[i].key;
-    if (!like_last && !like_next) is_outer[faces[i].cell] = true;
-  }
-  std::vector<std::size_t> outer;
-  for (std::size_t cell = 0; cell < cells.size(); ++cell)
-    if (is_outer[cell]) outer.push_back(cell);
-  return outer;
+/// Of the six faces of the first cell, then of the second, and so on.
+std::vector<int> partnersOf(const std::vector<HexahedralCells::Corners>& cells) {
+  std::vector<std::uint64_t> keys;
+  keys.reserve(kFaces.size() * cells.size());
+  for (const HexahedralCells::Corners& cell : cells)
+    for (const auto& face : kFaces) keys.push_back(faceKey(cell, face));
+  return facePartners(keys);
 }
 
 }  // namespace
@@ -115,7 +93,7 @@ HexahedralCells::HexahedralCells(std::vector<Eigen::Vector3d> corners_m, std::ve
     boxes_.emplace_back(box.min() - rounding, box.max() + rounding);
   }
   lookup_ = BoxLookup(boxes_);
-  outer_ = outerCells(cells_);
+  outer_ = outerCells(partnersOf(cells_), kFaces.size());
   for (const std::size_t cell : outer_) {
     // The map is linear in each natural coordinate: the box of the widened cell is that of its eight corners.
     Eigen::AlignedBox3d box;
@@ -238,12 +216,12 @@ std::vector<SharedFace> sharedFaces(const HexahedralCells& cells) {
   std::vector<HexahedralCells::Corners> all;
   all.reserve(cells.size());
   for (std::size_t cell = 0; cell < cells.size(); ++cell) all.push_back(cells.corners(cell));
-  const std::vector<Face> faces = sortedFaces(all);
+  const std::vector<int> partners = partnersOf(all);
   std::vector<SharedFace> shared;
-  for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
-    if (faces[i].key != faces[i + 1].key) continue;
-    SharedFace face{faces[i].cell, faces[i + 1].cell, {}};
-    for (std::size_t c = 0; c < 4; ++c) face.corners[c] = all[faces[i].cell][kFaces[faces[i].face][c]];
+  for (std::size_t i = 0; i < partners.size(); ++i) {
+    if (partners[i] < static_cast<int>(i)) continue;
+    SharedFace face{i / kFaces.size(), static_cast<std::size_t>(partners[i]) / kFaces.size(), {}};
+    for (std::size_t c = 0; c < 4; ++c) face.corners[c] = all[face.first_cell][kFaces[i % kFaces.size()][c]];
     shared.push_back(face);
   }
   return shared;

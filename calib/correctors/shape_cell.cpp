@@ -5,8 +5,10 @@
 namespace fieldtrue {
 namespace {
 
-/// A smallest pivot this far below the largest lets a nanometre in a corner move the middle by a millimetre.
-constexpr double kSingularPivot = 1e-6;
+/// A nanometre in a corner then moves the middle by a millimetre; in a cube the coefficients are 1/8.
+constexpr double kSingularCoefficient = 1e6;
+/// Volume of a cell this flat, of the cube of its size.
+constexpr double kFlat = 1e-6;
 
 /// Half the edges of the box around the cell, along the tracker's axes.
 Eigen::Matrix3d boxAxes_m(const std::array<Eigen::Vector3d, 8>& x) {
@@ -37,7 +39,7 @@ ShapeCell::ShapeCell(const HexahedralCells& cells, std::size_t cell, const std::
   const Eigen::Matrix3d tracker_from_local_m = axes == ShapeAxes::kCell ? edgeAxes_m(x) : boxAxes_m(x);
   const double volume = std::abs(tracker_from_local_m.determinant());
   const double size_m = tracker_from_local_m.norm();
-  is_singular_ = !(volume > kSingularPivot * size_m * size_m * size_m);
+  is_singular_ = !(volume > kFlat * size_m * size_m * size_m);
   if (is_singular_) return;
   local_from_tracker_1_m_ = tracker_from_local_m.inverse();
   Eigen::Matrix<double, 8, 8> a;
@@ -47,10 +49,10 @@ ShapeCell::ShapeCell(const HexahedralCells& cells, std::size_t cell, const std::
     a.row(row) = monomials(local_from_tracker_1_m_ * (x[c] - center_m_)).transpose();
     corner_values_m.row(row) = v_m[static_cast<std::size_t>(cells.corners(cell)[c])].transpose();
   }
-  // The eight systems have one matrix, and sum f_i v_i is wanted: one solve with the error vectors on the right.
-  const Eigen::FullPivLU<Eigen::Matrix<double, 8, 8>> lu(a);
-  is_singular_ = !(lu.matrixLU().diagonal().cwiseAbs().minCoeff() > kSingularPivot * lu.maxPivot());
-  if (!is_singular_) coefficients_m_ = lu.solve(corner_values_m);
+  // Row k of the inverse holds the coefficients f_ik of all eight functions.
+  const Eigen::Matrix<double, 8, 8> f = Eigen::PartialPivLU<Eigen::Matrix<double, 8, 8>>(a).inverse();
+  is_singular_ = !(f.cwiseAbs().maxCoeff() < kSingularCoefficient);
+  if (!is_singular_) coefficients_m_ = f * corner_values_m;
 }
 
 ShapeCell::Monomials ShapeCell::monomials(const Eigen::Vector3d& x) {

@@ -21,7 +21,8 @@ class ShapeCell {
   ///         section 3.2, eq. 3-4
   ShapeCell(const HexahedralCells& cells, std::size_t cell, const std::vector<Eigen::Vector3d>& v_m, ShapeAxes axes);
 
-  /// The corners do not determine the functions: A is singular or within 1e-6 of it.
+  /// The corners do not determine the functions: A is singular, or so nearly that coefficients exceed a million, where
+  /// those of a cube are 1/8.
   bool isSingular() const { return is_singular_; }
 
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const;

@@ -3,8 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "calib/correctors/cell_json.h"
+#include "calib/correctors/face_pairs.h"
 
 namespace fieldtrue {
 namespace {
@@ -15,27 +17,23 @@ constexpr double kOnFace = 1e-9;
 /// Flatter tetrahedra hold no position that their neighbours do not, and their slopes are noise.
 constexpr double kFlat = 1e-6;
 
-/// Numbers of the tetrahedra that have a face which no other has.
-std::vector<std::size_t> outerCells(const std::vector<TetrahedralMesh::Corners>& cells) {
-  std::vector<std::pair<std::array<int, 3>, std::size_t>> faces;
-  faces.reserve(4 * cells.size());
-  for (std::size_t cell = 0; cell < cells.size(); ++cell) {
-    TetrahedralMesh::Corners c = cells[cell];
-    std::sort(c.begin(), c.end());
-    for (const std::array<int, 3>& face :
-         {std::array<int, 3>{c[1], c[2], c[3]}, {c[0], c[2], c[3]}, {c[0], c[1], c[3]}, {c[0], c[1], c[2]}})
-      faces.emplace_back(face, cell);
-  }
-  std::sort(faces.begin(), faces.end());
-  std::vector<std::size_t> outer;
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    const bool like_last = i > 0 && faces[i - 1].first == faces[i].first;
-    const bool like_next = i + 1 < faces.size() && faces[i + 1].first == faces[i].first;
-    if (!like_last && !like_next) outer.push_back(faces[i].second);
-  }
-  std::sort(outer.begin(), outer.end());
-  outer.erase(std::unique(outer.begin(), outer.end()), outer.end());
-  return outer;
+constexpr std::size_t kFaces = 4;
+
+/// The three corners of each face in ascending order, 21 bits each: enough for two million places. Face c is opposite
+/// corner c.
+std::vector<std::uint64_t> faceKeys(const std::vector<TetrahedralMesh::Corners>& cells) {
+  std::vector<std::uint64_t> keys;
+  keys.reserve(kFaces * cells.size());
+  for (const TetrahedralMesh::Corners& cell : cells)
+    for (std::size_t c = 0; c < kFaces; ++c) {
+      std::array<std::uint64_t, 3> face{};
+      for (std::size_t k = 0; k < 3; ++k) face[k] = static_cast<std::uint64_t>(cell[(c + 1 + k) % kFaces]);
+      if (face[0] > face[1]) std::swap(face[0], face[1]);
+      if (face[1] > face[2]) std::swap(face[1], face[2]);
+      if (face[0] > face[1]) std::swap(face[0], face[1]);
+      keys.push_back((face[0] << 42U) | (face[1] << 21U) | face[2]);
+    }
+  return keys;
 }
 
 double least(const std::array<double, 4>& weights) { return *std::min_element(weights.begin(), weights.end()); }
@@ -45,17 +43,20 @@ double least(const std::array<double, 4>& weights) { return *std::min_element(we
 double relativeVolume(const TetrahedralMesh::Corners& cell, const std::vector<Eigen::Vector3d>& corners_m) {
   std::array<Eigen::Vector3d, 4> x;
   for (std::size_t c = 0; c < 4; ++c) x[c] = corners_m[static_cast<std::size_t>(cell[c])];
-  double longest_m = 0.0;
+  double longest_m2 = 0.0;
   for (std::size_t a = 0; a < 4; ++a)
-    for (std::size_t b = a + 1; b < 4; ++b) longest_m = std::max(longest_m, (x[a] - x[b]).norm());
-  if (!(longest_m > 0.0)) return 0.0;
-  return (x[1] - x[0]).cross(x[2] - x[0]).dot(x[3] - x[0]) / (longest_m * longest_m * longest_m);
+    for (std::size_t b = a + 1; b < 4; ++b) longest_m2 = std::max(longest_m2, (x[a] - x[b]).squaredNorm());
+  if (!(longest_m2 > 0.0)) return 0.0;
+  return (x[1] - x[0]).cross(x[2] - x[0]).dot(x[3] - x[0]) / (longest_m2 * std::sqrt(longest_m2));
 }
 
 TetrahedralMesh::TetrahedralMesh(std::vector<Eigen::Vector3d> corners_m, const std::vector<Corners>& cells)
     : corners_m_(std::move(corners_m)) {
   std::vector<Corners> kept;
   std::vector<Eigen::AlignedBox3d> boxes;
+  kept.reserve(cells.size());
+  boxes.reserve(cells.size());
+  cells_.reserve(cells.size());
   for (const Corners& corners : cells) {
     if (!(std::abs(relativeVolume(corners, corners_m_)) > kFlat)) continue;
     Cell cell;
@@ -75,14 +76,21 @@ TetrahedralMesh::TetrahedralMesh(std::vector<Eigen::Vector3d> corners_m, const s
     cells_.push_back(cell);
   }
   lookup_ = BoxLookup(boxes);
-  outer_ = outerCells(kept);
+  findOuter(kept);
+}
+
+void TetrahedralMesh::findOuter(const std::vector<Corners>& cells) {
+  const std::vector<int> partners = facePartners(faceKeys(cells));
   std::vector<Eigen::AlignedBox3d> outer_boxes;
-  for (const std::size_t cell : outer_) {
+  for (const std::size_t cell : outerCells(partners, kFaces)) {
+    Outer outer{cell, {}};
+    for (std::size_t c = 0; c < kFaces; ++c) outer.is_own[c] = partners[kFaces * cell + c] < 0;
+    outer_.push_back(outer);
     Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
-    for (const int c : cells_[cell].corners) center_m += 0.25 * corners_m_[static_cast<std::size_t>(c)];
+    for (const int c : cells[cell]) center_m += 0.25 * corners_m_[static_cast<std::size_t>(c)];
     // Weights of at least -1/4 each, adding up to 1: the tetrahedron grown about its centroid to twice its size.
     Eigen::AlignedBox3d box;
-    for (const int c : cells_[cell].corners)
+    for (const int c : cells[cell])
       box.extend(center_m + (1.0 + 4.0 * kMargin) * (corners_m_[static_cast<std::size_t>(c)] - center_m));
     outer_boxes.push_back(box);
   }
@@ -101,13 +109,33 @@ std::optional<TetrahedralMesh::Location> TetrahedralMesh::locate(const Eigen::Ve
     const Location at{cell, weights(cells_[cell], p_tracked_m)};
     if (least(at.weights) >= -kOnFace) return at;
   }
+  return locateAround(p_tracked_m);
+}
+
+double TetrahedralMesh::overshoot(const Outer& outer, const std::array<double, 4>& weights) {
+  // Over its own faces a position may be out by a quarter of the height over each. Over others it is some other
+  // tetrahedron's, and whatever it is out there adds up: else one that has but a corner on the hull would reach far.
+  double over_own = 0.0;
+  double over_others = 0.0;
+  for (std::size_t c = 0; c < 4; ++c) {
+    const double out = std::max(0.0, -weights[c]);
+    if (outer.is_own[c])
+      over_own = std::max(over_own, out);
+    else
+      over_others += out;
+  }
+  return over_own + over_others;
+}
+
+std::optional<TetrahedralMesh::Location> TetrahedralMesh::locateAround(const Eigen::Vector3d& p_tracked_m) const {
   std::optional<Location> nearest;
-  double highest = -kMargin - kOnFace;
+  double least_out = kMargin + kOnFace;
   for (const int item : outer_lookup_.near(p_tracked_m)) {
-    const std::size_t cell = outer_[static_cast<std::size_t>(item)];
-    const Location at{cell, weights(cells_[cell], p_tracked_m)};
-    if (!(least(at.weights) > highest)) continue;
-    highest = least(at.weights);
+    const Outer& outer = outer_[static_cast<std::size_t>(item)];
+    const Location at{outer.cell, weights(cells_[outer.cell], p_tracked_m)};
+    const double out = overshoot(outer, at.weights);
+    if (out > least_out || (nearest && out == least_out)) continue;
+    least_out = out;
     nearest = at;
   }
   return nearest;

@@ -11,8 +11,8 @@ namespace fieldtrue {
 
 /// Tetrahedra between measured places, in tracked space, and where a position lies in them.
 ///
-/// A position outside of all belongs to the nearest tetrahedron that has a face of its own and in which no weight is
-/// below -0.25, a quarter of its height. On a shared face, edge or corner the tetrahedron of the lowest number has it.
+/// A position outside of all, by at most a quarter of a tetrahedron's height over a face of its own, belongs to the
+/// nearest. On a shared face, edge or corner the tetrahedron of the lowest number has it.
 /// @source Kenwright, Lane 1996, in Kindratenko 2000, section 3.2, eq. 7
 class TetrahedralMesh {
  public:
@@ -49,12 +49,21 @@ class TetrahedralMesh {
     Eigen::AlignedBox3d box;
   };
 
+  /// A tetrahedron with faces of its own: those opposite the corners marked.
+  struct Outer {
+    std::size_t cell = 0;
+    std::array<bool, 4> is_own{};
+  };
+
   static std::array<double, 4> weights(const Cell& cell, const Eigen::Vector3d& p_tracked_m);
+  static double overshoot(const Outer& outer, const std::array<double, 4>& weights);
+  std::optional<Location> locateAround(const Eigen::Vector3d& p_tracked_m) const;
+  void findOuter(const std::vector<Corners>& cells);
 
   std::vector<Eigen::Vector3d> corners_m_;
   std::vector<Cell> cells_;
   BoxLookup lookup_;
-  std::vector<std::size_t> outer_;
+  std::vector<Outer> outer_;
   BoxLookup outer_lookup_;
 };
 
