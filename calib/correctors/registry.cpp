@@ -27,6 +27,7 @@
 #include "calib/correctors/orientation_none.h"
 #include "calib/correctors/orientation_rigid.h"
 #include "calib/correctors/polynomial.h"
+#include "calib/correctors/polynomial_euler.h"
 #include "calib/correctors/polynomial_quaternion.h"
 #include "calib/correctors/rbf.h"
 #include "calib/correctors/rigid.h"
@@ -68,6 +69,7 @@ std::span<const OrientationMethod> orientationMethods() {
                                                          slerpTrilinearOrientation(),
                                                          tetrahedralQuaternionOrientation(),
                                                          localQuaternionOrientation(),
+                                                         polynomialEulerOrientation(),
                                                          polynomialQuaternionOrientation(),
                                                          hmqMatrixOrientation()};
   return methods;

@@ -36,6 +36,10 @@ Eigen::Quaterniond quadraticVectorPart(const Eigen::Vector3d& p) {
   return {std::sqrt(1.0 - v.squaredNorm()), v.x(), v.y(), v.z()};
 }
 
+Eigen::Quaterniond quadraticEulerAngles(const Eigen::Vector3d& p) {
+  return rotationFromEuler({0.1 - 0.2 * p.x() * p.y(), 0.1 * p.z() * p.z(), 0.15 * p.y() - 0.05 * p.x()});
+}
+
 Eigen::Quaterniond smoothError(const Eigen::Vector3d& p) {
   return rotationFromVector(0.2 *
                             Eigen::Vector3d(std::sin(2.0 * p.x()), std::cos(1.5 * p.y()), std::sin(p.z() + p.x())));
@@ -75,6 +79,7 @@ struct RotationRecovery {
 const std::map<std::string, RotationRecovery> kOrientationRecoveries = {
     {"none", {noError}},
     {"rigid", {constantError}},
+    {"polynomial_euler", {quadraticEulerAngles}},
     {"polynomial_quaternion", {quadraticVectorPart}},
     {"hmq_matrix", {smoothError, false}},
     {"slerp_trilinear", {smoothError, false}},
