@@ -47,7 +47,7 @@ FitData dataOf(const std::function<Eigen::Matrix3d(const Eigen::Vector3d&)>& err
 class PolynomialEulerTest : public QObject {
   Q_OBJECT
  private slots:
-  /// One constant error of azimuth 10 and elevation 20 degrees, sensor pitched by 40 and rolled by 30: composed by
+  /// One constant error of azimuth 10 and elevation 20 degrees, sensor turned by 40 and rolled by 30: composed by
   /// matrices.
   void composesByMatrices_data() {
     QTest::addColumn<QString>("frame");
@@ -62,7 +62,7 @@ class PolynomialEulerTest : public QObject {
     const auto model =
         fitOrientation("polynomial_euler", data, {{"degree", "1"}, {"error_frame", frame.toStdString()}});
     FT_VERIFY_OK(model);
-    const Eigen::Matrix3d truth = about(1, 40 * kDeg) * about(0, 30 * kDeg);
+    const Eigen::Matrix3d truth = about(2, 40 * kDeg) * about(0, 30 * kDeg);
     const Eigen::Matrix3d tracked = in_tracker ? Eigen::Matrix3d(error * truth) : Eigen::Matrix3d(truth * error);
     const Eigen::Quaterniond corrected = (*model)->correct({0.7, 0.0, 0.1}, Eigen::Quaterniond(tracked));
     FT_VERIFY_MATCH(near(corrected.toRotationMatrix(), truth, 1e-12));
