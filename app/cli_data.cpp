@@ -185,13 +185,15 @@ void addImport(CommandLine& line) {
 struct ExportOptions {
   std::string calibration;
   std::string format;
+  std::optional<double> bake_um;
   std::string out;
 };
 
-Outcome runExport(const ExportOptions& options, const CommonOptions&) {
+Outcome runExport(const ExportOptions& options, const CommonOptions& common) {
   const auto exporter = findExporter(options.format);
   if (!exporter) return wrongUsage(exporter.error());
-  const auto corrector = Corrector::load(options.calibration);
+  auto corrector = Corrector::load(options.calibration);
+  if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
   const auto written = (*exporter)->write(*corrector, options.out);
   if (!written) return notPossible(written.error());
@@ -207,6 +209,11 @@ void addExport(CommandLine& line) {
       ->type_name("FILE")
       ->required();
   command->add_option("--format", options->format, "Format; see fieldtrue-cli formats")->type_name("ID")->required();
+  command
+      ->add_option("--bake-um", options->bake_um,
+                   "Bake the position part to a lattice first, which deviates by at most so much inside the region")
+      ->type_name("UM")
+      ->check(CLI::PositiveNumber);
   command->add_option("--out", options->out, "File to write")->type_name("PATH")->required();
 }
 

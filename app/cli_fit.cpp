@@ -10,6 +10,7 @@
 #include "app/cli_values.h"
 #include "calib/correctors/corrector.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/learning_curve.h"
 #include "widgets/report/report.h"
 
 /// fit, compare, report: what is done with a table of nodes.
@@ -24,6 +25,7 @@ struct FitOptions {
   std::string position;
   std::string orientation = "none";
   std::string align;
+  std::optional<double> bake_um;
   std::string out;
 };
 
@@ -69,7 +71,8 @@ Outcome runFit(const FitOptions& options, const CommonOptions& common) {
   const auto align = readAlignArgument(options.align, defaultAlignMode(table.metadata));
   if (!align) return tl::unexpected(align.error());
   const std::vector<Node> rows = fitRows(table);
-  const auto corrector = Corrector::fit(rows, table.metadata, *choice, *align, runControl(common, "fitting"));
+  auto corrector = Corrector::fit(rows, table.metadata, *choice, *align, runControl(common, "fitting"));
+  if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
   const auto saved = corrector->save(options.out);
   if (!saved) return notPossible(saved.error());
@@ -91,12 +94,18 @@ void addFit(CommandLine& line) {
       ->add_option("--align", options->align,
                    "none or rigid; default rigid unless the table says the alignment is known")
       ->type_name("MODE");
+  command
+      ->add_option("--bake-um", options->bake_um,
+                   "Bake the position part to a lattice that deviates by at most so much inside the region")
+      ->type_name("UM")
+      ->check(CLI::PositiveNumber);
   command->add_option("--out", options->out, "Calibration to write (*.ftcal.json)")->type_name("FILE")->required();
 }
 
 struct CompareOptions {
   std::string nodes;
   std::string html;
+  bool learning_curve = false;
   ComparisonArguments comparison;
 };
 
@@ -117,10 +126,21 @@ Outcome runCompare(const CompareOptions& options, const CommonOptions& common) {
   if (!reading) return tl::unexpected(reading.error());
   const auto comparison = compareMethods(reading->table, *arguments, runControl(common, "comparing"));
   if (!comparison) return notPossible(comparison.error());
-  Answer answer{comparisonText(*comparison), toJson(*comparison), reading->notes};
+  std::vector<LearningCurve> curves;
+  if (options.learning_curve) {
+    auto learned = learningCurves(reading->table, *arguments, runControl(common, "learning"));
+    if (!learned) return notPossible(learned.error());
+    curves = *std::move(learned);
+  }
+  Answer answer{comparisonText(*comparison, curves), toJson(*comparison), reading->notes};
+  if (options.learning_curve) {
+    answer.json["learning_curves"] = nlohmann::json::array();
+    for (const LearningCurve& curve : curves) answer.json["learning_curves"].push_back(toJson(curve));
+  }
   if (!options.html.empty()) {
     ReportInput input = reportInput(reading->table, *comparison, options.nodes, options.comparison.seed);
     input.notes = reading->notes;
+    input.learning_curves = std::move(curves);
     const auto written = writeHtmlReport(input, options.html);
     if (!written) return notPossible(written.error());
   }
@@ -132,6 +152,8 @@ void addCompare(CommandLine& line) {
   command->add_option("--nodes", options->nodes, "Node table")->type_name("FILE")->required();
   addComparisonOptions(*command, options->comparison);
   command->add_option("--html", options->html, "Report to write beside the answer")->type_name("FILE");
+  command->add_flag("--learning-curve", options->learning_curve,
+                    "Also fit growing parts of the places and tell the held-out error of each");
 }
 
 struct ReportOptions {
