@@ -213,7 +213,7 @@ void addExport(CommandLine& line) {
       ->add_option("--bake-um", options->bake_um,
                    "Bake the position part to a lattice first, which deviates by at most so much inside the region")
       ->type_name("UM")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(0.01, 1e6));
   command->add_option("--out", options->out, "File to write")->type_name("PATH")->required();
 }
 

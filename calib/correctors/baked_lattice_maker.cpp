@@ -175,6 +175,13 @@ class LatticeBaker {
     }
   }
 
+  static std::string lengthText(double length_m) {
+    char text[32];
+    const bool in_mm = length_m >= 1e-3;
+    std::snprintf(text, sizeof text, "%.3g %s", (in_mm ? 1e3 : 1e6) * length_m, in_mm ? "mm" : "um");
+    return text;
+  }
+
   static std::string sizeText(const LatticeParts& parts) {
     char text[96];
     std::snprintf(text, sizeof text, "%dx%dx%d at %.3g mm", parts.counts[0], parts.counts[1], parts.counts[2],
@@ -189,11 +196,10 @@ class LatticeBaker {
   }
 
   tl::unexpected<Error> unreachable(const BakedLattice& lattice, double deviation_m) const {
-    char text[160];
-    std::snprintf(text, sizeof text, "within %.3g um: at the finest that 32 MB hold, %s, it is off by up to %.3g um",
-                  1e6 * max_deviation_m_, sizeText(lattice.parts()).c_str(), 1e6 * deviation_m);
     return fail(ErrorCode::kUnsupported,
-                std::string("A lattice cannot follow this correction ") + text +
+                "A lattice cannot follow this correction within " + lengthText(max_deviation_m_) +
+                    ": at the finest that 32 MB hold, " + sizeText(lattice.parts()) + ", it is off by up to " +
+                    lengthText(deviation_m) +
                     "; ask for a larger deviation, or bake a method that does not jump or bend between its cells");
   }
 
