@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <numbers>
+#include <optional>
 
 #include "app/cli_values.h"
+#include "calib/correctors/registry.h"
 #include "widgets/report/numbers.h"
 #include "widgets/report/report_data.h"
 
@@ -18,35 +20,63 @@ std::size_t width(const std::string& text) {
       std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
 }
 
-void appendStats(Row& row, const ErrorStats& stats) {
-  for (const double value : {stats.mean, stats.median, stats.rms}) row.push_back(errorFigure(value));
-  row.push_back(errorFigure(stats.rms_low90) + "-" + errorFigure(stats.rms_high90));
-  for (const double value : {stats.p95, stats.max}) row.push_back(errorFigure(value));
+/// The rows of one kind of method.
+struct ScoreTable {
+  std::string title;
+  const ErrorStats& before;
+  const std::vector<MethodScore>& scores;
+  std::optional<std::size_t> best_row;
+};
+
+/// The method as one would ask for it, with the settings that are not at their defaults.
+std::string methodName(const MethodScore& score) {
+  const auto position = findPositionMethod(score.method);
+  const auto orientation = findOrientationMethod(score.method);
+  std::string settings = position      ? givenSettingsText(score.settings, (*position)->settings)
+                         : orientation ? givenSettingsText(score.settings, (*orientation)->settings)
+                                       : settingsText(score.settings);
+  settings.erase(std::remove(settings.begin(), settings.end(), ' '), settings.end());
+  return score.method + (settings.empty() ? "" : ":" + settings);
 }
 
-Row scoreRow(const MethodScore& score) {
-  std::string settings = settingsText(score.settings);
-  settings.erase(std::remove(settings.begin(), settings.end(), ' '), settings.end());
-  const std::string name = score.method + (settings.empty() ? "" : ":" + settings);
-  if (score.skipped) return {name + "  not used: " + *score.skipped};
-  Row row{name};
-  appendStats(row, score.stats);
+Row statsRow(const std::string& name, const ErrorStats& stats) {
+  return {name,
+          errorFigure(stats.rms),
+          errorFigure(stats.rms_low90) + " to " + errorFigure(stats.rms_high90),
+          errorFigure(stats.median),
+          errorFigure(stats.p95),
+          errorFigure(stats.max)};
+}
+
+Row scoreRow(const MethodScore& score, bool is_best) {
+  if (score.skipped) return {methodName(score) + "  not used: " + *score.skipped};
+  Row row = statsRow(methodName(score), score.stats);
+  row.push_back(toBestText(score, is_best));
   row.push_back(std::to_string(score.n_uncovered));
-  row.push_back(errorFigure(score.in_sample_rms));
   row.push_back(durationText(score.fit_s));
   row.push_back(durationText(score.eval_ns * 1e-9));
   return row;
 }
 
-std::string scoreTable(const std::string& title, const ErrorStats& before, const std::vector<MethodScore>& scores) {
-  std::vector<Row> rows{{title, "mean", "median", "RMS", "90 % interval", "95 %", "max", "uncovered", "in-sample RMS",
-                         "fit", "evaluation"}};
-  Row before_row{"before"};
-  appendStats(before_row, before);
-  before_row.resize(rows.front().size());
-  rows.push_back(std::move(before_row));
-  for (const MethodScore& score : scores) rows.push_back(scoreRow(score));
+std::string scoreTable(const ScoreTable& table) {
+  std::vector<Row> rows{{table.title, "RMS", "90 % interval", "median", "95 %", "max", "to the best (90 %)",
+                         "uncovered", "fit", "evaluation"}};
+  rows.push_back(statsRow("before", table.before));
+  rows.back().resize(rows.front().size());
+  for (std::size_t i = 0; i < table.scores.size(); ++i) rows.push_back(scoreRow(table.scores[i], table.best_row == i));
   return alignedColumns(rows);
+}
+
+/// What was found out besides the scores, a sentence a line.
+std::string surroundingsText(const Comparison& comparison) {
+  std::string text;
+  for (const std::string& line :
+       {truenessText(comparison), comparison.coverage ? comparison.coverage->text : std::string(),
+        comparison.fold_back ? comparison.fold_back->text : std::string(),
+        comparison.orientation_dependence ? comparison.orientation_dependence->text : std::string(),
+        resamplingText(comparison)})
+    if (!line.empty()) text += line + "\n";
+  return text;
 }
 
 void appendNotes(std::string& text, const std::string& who, const std::vector<std::string>& notes) {
@@ -92,19 +122,45 @@ std::string fitText(const Corrector& corrector, AlignMode align, std::size_t n_u
   return text;
 }
 
-std::string comparisonText(const Comparison& comparison) {
+std::string learningText(const std::vector<LearningCurve>& curves) {
+  std::vector<int> counts;
+  for (const LearningCurve& curve : curves)
+    for (const LearningPoint& point : curve.points)
+      if (std::find(counts.begin(), counts.end(), point.n_places) == counts.end()) counts.push_back(point.n_places);
+  std::sort(counts.begin(), counts.end());
+  if (counts.empty()) return {};
+  std::vector<Row> rows{{"RMS (mm) by places fitted to"}};
+  rows.front().resize(counts.size() + 1);
+  for (std::size_t i = 0; i < counts.size(); ++i) rows.front()[i + 1] = std::to_string(counts[i]);
+  for (const LearningCurve& curve : curves) {
+    Row row(counts.size() + 1, "-");
+    row.front() = curve.method;
+    for (const LearningPoint& point : curve.points) {
+      const auto column = std::find(counts.begin(), counts.end(), point.n_places) - counts.begin();
+      row[static_cast<std::size_t>(column) + 1] = errorFigure(point.rms);
+    }
+    rows.push_back(std::move(row));
+  }
+  return "\n" + alignedColumns(rows);
+}
+
+std::string comparisonText(const Comparison& comparison, const std::vector<LearningCurve>& curves) {
   std::string text = std::to_string(comparison.places.size()) + " places scored by " + toText(comparison.validation) +
                      ", align " + toText(comparison.align) + ". Noise floor " + floorText(comparison);
-  text += ".\n\n" + scoreTable("position (mm)", comparison.before_position_mm, comparison.position);
-  if (comparison.before_orientation_deg) {
-    text += "\n" + scoreTable("orientation (deg)", *comparison.before_orientation_deg, comparison.orientation);
-  }
+  text += ".\n\n" + scoreTable({"position (mm)", comparison.before_position_mm, comparison.position,
+                                comparison.best_position_row});
+  if (comparison.before_orientation_deg)
+    text += "\n" + scoreTable({"orientation (deg)", *comparison.before_orientation_deg, comparison.orientation,
+                               comparison.best_orientation_row});
+  text += learningText(curves);
   std::string notes;
   appendNotes(notes, "", comparison.notes);
   for (const auto* scores : {&comparison.position, &comparison.orientation}) {
     for (const MethodScore& score : *scores) appendNotes(notes, score.method, score.notes);
   }
   if (!notes.empty()) text += "\n" + notes;
+  const std::string surroundings = surroundingsText(comparison);
+  if (!surroundings.empty()) text += "\n" + surroundings;
   return text + "\n" + comparison.verdict.text + "\n";
 }
 

@@ -5,6 +5,7 @@
 
 #include "calib/correctors/corrector.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/learning_curve.h"
 
 /// What people read on the terminal.
 namespace fieldtrue::cli {
@@ -16,7 +17,7 @@ std::string alignedColumns(const std::vector<std::vector<std::string>>& rows);
 /// In-sample figures of a fit.
 std::string fitText(const Corrector& corrector, AlignMode align, std::size_t n_unused);
 
-/// The methods' held-out errors, the verdict last.
-std::string comparisonText(const Comparison& comparison);
+/// The methods' held-out errors, learning curves where there are any, what surrounds the scores, the verdict last.
+std::string comparisonText(const Comparison& comparison, const std::vector<LearningCurve>& curves = {});
 
 }  // namespace fieldtrue::cli

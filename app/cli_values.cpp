@@ -76,8 +76,10 @@ std::string toText(AlignMode align) { return align == AlignMode::kRigid ? "rigid
 
 void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
   command
-      .add_option("--methods", arguments.methods,
-                  "all, or a list like rigid,polynomial:degree=3,hmq; names of position and orientation methods")
+      .add_option(
+          "--methods", arguments.methods,
+          "all, or a list of position and orientation methods separated by commas, each with its settings after a "
+          "colon: rigid,polynomial:degree=4,rbf:kernel=cubic,smoothing=0,hmq")
       ->type_name("LIST");
   command
       .add_option("--validate", arguments.validate,

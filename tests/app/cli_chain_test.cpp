@@ -133,6 +133,10 @@ class CliChainTest : public QObject {
     QVERIFY(result["best"].contains("position") && result["best"].contains("orientation"));
     QCOMPARE(result["validate"].get<std::string>(), std::string("loo"));
     QCOMPARE(result["places"].get<int>(), 48);
+    for (const char* key : {"coverage", "fold_back", "orientation_dependence", "trueness"})
+      QVERIFY2(result.at(key).is_object(), key);
+    for (const char* key : {"coverage", "fold_back", "orientation_dependence"})
+      QVERIFY2(!result.at(key).at("text").get<std::string>().empty(), key);
     verifyScores(result, "position", "position_mm", {"rms_common_mm"});
     verifyScores(result, "orientation", "orientation_deg", {});
   }
@@ -181,6 +185,8 @@ class CliChainTest : public QObject {
                                    << QStringList{"none"};
     QTest::newRow("both kinds") << "rigid" << QStringList{"rigid"} << QStringList{"rigid"};
     QTest::newRow("orientation only") << "hmq_matrix" << QStringList{"none"} << QStringList{"hmq_matrix"};
+    QTest::newRow("settings with a comma") << "affine,rbf:kernel=cubic,smoothing=0,polynomial:degree=2"
+                                           << QStringList{"affine", "rbf", "polynomial"} << QStringList{"none"};
     QTest::newRow("same method twice") << "polynomial:degree=1,polynomial:degree=2"
                                        << QStringList{"polynomial", "polynomial"} << QStringList{"none"};
   }
@@ -223,6 +229,19 @@ class CliChainTest : public QObject {
         runCli({"compare", "--nodes", at("a.nodes.csv"), "--validate", "kfold:4", "--methods", "none,rigid", "--json"})
             .json();
     QCOMPARE(run.out.trimmed().split('\n').last().toStdString(), same.at("verdict").at("text").get<std::string>());
+  }
+
+  void learningCurvesAreAddedWhenAskedFor() {
+    const CliRun run = runCli({"compare", "--nodes", at("a.nodes.csv"), "--validate", "kfold:4", "--methods",
+                               "rigid,affine", "--learning-curve", "--html", at("curves.html"), "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    const json curves = run.json().at("learning_curves");
+    QCOMPARE(curves.size(), std::size_t(2));
+    QCOMPARE(curves[1].at("method").get<std::string>(), std::string("affine"));
+    // A fifth of 48 places is held out.
+    QCOMPARE(curves[1].at("points").back().at("places").get<int>(), 39);
+    QVERIFY(readWhole(at("curves.html")).contains("<polyline"));
+    QVERIFY(!comparison().contains("learning_curves"));
   }
 
   void fitPrintsItsInSampleFigures() {

@@ -6,8 +6,10 @@
 #include "calib/core/file_io.h"
 #include "widgets/report/html_writer.h"
 #include "widgets/report/numbers.h"
+#include "widgets/report/report_curves.h"
 #include "widgets/report/report_data.h"
 #include "widgets/report/report_pictures.h"
+#include "widgets/report/report_region.h"
 #include "widgets/report/report_style.h"
 #include "widgets/report/report_tables.h"
 
@@ -112,11 +114,8 @@ void writeMeasured(HtmlWriter& html, const ReportInput& input) {
   facts.add("SD of one sample", optionalNumber(summary.sd_mm, " mm") +
                                     (summary.sd_deg ? ", " + significantText(*summary.sd_deg) + " deg" : ""));
   facts.add("Lag-1 autocorrelation", summary.autocorrelation ? decimalText(*summary.autocorrelation, 2) : "");
-  facts.add(
-      "Noise floor",
-      significantText(comparison.floor_position_mm) + " mm" +
-          (comparison.before_orientation_deg ? ", " + significantText(comparison.floor_orientation_deg) + " deg" : "") +
-          " (from samples and jig tolerance)");
+  facts.add("Noise floor", floorText(comparison));
+  facts.add("Trueness", truenessText(comparison));
   facts.add("Position lattice of the tracker", optionalNumber(input.table.metadata.quantum_m, " mm", 1000.0));
   facts.add("Jig tolerance", optionalNumber(input.table.metadata.jig_tolerance_m, " mm", 1000.0));
   facts.add("Duration", optionalNumber(summary.duration_s, " s"));
@@ -163,6 +162,8 @@ std::string htmlReport(const ReportInput& input) {
   writeVerdict(html, input);
   writePictures(html, input, places);
   writeMethods(html, input.comparison);
+  writeLearningCurves(html, input.learning_curves);
+  writeRegion(html, input.comparison);
   writeMeasured(html, input);
   html.element("h2", "Places, worst first");
   writePlaceTables(html, places);

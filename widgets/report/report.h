@@ -9,21 +9,23 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/learning_curve.h"
 
 namespace fieldtrue {
 
 /// Everything a report tells. The same input always gives the same page.
 struct ReportInput {
-  CalibrationTable table;            ///< The rows that were compared.
-  Comparison comparison;             ///< Of that table.
-  std::string source;                ///< The file the table came from.
-  std::string plan;                  ///< How the places were planned; empty = not known.
-  std::vector<PlannedPlace> places;  ///< What was planned, in visiting order; empty = the table's places.
-  std::vector<PlaceState> states;    ///< One per planned place.
-  std::string made_at;               ///< When the report was made, as text.
-  std::uint64_t seed = 1;            ///< Of folds and bootstrap.
-  std::vector<std::string> notes;    ///< Remarks of whoever read the input.
-  bool with_pictures = true;         ///< False leaves the pictures out and says so.
+  CalibrationTable table;                      ///< The rows that were compared.
+  Comparison comparison;                       ///< Of that table.
+  std::vector<LearningCurve> learning_curves;  ///< Of that table; empty = not asked for.
+  std::string source;                          ///< The file the table came from.
+  std::string plan;                            ///< How the places were planned; empty = not known.
+  std::vector<PlannedPlace> places;            ///< What was planned, in visiting order; empty = the table's places.
+  std::vector<PlaceState> states;              ///< One per planned place.
+  std::string made_at;                         ///< When the report was made, as text.
+  std::uint64_t seed = 1;                      ///< Of folds and bootstrap.
+  std::vector<std::string> notes;              ///< Remarks of whoever read the input.
+  bool with_pictures = true;                   ///< False leaves the pictures out and says so.
 };
 
 /// Writes one self-contained HTML page: verdict, error field before and after, method tables, what was measured, places

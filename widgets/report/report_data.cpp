@@ -133,6 +133,50 @@ std::string settingsText(const Settings& settings) {
   return text;
 }
 
+std::string givenSettingsText(const Settings& settings, std::span<const Setting> declared) {
+  Settings given;
+  for (const auto& [key, value] : settings) {
+    const auto is_default = [&key = key, &value = value](const Setting& setting) {
+      return setting.key == key && setting.default_value == value;
+    };
+    if (std::none_of(declared.begin(), declared.end(), is_default)) given.emplace(key, value);
+  }
+  return settingsText(given);
+}
+
+std::string toBestText(const MethodScore& score, bool is_best) {
+  if (is_best) return "best";
+  const auto figure = [](double value) { return value < 0.0 ? "-" + errorFigure(-value) : errorFigure(value); };
+  const bool as_good = score.rms_to_best_low90 <= 0.0;
+  return (score.rms_to_best < 0.0 ? "" : "+") + figure(score.rms_to_best) + " (" + figure(score.rms_to_best_low90) +
+         " to " + figure(score.rms_to_best_high90) + ")" + (as_good ? ", as good" : "");
+}
+
+std::string truenessText(const Comparison& comparison) {
+  std::string text;
+  const Trueness& trueness = comparison.trueness;
+  if (comparison.floor_position_mm > 0.0)
+    text = errorFigure(trueness.before_position_mm) + " mm before and " + errorFigure(trueness.after_position_mm) +
+           " mm after the best position method";
+  if (comparison.floor_orientation_deg > 0.0 && trueness.before_orientation_deg && trueness.after_orientation_deg)
+    text += (text.empty() ? "" : ", ") + errorFigure(*trueness.before_orientation_deg) + " deg before and " +
+            errorFigure(*trueness.after_orientation_deg) + " deg after the best orientation method";
+  return text.empty() ? text : "Systematic error apart from the noise floor: " + text + ".";
+}
+
+std::string resamplingText(const Comparison& comparison) {
+  std::string text;
+  for (const ResamplingError& error : comparison.resampling) {
+    text += (text.empty() ? "" : ", ") + error.method + " ";
+    if (error.n_scored > 0)
+      text += errorFigure(error.rms_mm) + " mm (" + errorFigure(error.excess_mm) + " above the noise floor, " +
+              std::to_string(error.n_without_support) + " places without support)";
+    else
+      text += "has support at no place";
+  }
+  return text.empty() ? text : "Error that resampling adds by itself, each place left out in turn: " + text + ".";
+}
+
 std::string floorText(const Comparison& comparison) {
   std::string text;
   if (comparison.floor_position_mm > 0.0) text = significantText(comparison.floor_position_mm) + " mm";

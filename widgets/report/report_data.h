@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,20 @@ MeasurementSummary measurementSummary(const CalibrationTable& table);
 
 /// "degree=3, lambda=auto"; empty without settings.
 std::string settingsText(const Settings& settings);
+
+/// What is not at its default: "degree=4"; empty when all are.
+/// @param declared settings of the method
+std::string givenSettingsText(const Settings& settings, std::span<const Setting> declared);
+
+/// Distance of a method's RMS to the best one's: "best", "+0.42 (0.31 to 0.55)", and ", as good" where the 90 %
+/// interval holds zero.
+std::string toBestText(const MethodScore& score, bool is_best);
+
+/// What the floor leaves of the error before and after the best method, as a sentence; empty where no floor is known.
+std::string truenessText(const Comparison& comparison);
+
+/// What each way to bring the measured errors to a grid costs by itself, as a sentence; empty where none was tried.
+std::string resamplingText(const Comparison& comparison);
 
 /// "0.31 mm, 0.02 deg (from samples and jig tolerance)", or that it is not known.
 std::string floorText(const Comparison& comparison);

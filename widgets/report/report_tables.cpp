@@ -39,7 +39,7 @@ struct ScoreTable {
   std::string (*label)(const std::string& id);
   bool with_common_places;  ///< Whether the RMS over the places that all methods cover is a column.
 
-  int columns() const { return with_common_places ? 12 : 11; }
+  int columns() const { return with_common_places ? 13 : 12; }
 };
 
 void writeName(HtmlWriter& html, const std::string& label, const std::string& settings, const std::string& mark) {
@@ -74,6 +74,7 @@ void writeScore(HtmlWriter& html, const ScoreTable& table, const MethodScore& sc
             : worse ? "worse than before"
                     : "");
   writeStats(html, score.stats);
+  number(html, toBestText(score, best));
   number(html, std::to_string(score.n_uncovered));
   if (table.with_common_places) number(html, errorFigure(score.rms_common_mm));
   number(html, errorFigure(score.in_sample_rms));
@@ -88,12 +89,12 @@ void writeScoreTable(HtmlWriter& html, const ScoreTable& table) {
   html.element("caption",
                std::string("Held-out errors in ") + table.unit + ": on places the fits did not see, unless stated");
   if (table.with_common_places) {
-    writeHead(html,
-              {"Method", "Mean", "Median", "RMS", "90 % interval of the RMS", "95th percentile", "Largest",
-               "Places not covered", "RMS where all cover", "RMS on its own places", "One fit", "One evaluation"});
+    writeHead(html, {"Method", "Mean", "Median", "RMS", "90 % interval of the RMS", "95th percentile", "Largest",
+                     "To the best (90 %)", "Places not covered", "RMS where all cover", "RMS on its own places",
+                     "One fit", "One evaluation"});
   } else {
     writeHead(html, {"Method", "Mean", "Median", "RMS", "90 % interval of the RMS", "95th percentile", "Largest",
-                     "Places not covered", "RMS on its own places", "One fit", "One evaluation"});
+                     "To the best (90 %)", "Places not covered", "RMS on its own places", "One fit", "One evaluation"});
   }
   html.open("tbody");
   writeBefore(html, table);

@@ -232,6 +232,67 @@ class ReportTest : public QObject {
     }
   }
 
+  void distanceToTheBestIsAColumn() {
+    const auto page = parsed(input_);
+    const auto rows = page->all("table").front()->all("tbody").front()->all("tr");
+    for (std::size_t i = 0; i < input_.comparison.position.size(); ++i) {
+      const MethodScore& score = input_.comparison.position[i];
+      const bool is_best = &score == bestPosition(input_.comparison);
+      QCOMPARE(rowTexts(*rows[i + 1]).at(7).toStdString(), toBestText(score, is_best));
+    }
+    MethodScore score;
+    score.rms_to_best = 0.5;
+    score.rms_to_best_low90 = -0.1;
+    score.rms_to_best_high90 = 1.2;
+    QCOMPARE(toBestText(score, false), std::string("+0.500 (-0.100 to 1.20), as good"));
+    score.rms_to_best_low90 = 0.1;
+    QCOMPARE(toBestText(score, false), std::string("+0.500 (0.100 to 1.20)"));
+    QCOMPARE(toBestText(score, true), std::string("best"));
+  }
+
+  void regionAndFieldAreTold() {
+    ReportInput input = input_;
+    FoldBackCell cell;
+    cell.center_m = {0.25, -0.5, 1.0};
+    cell.determinant = -2.0;
+    cell.one_to_one = false;
+    cell.nodes = {3, 4, 8, 9, 28, 29, 33, 34};
+    input.comparison.fold_back->cells.push_back(cell);
+    input.comparison.coverage->holes.push_back({{0.5, 0.25, -1.0}, 0.4});
+    const auto page = parsed(input);
+    for (const std::string& text :
+         {input.comparison.coverage->text, input.comparison.fold_back->text,
+          input.comparison.orientation_dependence->text, resamplingText(input.comparison),
+          std::string("cell between places 3, 4, 8, 9, 28, 29, 33, 34 around (0.250, -0.500, 1.000) m"),
+          std::string("hole around (0.500, 0.250, -1.000) m, 0.400 m from the nearest place")})
+      QVERIFY2(!text.empty() && page->text.contains(QString::fromStdString(text)), text.c_str());
+  }
+
+  void learningCurvesAreDrawn() {
+    QVERIFY(parsed(input_)->all("svg").empty());
+    ReportInput input = input_;
+    input.learning_curves = {{"affine", {}, {{10, 3.0, 2.0, 4.0}, {40, 1.0, 0.9, 1.2}, {80, 0.8, 0.8, 0.8}}},
+                             {"hmq", {}, {{40, 0.5, 0.4, 0.6}, {80, 0.1, 0.1, 0.1}}},
+                             {"nothing fitted", {}, {}}};
+    const auto page = parsed(input);
+    QCOMPARE(page->all("svg").size(), std::size_t(1));
+    const auto curves = page->all("polyline");
+    QCOMPARE(curves.size(), std::size_t(2));  // Best first.
+    QCOMPARE(curves.front()->attributes["points"].split(' ', Qt::SkipEmptyParts).size(), 2);
+    const QStringList affine = curves.back()->attributes["points"].split(' ', Qt::SkipEmptyParts);
+    QCOMPARE(affine.size(), 3);
+    double last_x = 0.0;
+    double last_y = 0.0;
+    for (const QString& point : affine) {
+      const double x = point.section(',', 0, 0).toDouble();
+      const double y = point.section(',', 1, 1).toDouble();
+      QVERIFY(x > last_x && x < 900.0 && y > last_y && y < 440.0);  // To the right, and down as the error falls.
+      last_x = x;
+      last_y = y;
+    }
+    QVERIFY(page->all("svg").front()->text.contains("hmq 0.100"));
+  }
+
   void tablesWithoutOrientationSayIt() {
     SyntheticOptions options;
     options.has_orientation = false;

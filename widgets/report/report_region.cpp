@@ -1,0 +1,71 @@
+#include "widgets/report/report_region.h"
+
+#include <algorithm>
+
+#include "widgets/report/numbers.h"
+#include "widgets/report/report_data.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr std::size_t kMostListed = 20;
+
+std::string pointText(const Eigen::Vector3d& point_m) {
+  return "(" + decimalText(point_m.x(), 3) + ", " + decimalText(point_m.y(), 3) + ", " + decimalText(point_m.z(), 3) +
+         ") m";
+}
+
+/// A list of lines, the first twenty, with how many there are besides.
+void writeList(HtmlWriter& html, const std::vector<std::string>& lines) {
+  if (lines.empty()) return;
+  html.open("ul");
+  for (std::size_t i = 0; i < std::min(kMostListed, lines.size()); ++i) html.element("li", lines[i]);
+  if (lines.size() > kMostListed) html.element("li", "and " + std::to_string(lines.size() - kMostListed) + " more");
+  html.close();
+}
+
+void writeCoverage(HtmlWriter& html, const Coverage& coverage) {
+  html.element("h3", "Coverage");
+  html.element("p", coverage.text, {{"id", "coverage"}});
+  std::vector<std::string> holes;
+  for (const Hole& hole : coverage.holes)
+    holes.push_back("hole around " + pointText(hole.center_m) + ", " + decimalText(hole.radius_m, 3) +
+                    " m from the nearest place");
+  writeList(html, holes);
+}
+
+std::string cellText(const FoldBackCell& cell) {
+  std::string nodes;
+  for (const int node : cell.nodes) nodes += (nodes.empty() ? "" : ", ") + std::to_string(node);
+  return (nodes.empty() ? "point around " : "cell between places " + nodes + " around ") + pointText(cell.center_m) +
+         ", determinant " + significantText(cell.determinant) + ", condition " + significantText(cell.condition);
+}
+
+void writeFoldBack(HtmlWriter& html, const FoldBack& fold_back) {
+  html.element("h3", "Fold-back");
+  html.element("p", fold_back.text, {{"id", "fold-back"}});
+  std::vector<std::string> folded;
+  for (const FoldBackCell& cell : fold_back.cells)
+    if (!cell.one_to_one) folded.push_back(cellText(cell));
+  writeList(html, folded);
+}
+
+}  // namespace
+
+void writeRegion(HtmlWriter& html, const Comparison& comparison) {
+  const std::string resampling = resamplingText(comparison);
+  if (!comparison.coverage && !comparison.fold_back && !comparison.orientation_dependence && resampling.empty()) return;
+  html.element("h2", "Region and field");
+  if (comparison.coverage) writeCoverage(html, *comparison.coverage);
+  if (comparison.fold_back) writeFoldBack(html, *comparison.fold_back);
+  if (comparison.orientation_dependence) {
+    html.element("h3", "Dependence on orientation");
+    html.element("p", comparison.orientation_dependence->text, {{"id", "orientation-dependence"}});
+  }
+  if (!resampling.empty()) {
+    html.element("h3", "Resampling");
+    html.element("p", resampling, {{"id", "resampling"}});
+  }
+}
+
+}  // namespace fieldtrue
