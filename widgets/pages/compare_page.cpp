@@ -1,49 +1,53 @@
 #include "widgets/pages/compare_page.h"
 
-#include <QCheckBox>
 #include <QComboBox>
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QProgressBar>
 #include <QPushButton>
-#include <QSlider>
 #include <QSplitter>
 #include <QStackedWidget>
+#include <QStyle>
 #include <QTabWidget>
 #include <QVBoxLayout>
-#include <cmath>
 
+#include "widgets/pages/curve_panel.h"
 #include "widgets/pages/empty_page.h"
-#include "widgets/pages/error_fields.h"
+#include "widgets/pages/field_panel.h"
+#include "widgets/pages/fitted_methods.h"
 #include "widgets/pages/method_panel.h"
+#include "widgets/pages/place_panel.h"
 #include "widgets/pages/units.h"
-#include "widgets/views/chart_views.h"
-#include "widgets/views/field_scale.h"
-#include "widgets/views/field_view.h"
+#include "widgets/pages/verdict_panel.h"
+#include "widgets/pages/volume_store.h"
+#include "widgets/views/volume_field.h"
 
 namespace fieldtrue {
 namespace {
 
-constexpr int kInspectorWidth = 440;
+constexpr int kInspectorWidth = 432;
+constexpr int kNarrowestInspector = 320;
 constexpr std::size_t kFewestPlaces = 5;
-
-// The slider runs over magnifications 1 to 100 in even ratios.
-double magnificationOf(int slider) { return std::pow(10.0, slider / 50.0); }
-int sliderOf(double magnification) { return static_cast<int>(std::lround(50.0 * std::log10(magnification))); }
 
 }  // namespace
 
-ComparePage::ComparePage(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
+ComparePage::ComparePage(Workbench& workbench, QWidget* parent)
+    : QWidget(parent),
+      workbench_(workbench),
+      fitted_methods_(new FittedMethods(this)),
+      volumes_(new VolumeStore(*fitted_methods_, this)) {
   auto* content = new QWidget(this);
   auto* rows = new QVBoxLayout(content);
   rows->setContentsMargins(0, 0, 0, 0);
   rows->setSpacing(0);
   rows->addWidget(makeHeader());
+  fields_ = new FieldPanel(*fitted_methods_, *volumes_, content);
   auto* splitter = new QSplitter(content);
-  splitter->addWidget(makeViews());
+  splitter->addWidget(fields_);
   splitter->addWidget(makeInspector());
   splitter->setStretchFactor(0, 1);
   splitter->setSizes({880, kInspectorWidth});
+  splitter->setCollapsible(0, false);
   rows->addWidget(splitter, 1);
 
   stack_ = new QStackedWidget(this);
@@ -57,44 +61,66 @@ ComparePage::ComparePage(Workbench& workbench, QWidget* parent) : QWidget(parent
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   layout->addWidget(stack_);
-
-  connect(&workbench_, &Workbench::tableChanged, this, &ComparePage::onTable);
-  connect(&workbench_, &Workbench::comparisonChanged, this, &ComparePage::onComparison);
-  connect(&workbench_, &Workbench::correctorChanged, this, &ComparePage::onCorrector);
-  connect(&workbench_, &Workbench::comparisonProgress, this,
-          [this](double fraction) { progress_->setValue(static_cast<int>(fraction * 1000.0)); });
+  connectParts();
   onTable();
 }
 
+void ComparePage::connectParts() {
+  connect(&workbench_, &Workbench::tableChanged, this, &ComparePage::onTable);
+  connect(&workbench_, &Workbench::comparisonChanged, this, &ComparePage::onComparison);
+  connect(&workbench_, &Workbench::correctorChanged, this, &ComparePage::onCorrector);
+  connect(&workbench_, &Workbench::comparisonProgress, this, &ComparePage::onProgress);
+  connect(&workbench_, &Workbench::closing, this, [this] {
+    fitted_methods_->stop();
+    volumes_->reset({}, std::nullopt);
+    curve_->stop();
+  });
+  connect(fields_, &FieldPanel::nodeClicked, this, &ComparePage::selectNode);
+  connect(fields_, &FieldPanel::shownChanged, this, &ComparePage::onShown);
+  connect(place_, &PlacePanel::nodeChosen, this, &ComparePage::selectNode);
+  connect(verdict_panel_, &VerdictPanel::marksChanged, this, &ComparePage::showMarks);
+  for (MethodPanel* panel : {position_, rotation_}) {
+    connect(panel, &MethodPanel::methodChanged, this, &ComparePage::showChoice);
+    connect(panel, &MethodPanel::ticksChanged, this, &ComparePage::showChoice);
+  }
+}
+
 QWidget* ComparePage::makeHeader() {
-  auto* header = new QWidget(this);
-  header->setObjectName(QStringLiteral("verdictBar"));
-  header->setAttribute(Qt::WA_StyledBackground);
-  auto* layout = new QHBoxLayout(header);
-  layout->setContentsMargins(20, 12, 20, 12);
+  header_ = new QWidget(this);
+  header_->setObjectName(QStringLiteral("verdictBar"));
+  header_->setAttribute(Qt::WA_StyledBackground);
+  auto* layout = new QHBoxLayout(header_);
+  layout->setContentsMargins(20, 8, 20, 8);
+  layout->setSpacing(20);
   auto* texts = new QVBoxLayout;
-  verdict_ = new QLabel(header);
+  texts->setSpacing(2);
+  headline_ = new QLabel(header_);
+  headline_->setObjectName(QStringLiteral("headline"));
+  headline_->setProperty("role", "headline");
+  verdict_ = new QLabel(header_);
   verdict_->setObjectName(QStringLiteral("verdict"));
-  verdict_->setProperty("role", "title");
   verdict_->setWordWrap(true);
-  details_ = new QLabel(header);
-  details_->setProperty("role", "muted");
-  details_->setWordWrap(true);
+  verdict_->setTextInteractionFlags(Qt::TextSelectableByMouse);
+  texts->addWidget(headline_);
   texts->addWidget(verdict_);
-  texts->addWidget(details_);
   layout->addLayout(texts, 1);
-  progress_ = new QProgressBar(header);
-  progress_->setRange(0, 1000);
-  progress_->setFixedWidth(140);
-  progress_->setAccessibleName(tr("Comparison"));
-  validation_ = new QComboBox(header);
+  layout->addWidget(makeControls(header_), 0, Qt::AlignTop);
+  return header_;
+}
+
+QWidget* ComparePage::makeControls(QWidget* header) {
+  auto* controls = new QWidget(header);
+  auto* layout = new QVBoxLayout(controls);
+  layout->setContentsMargins(0, 4, 0, 0);
+  validation_ = new QComboBox(controls);
+  validation_->setObjectName(QStringLiteral("validation"));
   validation_->addItem(tr("Leave one place out"), QStringLiteral("loo"));
   validation_->addItem(tr("10 folds"), QStringLiteral("kfold:10"));
   validation_->addItem(tr("8 blocks of space"), QStringLiteral("block:8"));
   validation_->addItem(tr("Validation places"), QStringLiteral("role"));
   validation_->setAccessibleName(tr("How methods are judged"));
   connect(validation_, &QComboBox::activated, this, &ComparePage::runComparison);
-  run_ = new QPushButton(tr("Compare"), header);
+  run_ = new QPushButton(tr("Compare"), controls);
   run_->setObjectName(QStringLiteral("runComparison"));
   run_->setProperty("primary", true);
   connect(run_, &QPushButton::clicked, this, [this] {
@@ -104,87 +130,18 @@ QWidget* ComparePage::makeHeader() {
       runComparison();
     }
   });
+  progress_ = new QProgressBar(controls);
+  progress_->setRange(0, 1000);
+  progress_->setAccessibleName(tr("Comparison"));
+  progress_text_ = new QLabel(controls);
+  progress_text_->setProperty("role", "muted");
+  auto* row = new QHBoxLayout;
+  row->addWidget(validation_);
+  row->addWidget(run_);
+  layout->addLayout(row);
   layout->addWidget(progress_);
-  layout->addWidget(validation_);
-  layout->addWidget(run_);
-  return header;
-}
-
-QWidget* ComparePage::makeViews() {
-  auto* panel = new QWidget(this);
-  auto* layout = new QVBoxLayout(panel);
-  layout->setContentsMargins(0, 0, 0, 0);
-  layout->setSpacing(0);
-  auto* vertical = new QSplitter(Qt::Vertical, panel);
-  auto* fields = new QSplitter(vertical);
-  before_ = new FieldView(fields);
-  after_ = new FieldView(fields);
-  before_->setObjectName(QStringLiteral("fieldBefore"));
-  after_->setObjectName(QStringLiteral("fieldAfter"));
-  after_->linkCamera(before_);
-  fields->addWidget(before_);
-  fields->addWidget(after_);
-  histogram_ = new HistogramView(vertical);
-  histogram_->setObjectName(QStringLiteral("histogram"));
-  vertical->addWidget(fields);
-  vertical->addWidget(histogram_);
-  vertical->setStretchFactor(0, 3);
-  vertical->setStretchFactor(1, 1);
-  vertical->setSizes({460, 170});
-  layout->addWidget(makeViewBar());
-  layout->addWidget(vertical, 1);
-  for (FieldView* view : {before_, after_}) {
-    connect(view, &FieldView::nodeHovered, this, [this](int, const QString& text) { hovered_->setText(text); });
-    connect(view, &FieldView::nodeClicked, this, &ComparePage::selectNode);
-  }
-  return panel;
-}
-
-QWidget* ComparePage::makeViewBar() {
-  auto* bar = new QWidget(this);
-  bar->setObjectName(QStringLiteral("viewBar"));
-  bar->setAttribute(Qt::WA_StyledBackground);
-  auto* layout = new QHBoxLayout(bar);
-  layout->setContentsMargins(12, 4, 12, 4);
-  auto* scale_label = new QLabel(tr("Arrows"), bar);
-  scale_ = new QSlider(Qt::Horizontal, bar);
-  scale_->setObjectName(QStringLiteral("glyphScale"));
-  scale_->setRange(0, 100);
-  scale_->setFixedWidth(140);
-  scale_->setAccessibleName(tr("Magnification of the arrows"));
-  scale_text_ = new QLabel(bar);
-  scale_text_->setMinimumWidth(48);
-  connect(scale_, &QSlider::valueChanged, this, [this](int value) {
-    scale_chosen_by_hand_ = true;
-    magnify(magnificationOf(value));
-  });
-  two_views_ = new QCheckBox(tr("Before and after"), bar);
-  two_views_->setChecked(true);
-  connect(two_views_, &QCheckBox::toggled, this, [this](bool on) { before_->setVisible(on); });
-  orientation_ = new QCheckBox(tr("Orientation error"), bar);
-  connect(orientation_, &QCheckBox::toggled, this, [this](bool on) {
-    before_->setShowOrientation(on);
-    after_->setShowOrientation(on);
-  });
-  layout->addWidget(scale_label);
-  layout->addWidget(scale_);
-  layout->addWidget(scale_text_);
-  layout->addWidget(two_views_);
-  layout->addWidget(orientation_);
-  auto* camera = new QComboBox(bar);
-  camera->setAccessibleName(tr("Where to look from"));
-  for (const auto& [label, preset] :
-       {std::pair(tr("Operator"), CameraPreset::kOperator), std::pair(tr("Front"), CameraPreset::kFront),
-        std::pair(tr("Side"), CameraPreset::kSide), std::pair(tr("Top"), CameraPreset::kTop)})
-    camera->addItem(label, static_cast<int>(preset));
-  connect(camera, &QComboBox::activated, this,
-          [this, camera] { before_->setCamera(static_cast<CameraPreset>(camera->currentData().toInt())); });
-  layout->addWidget(camera);
-  hovered_ = new QLabel(bar);
-  hovered_->setProperty("role", "muted");
-  hovered_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
-  layout->addWidget(hovered_, 1);
-  return bar;
+  layout->addWidget(progress_text_);
+  return controls;
 }
 
 QWidget* ComparePage::makeInspector() {
@@ -192,25 +149,41 @@ QWidget* ComparePage::makeInspector() {
   inspector->setObjectName(QStringLiteral("inspector"));
   inspector->setAttribute(Qt::WA_StyledBackground);
   auto* layout = new QVBoxLayout(inspector);
-  layout->setContentsMargins(12, 12, 12, 12);
-  position_ = new MethodPanel(ScoreModel::Part::kPosition, QStringLiteral("position"), inspector);
-  rotation_ = new MethodPanel(ScoreModel::Part::kOrientation, QStringLiteral("orientation"), inspector);
-  auto* tabs = new QTabWidget(inspector);
-  tabs->addTab(position_, tr("Position"));
-  tabs->addTab(rotation_, tr("Orientation"));
-  layout->addWidget(tabs, 1);
-  for (MethodPanel* panel : {position_, rotation_})
-    connect(panel, &MethodPanel::methodChanged, this, &ComparePage::drawFields);
+  layout->setContentsMargins(12, 8, 12, 12);
+  tabs_ = new QTabWidget(inspector);
+  tabs_->setObjectName(QStringLiteral("inspectorTabs"));
+  verdict_panel_ = new VerdictPanel(tabs_);
+  position_ = new MethodPanel(MethodPart::kPosition, QStringLiteral("position"), tabs_);
+  rotation_ = new MethodPanel(MethodPart::kOrientation, QStringLiteral("orientation"), tabs_);
+  place_ = new PlacePanel(tabs_);
+  curve_ = new CurvePanel(tabs_);
+  position_->setObjectName(QStringLiteral("positionPanel"));
+  rotation_->setObjectName(QStringLiteral("orientationPanel"));
+  curve_->setObjectName(QStringLiteral("curvePanel"));
+  tabs_->addTab(verdict_panel_, tr("Verdict"));
+  tabs_->addTab(position_, tr("Position"));
+  tabs_->addTab(rotation_, tr("Orientation"));
+  tabs_->addTab(place_, tr("Place"));
+  tabs_->addTab(curve_, tr("Curve"));
+  tabs_->tabBar()->setExpanding(false);
+  tabs_->setUsesScrollButtons(false);
+  layout->addWidget(tabs_, 1);
   fit_ = new QPushButton(tr("Fit these methods"), inspector);
   fit_->setObjectName(QStringLiteral("fit"));
   fit_->setProperty("primary", true);
   connect(fit_, &QPushButton::clicked, this, &ComparePage::fitChosen);
   fitted_ = new QLabel(inspector);
   fitted_->setObjectName(QStringLiteral("fitted"));
+  fitted_->setProperty("role", "muted");
   fitted_->setWordWrap(true);
   layout->addWidget(fit_);
   layout->addWidget(fitted_);
-  inspector->setMinimumWidth(kInspectorWidth);
+  // A place and a curve need the height, and nothing is chosen there.
+  connect(tabs_, &QTabWidget::currentChanged, this, [this](int tab) {
+    for (QWidget* widget : {static_cast<QWidget*>(fit_), static_cast<QWidget*>(fitted_)})
+      widget->setVisible(tab < tabs_->indexOf(place_));
+  });
+  inspector->setMinimumWidth(kNarrowestInspector);
   return inspector;
 }
 
@@ -224,6 +197,7 @@ void ComparePage::onTable() {
   for (const Node& node : workbench_.table().nodes) usable += node.role != NodeRole::kSkipped;
   stack_->setCurrentIndex(usable >= kFewestPlaces ? 1 : 0);
   out_of_date_ = true;
+  place_->setData(workbench_.table(), workbench_.samples(), workbench_.comparison());
   if (stack_->currentIndex() == 1 && isVisible()) runComparison();
 }
 
@@ -232,67 +206,92 @@ void ComparePage::runComparison() {
   ComparisonOptions options;
   const auto validation = parseValidation(validation_->currentData().toString().toStdString());
   if (validation) options.validation = *validation;
+  options.position_methods = position_->ticked();
+  options.orientation_methods = rotation_->ticked();
+  // An empty list would mean all methods; none ticked means the error before alone.
+  for (auto* methods : {&options.position_methods, &options.orientation_methods})
+    methods->insert(methods->begin(), MethodText{"none", {}});
   workbench_.compare(options);
+}
+
+void ComparePage::onProgress(double fraction) {
+  progress_->setValue(static_cast<int>(fraction * 1000.0));
+  progress_text_->setText(tr("%1 % of %2 methods")
+                              .arg(static_cast<int>(100.0 * fraction))
+                              .arg(position_->tickedCount() + rotation_->tickedCount()));
 }
 
 void ComparePage::onComparison() {
   const bool running = workbench_.isComparing();
   progress_->setVisible(running);
+  progress_text_->setVisible(running);
   run_->setText(running ? tr("Stop") : tr("Compare again"));
-  const std::optional<Comparison>& comparison = workbench_.comparison();
-  if (running && !comparison) {
-    verdict_->setText(tr("Trying every method on places it has not seen..."));
-    details_->clear();
-  }
-  if (running) return;
-  position_->setComparison(comparison);
-  rotation_->setComparison(comparison);
-  if (!comparison) {
-    verdict_->setText(tr("Not compared yet."));
-    details_->clear();
+  if (running) {
+    onProgress(0.0);
+    if (!workbench_.comparison()) {
+      headline_->setText(tr("Comparing..."));
+      verdict_->setText(tr("Trying every ticked method on places it has not seen."));
+    }
     return;
   }
-  verdict_->setText(QString::fromStdString(comparison->verdict.text));
-  QString details =
-      tr("%1 places scored. What a perfect correction would leave, from the samples' scatter and the jig: %2 mm.")
-          .arg(comparison->places.size())
-          .arg(threeFigures(comparison->floor_position_mm));
-  for (const std::string& note : comparison->notes) details += QStringLiteral(" ") + QString::fromStdString(note);
-  details_->setText(details);
-  chooseScale(*comparison);
+  showComparison();
+}
+
+void ComparePage::showComparison() {
+  const std::optional<Comparison>& comparison = workbench_.comparison();
+  fitted_methods_->reset(workbench_.table(), comparison);
+  volumes_->reset(workbench_.table(), comparison);
+  position_->setComparison(comparison);
+  rotation_->setComparison(comparison);
+  verdict_panel_->setComparison(comparison);
+  curve_->setComparison(workbench_.table(), comparison);
+  place_->setData(workbench_.table(), workbench_.samples(), comparison);
+  fields_->setComparison(workbench_.table(), comparison);
+  if (!comparison) {
+    headline_->setText(tr("Not compared yet"));
+    verdict_->clear();
+    return;
+  }
+  showHeadline(*comparison);
   position_->choose(QString::fromStdString(comparison->best_position));
   rotation_->choose(QString::fromStdString(comparison->best_orientation));
-  drawFields();
+  fields_->setOrientation(comparison->best_orientation_row);
+  if (!fields_->right()) fields_->setRight(comparison->best_position_row);
+  onShown();
+  showMarks();
 }
 
-void ComparePage::chooseScale(const Comparison& comparison) {
-  const FieldScale scale = fieldScale(heldOutField(comparison, workbench_.table(), QString(), QString(), QString()));
-  before_->setScaleMax_mm(scale.max_mm);
-  after_->setScaleMax_mm(scale.max_mm);
-  if (scale_chosen_by_hand_) return;
-  const QSignalBlocker quiet(scale_);
-  scale_->setValue(sliderOf(scale.magnification));
-  magnify(scale.magnification);
+void ComparePage::showHeadline(const Comparison& comparison) {
+  const bool apply = comparison.verdict.apply_position;
+  const auto best = comparison.best_position_row;
+  const double after_mm = best ? comparison.position[*best].stats.rms : comparison.before_position_mm.rms;
+  headline_->setText(
+      apply
+          ? tr("Apply it: %1 \u2192 %2 mm").arg(threeFigures(comparison.before_position_mm.rms), threeFigures(after_mm))
+          : tr("Do not correct: %1 mm as it is").arg(threeFigures(comparison.before_position_mm.rms)));
+  header_->setProperty("state", apply ? "apply" : "leave");
+  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) {
+    widget->style()->unpolish(widget);
+    widget->style()->polish(widget);
+  }
+  verdict_->setText(QString::fromStdString(comparison.verdict.text));
 }
 
-void ComparePage::magnify(double magnification) {
-  scale_text_->setText(tr("x%1").arg(threeFigures(magnification)));
-  before_->setMagnification(magnification);
-  after_->setMagnification(magnification);
+void ComparePage::showChoice() {
+  fit_->setText(tr("Fit these methods"));
+  fit_->setToolTip(tr("%1 for position, %2 for orientation").arg(position_->label(), rotation_->label()));
+  if (!workbench_.corrector())
+    fitted_->setText(tr("%1 for position, %2 for orientation.").arg(position_->label(), rotation_->label()));
 }
 
-void ComparePage::drawFields() {
-  const std::optional<Comparison>& comparison = workbench_.comparison();
-  if (!comparison) return;
-  const QString method = position_->method();
-  const QString turned = rotation_->method();
-  const QString label = position_->label();
-  before_->setField(heldOutField(*comparison, workbench_.table(), QString(), QString(), tr("Before correction")));
-  after_->setField(
-      heldOutField(*comparison, workbench_.table(), method, turned, tr("After: %1, places it did not see").arg(label)));
-  histogram_->setSeries({tr("Before"), label},
-                        {heldOutErrors_mm(*comparison, QString()), heldOutErrors_mm(*comparison, method)},
-                        tr("Position error on places the fit did not see [mm]"));
+void ComparePage::onShown() {
+  verdict_panel_->showMethods(fields_->left(), fields_->right());
+  curve_->showMethods(fields_->left(), fields_->right());
+}
+
+void ComparePage::showMarks() {
+  fields_->setHoles(verdict_panel_->holes());
+  fields_->setFolds(verdict_panel_->folds());
 }
 
 void ComparePage::fitChosen() {
@@ -306,10 +305,7 @@ void ComparePage::fitChosen() {
 
 void ComparePage::onCorrector() {
   const std::optional<Corrector>& corrector = workbench_.corrector();
-  if (!corrector) {
-    fitted_->clear();
-    return;
-  }
+  if (!corrector) return showChoice();
   const FitReport& report = corrector->report();
   fitted_->setText(tr("Fitted on %1 rows; what is left on those same rows (no verdict): RMS %2. Kept in the session, "
                       "ready to export.")
@@ -318,22 +314,9 @@ void ComparePage::onCorrector() {
 }
 
 void ComparePage::selectNode(int node) {
-  before_->setSelected(node);
-  after_->setSelected(node);
-  hovered_->setText(describeNode(node));
-}
-
-QString ComparePage::describeNode(int node) const {
-  const std::optional<Comparison>& comparison = workbench_.comparison();
-  if (!comparison) return {};
-  for (std::size_t i = 0; i < comparison->places.size(); ++i) {
-    if (comparison->places[i] != node) continue;
-    const std::vector<double> after_mm = heldOutErrors_mm(*comparison, position_->method());
-    return tr("Place %1: before %2 mm, after %3 mm")
-        .arg(node)
-        .arg(threeFigures(comparison->before_place_mm[i]), threeFigures(after_mm[i]));
-  }
-  return {};
+  fields_->setSelected(node);
+  place_->setNode(node);
+  tabs_->setCurrentWidget(place_);
 }
 
 }  // namespace fieldtrue

@@ -4,22 +4,25 @@
 
 #include "widgets/pages/workbench.h"
 
-class QCheckBox;
 class QComboBox;
 class QLabel;
 class QProgressBar;
 class QPushButton;
-class QSlider;
 class QStackedWidget;
+class QTabWidget;
 
 namespace fieldtrue {
 
-class FieldView;
-class HistogramView;
+class CurvePanel;
+class FieldPanel;
+class FittedMethods;
 class MethodPanel;
+class PlacePanel;
+class VerdictPanel;
+class VolumeStore;
 
-/// Fit and compare: the verdict, the error field before and after on one colour scale, and every method's held-out
-/// figures.
+/// Fit and compare: the verdict, the error fields of any two methods, every method's held-out figures, and what is
+/// known of each place.
 class ComparePage : public QWidget {
   Q_OBJECT
  public:
@@ -30,40 +33,42 @@ class ComparePage : public QWidget {
 
  private:
   QWidget* makeHeader();
-  QWidget* makeViews();
-  QWidget* makeViewBar();
+  QWidget* makeControls(QWidget* header);
   QWidget* makeInspector();
+  void connectParts();
   void onTable();
   void runComparison();
   void onComparison();
+  void onProgress(double fraction);
   void onCorrector();
-  void drawFields();
-  void chooseScale(const Comparison& comparison);
-  void magnify(double magnification);
+  void showHeadline(const Comparison& comparison);
+  void showComparison();
+  void showChoice();
+  void onShown();
+  void showMarks();
   void fitChosen();
   void selectNode(int node);
-  QString describeNode(int node) const;
 
   Workbench& workbench_;
+  FittedMethods* fitted_methods_;
+  VolumeStore* volumes_;
   QStackedWidget* stack_;
+  QWidget* header_ = nullptr;
+  QLabel* headline_;
   QLabel* verdict_;
-  QLabel* details_;
   QProgressBar* progress_;
+  QLabel* progress_text_;
   QPushButton* run_;
   QComboBox* validation_;
-  FieldView* before_;
-  FieldView* after_;
-  HistogramView* histogram_;
-  QSlider* scale_;
-  QLabel* scale_text_;
-  QCheckBox* two_views_;
-  QCheckBox* orientation_;
-  QLabel* hovered_;
+  FieldPanel* fields_;
+  QTabWidget* tabs_;
+  VerdictPanel* verdict_panel_;
   MethodPanel* position_;
   MethodPanel* rotation_;
+  PlacePanel* place_;
+  CurvePanel* curve_;
   QPushButton* fit_;
   QLabel* fitted_;
-  bool scale_chosen_by_hand_ = false;
   bool out_of_date_ = true;
 };
 

@@ -1,7 +1,9 @@
 #include "widgets/pages/export_page.h"
 
+#include <QCheckBox>
 #include <QDateTime>
 #include <QDir>
+#include <QDoubleSpinBox>
 #include <QFileDialog>
 #include <QFileInfo>
 #include <QHBoxLayout>
@@ -18,12 +20,21 @@
 #include "widgets/pages/empty_page.h"
 #include "widgets/pages/units.h"
 #include "widgets/report/report.h"
+#include "widgets/report/thread_pool.h"
 
 namespace fieldtrue {
 namespace {
 
 constexpr int kColumnWidth = 720;
 constexpr int kRowHeight = 36;
+constexpr double kLeastDeviation_mm = 0.001;
+constexpr double kUsualDeviation_mm = 0.05;
+constexpr double kMostDeviation_mm = 10.0;
+
+Result<std::string> said(const Result<void>& written, const std::string& note = {}) {
+  if (!written) return tl::unexpected(written.error());
+  return note;
+}
 
 }  // namespace
 
@@ -63,6 +74,7 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   list_->setSizePolicy(QSizePolicy::Preferred, QSizePolicy::Fixed);
   layout->addWidget(list_);
   layout->addWidget(about_);
+  layout->addWidget(makeBake());
   layout->addLayout(row);
   layout->addStretch(1);
   outer->addStretch();
@@ -93,32 +105,64 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   onData();
 }
 
+QWidget* ExportPage::makeBake() {
+  bake_row_ = new QWidget(this);
+  bake_ = new QCheckBox(tr("Bake to a lattice that is fast to evaluate, off the method by at most"), bake_row_);
+  bake_->setObjectName(QStringLiteral("exportBake"));
+  deviation_ = new QDoubleSpinBox(bake_row_);
+  deviation_->setObjectName(QStringLiteral("exportDeviation"));
+  deviation_->setAccessibleName(tr("Largest deviation of the lattice from the method"));
+  deviation_->setDecimals(3);
+  deviation_->setRange(kLeastDeviation_mm, kMostDeviation_mm);
+  deviation_->setValue(kUsualDeviation_mm);
+  deviation_->setStepType(QAbstractSpinBox::AdaptiveDecimalStepType);
+  deviation_->setSuffix(tr(" mm"));
+  deviation_->setEnabled(false);
+  connect(bake_, &QCheckBox::toggled, deviation_, &QWidget::setEnabled);
+  auto* row = new QHBoxLayout(bake_row_);
+  row->setContentsMargins(0, 0, 0, 0);
+  row->addWidget(bake_);
+  row->addWidget(deviation_);
+  row->addStretch(1);
+  return bake_row_;
+}
+
+ExportPage::Writing ExportPage::calibrationWriter(Result<void> (*exporter)(const Corrector&,
+                                                                           const std::filesystem::path&)) const {
+  const bool bake = bake_->isChecked() && !workbench_.corrector()->isBaked();
+  const double deviation_m = deviation_->value() / 1000.0;
+  return [corrector = *workbench_.corrector(), exporter, bake, deviation_m](const std::string& path) {
+    RunControl control;
+    control.parallel_for = threadedFor(0);
+    const Result<Corrector> written = bake ? corrector.baked(deviation_m, control) : Result<Corrector>(corrector);
+    if (!written) return Result<std::string>(tl::unexpected(written.error()));
+    return said(exporter(*written, path), bake ? written->report().notes.back() : std::string());
+  };
+}
+
 void ExportPage::fillTargets() {
-  for (const Exporter& exporter : exporters()) {
+  for (const Exporter& exporter : exporters())
     targets_.push_back({QString::fromStdString(exporter.id), QString::fromStdString(exporter.label),
-                        QString::fromStdString(exporter.extension), QString::fromStdString(exporter.reads_it),
-                        [this, write = exporter.write] {
-                          return [corrector = *workbench_.corrector(), write](const std::string& path) {
-                            return write(corrector, path);
-                          };
-                        }});
-  }
+                        QString::fromStdString(exporter.extension), QString::fromStdString(exporter.reads_it), true,
+                        [this, write = exporter.write] { return calibrationWriter(write); }});
   targets_.push_back({QStringLiteral("nodes"), tr("Node table"), QStringLiteral(".nodes.csv"),
-                      tr("One row per place: what the rig says and what the tracker said."), [this] {
+                      tr("One row per place: what the rig says and what the tracker said."), false, [this] {
                         return [table = workbench_.table()](const std::string& path) {
-                          return writeNodeTable(std::filesystem::path(path), table);
+                          return said(writeNodeTable(std::filesystem::path(path), table));
                         };
                       }});
   targets_.push_back({QStringLiteral("samples"), tr("Raw samples"), QStringLiteral(".samples.csv"),
-                      tr("Every reading that was taken at the places."), [this] {
+                      tr("Every reading that was taken at the places."), false, [this] {
                         return [samples = workbench_.samples()](const std::string& path) {
-                          return writeSampleTable(std::filesystem::path(path), samples);
+                          return said(writeSampleTable(std::filesystem::path(path), samples));
                         };
                       }});
   targets_.push_back(
       {QStringLiteral("report"), tr("Report"), QStringLiteral(".html"),
-       tr("One page with pictures, the method table, the verdict and where it all came from; any browser."),
-       [this] { return [input = reportInput()](const std::string& path) { return writeHtmlReport(input, path); }; }});
+       tr("One page with pictures, the method table, the verdict and where it all came from; any browser."), false,
+       [this] {
+         return [input = reportInput()](const std::string& path) { return said(writeHtmlReport(input, path)); };
+       }});
 }
 
 ReportInput ExportPage::reportInput() const {
@@ -164,6 +208,8 @@ void ExportPage::onTarget() {
   const Target* target = chosen();
   if (!target) return;
   about_->setText(target->reads_it);
+  bake_row_->setVisible(target->is_calibration);
+  bake_row_->setEnabled(workbench_.corrector() && !workbench_.corrector()->isBaked());
   path_->setText(suggestedPath(*target));
 }
 
@@ -187,13 +233,18 @@ void ExportPage::write() {
   write_->setEnabled(false);
   runInBackground(
       this, [work = target->prepare(), path] { return work(path.toStdString()); },
-      [this, path](const Result<void>& written) { onWritten(path, written); });
+      [this, path](const Result<std::string>& written) { onWritten(path, written); });
 }
 
-void ExportPage::onWritten(const QString& path, const Result<void>& written) {
+void ExportPage::onWritten(const QString& path, const Result<std::string>& written) {
   write_->setEnabled(true);
   if (written) {
-    workbench_.showMessage({tr("Written: %1").arg(QDir::toNativeSeparators(path)), Severity::kInfo, {}, {}});
+    const QString note = QString::fromStdString(*written);
+    workbench_.showMessage({tr("Written: %1").arg(QDir::toNativeSeparators(path)) +
+                                (note.isEmpty() ? QString() : QStringLiteral(". ") + note),
+                            Severity::kInfo,
+                            {},
+                            {}});
   } else {
     workbench_.showMessage({QString::fromStdString(written.error().message), Severity::kDanger, {}, {}});
   }

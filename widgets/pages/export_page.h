@@ -5,6 +5,8 @@
 #include "widgets/pages/workbench.h"
 #include "widgets/report/report.h"
 
+class QCheckBox;
+class QDoubleSpinBox;
 class QLabel;
 class QListWidget;
 class QLineEdit;
@@ -20,21 +22,26 @@ class ExportPage : public QWidget {
   explicit ExportPage(Workbench& workbench, QWidget* parent = nullptr);
 
  private:
+  using Writing = std::function<Result<std::string>(const std::string& path)>;
   /// One thing that can be written; every exporter of the registry is one, the tables and the report are the others.
   struct Target {
     QString id;
     QString label;
     QString extension;
     QString reads_it;
-    /// Copies what is needed in the window's thread and returns the writing itself, which runs beside it.
-    std::function<std::function<Result<void>(const std::string& path)>()> prepare;
+    bool is_calibration = false;  ///< Can be baked.
+    /// Copies what is needed in the window's thread and returns the writing itself, which runs beside it and answers
+    /// with what is to be said of it.
+    std::function<Writing()> prepare;
   };
   void fillTargets();
+  QWidget* makeBake();
+  Writing calibrationWriter(Result<void> (*exporter)(const Corrector&, const std::filesystem::path&)) const;
   void onTarget();
   void onData();
   void browse();
   void write();
-  void onWritten(const QString& path, const Result<void>& written);
+  void onWritten(const QString& path, const Result<std::string>& written);
   ReportInput reportInput() const;
   QString suggestedPath(const Target& target) const;
   const Target* chosen() const;
@@ -45,6 +52,9 @@ class ExportPage : public QWidget {
   QListWidget* list_;
   QLabel* about_;
   QLabel* calibration_;
+  QWidget* bake_row_;
+  QCheckBox* bake_;
+  QDoubleSpinBox* deviation_;
   QLineEdit* path_;
   QPushButton* write_;
 };

@@ -1,51 +1,60 @@
 #pragma once
 
 #include <QWidget>
-#include <span>
 
-#include "calib/core/settings.h"
 #include "widgets/pages/score_model.h"
 
-class QComboBox;
+class QHBoxLayout;
+class QLabel;
+class QPushButton;
 class QTableView;
 
 namespace fieldtrue {
 
 class SettingsForm;
 
-/// Every method of one part (position or orientation): its held-out figures, the choice of one, and that one's
-/// settings.
+/// Every method of one part (position or orientation): its held-out figures, whether the next comparison takes it, and
+/// the settings of the one chosen. Changing a setting adds the method a second time, with that setting.
 class MethodPanel : public QWidget {
   Q_OBJECT
  public:
-  /// @param name begins the object names of the table and the choice: "position" gives "positionTable",
-  /// "positionMethod"
+  /// @param name begins the object names: "position" gives "positionTable", "positionAll" and so on
   MethodPanel(ScoreModel::Part part, const QString& name, QWidget* parent = nullptr);
   void setComparison(const std::optional<Comparison>& comparison);
-  QString method() const;  ///< Id of the chosen one.
+  QString method() const;  ///< Id of the chosen one, "none" for before.
   QString label() const;
   Settings settings() const;
-  /// @param method id; empty = none
+  /// @param method id; empty or "none" = before
   void choose(const QString& method);
+  /// The methods the next comparison takes.
+  std::vector<MethodText> ticked() const { return tickedMethods(scores_->entries()); }
+  int tickedCount() const;
 
  signals:
   void methodChanged();
+  void ticksChanged();
 
  private:
-  struct Entry {
-    std::string id;
-    std::string label;
-    std::span<const Setting> settings;
-  };
-  static std::vector<Entry> entriesOf(ScoreModel::Part part);
   void makeTable(const QString& name);
+  QWidget* makeTicks(const QString& name);
+  void onRow();
+  void onSettings();
+  void removeVariant();
+  void showTicks();
+  int currentRow() const;
+  void chooseRow(int row);
 
-  std::vector<Entry> entries_;
+  ScoreModel::Part part_;
   ScoreModel* scores_;
   QSortFilterProxyModel* sorted_;
   QTableView* table_;
-  QComboBox* choice_;
+  QLabel* ticks_;
+  QLabel* about_;
+  QPushButton* remove_;
   SettingsForm* form_;
+  QString method_ = QStringLiteral("none");
+  Settings settings_;
+  bool setting_up_ = false;
 };
 
 }  // namespace fieldtrue

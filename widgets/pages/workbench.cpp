@@ -10,6 +10,7 @@
 #include <array>
 
 #include "widgets/pages/background.h"
+#include "widgets/pages/fitted_methods.h"
 #include "widgets/report/thread_pool.h"
 
 namespace fieldtrue {
@@ -27,14 +28,6 @@ constexpr std::array<StepName, 6> kStepNames{{{Step::kStart, "start"},
                                               {Step::kExport, "export"}}};
 
 constexpr int kRecentSessions = 6;
-
-/// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
-std::vector<Node> fitRows(const CalibrationTable& table) {
-  std::vector<Node> rows;
-  for (const Node& node : table.nodes)
-    if (node.role == NodeRole::kFit) rows.push_back(node);
-  return rows;
-}
 
 }  // namespace
 
@@ -61,6 +54,7 @@ Workbench::Workbench(QObject* parent) : QObject(parent) {
 }
 
 Workbench::~Workbench() {
+  emit closing();
   comparison_stop_.request_stop();
   QMetaObject::invokeMethod(controller_, &AcquisitionController::closeSession, Qt::BlockingQueuedConnection);
   QMetaObject::invokeMethod(controller_, &AcquisitionController::disconnectDevice, Qt::BlockingQueuedConnection);

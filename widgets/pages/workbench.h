@@ -88,6 +88,7 @@ class Workbench : public QObject {
   void correctorChanged();
   void stepRequested(fieldtrue::Step step);
   void messageShown(const fieldtrue::Message& message);
+  void closing();  ///< The window goes: long work of the pages must stop.
   void nodeStored(int place, const fieldtrue::Node& node, const QString& suspicious);
 
  private:

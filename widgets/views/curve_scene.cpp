@@ -31,7 +31,9 @@ namespace fieldtrue {
 namespace {
 
 constexpr int kTextSize = 12;
-constexpr double kLabelRoom_px = 132.0;
+constexpr double kLetter_px = 7.4;  ///< Mean width of a bold letter.
+constexpr double kMostLabelShare = 0.42;
+constexpr std::size_t kFewestLetters = 8;
 constexpr double kLabelGap_px = 16.0;
 constexpr double kPick_px = 14.0;
 constexpr double kLine_px = 2.0;
@@ -80,6 +82,7 @@ class CurveLabels : public vtkContextItem {
   const std::vector<ChartLine>* lines = nullptr;
   const Theme* theme = &Theme::of(false);
   double ratio = 1.0;
+  std::size_t letters = 20;  ///< Room for a name; longer ones are cut.
 
   /// Where a point stands in the picture [device pixels from the lower left corner].
   std::array<double, 2> toPixels(double x, double y) const;
@@ -90,6 +93,7 @@ class CurveLabels : public vtkContextItem {
  private:
   void paintWhiskers(vtkContext2D* painter) const;
   void paintNames(vtkContext2D* painter) const;
+  QString cut(const QString& name) const;
 };
 
 vtkStandardNewMacro(CurveLabels);
@@ -148,8 +152,13 @@ void CurveLabels::paintNames(vtkContext2D* painter) const {
     text->SetJustificationToLeft();
     text->SetVerticalJustificationToCentered();
     painter->DrawString(static_cast<float>(x), static_cast<float>(heights[k]),
-                        vtkStdString((*lines)[shown[k]].name.toStdString()));
+                        vtkStdString(cut((*lines)[shown[k]].name).toStdString()));
   }
+}
+
+QString CurveLabels::cut(const QString& name) const {
+  const auto room = static_cast<qsizetype>(letters);
+  return name.size() <= room ? name : name.left(room - 1).trimmed() + QChar(0x2026);
 }
 
 std::vector<double> logTicks(double low, double high) {
@@ -217,8 +226,11 @@ void CurveScene::setStyle(const Theme& theme, double ratio) {
 
 void CurveScene::fillSize() {
   const int* size = renderer_->GetSize();
-  const double room = lines_.empty() ? 12.0 : kLabelRoom_px;
-  const auto width = static_cast<float>(std::max(60.0, size[0] - room * ratio_));
+  qsizetype letters = 0;
+  for (const ChartLine& line : lines_) letters = std::max(letters, line.name.size());
+  const double room_px = std::min(kMostLabelShare * size[0] / ratio_, kLetter_px * static_cast<double>(letters) + 12.0);
+  labels_->letters = std::max(kFewestLetters, static_cast<std::size_t>(std::max(0.0, room_px - 12.0) / kLetter_px));
+  const auto width = static_cast<float>(std::max(60.0, size[0] - room_px * ratio_));
   chart_->SetSize(vtkRectf(0.0F, 0.0F, width, static_cast<float>(size[1])));
 }
 

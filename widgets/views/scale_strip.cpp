@@ -134,7 +134,6 @@ void ScaleStrip::paintOpacity(QPainter& painter, int left, int width) const {
 void ScaleStrip::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   const Theme& colors = theme();
-  painter.fillRect(rect(), colors.surface);
   const QString arrows = tr("arrows \u00d7%1").arg(number(magnification_));
   const int arrows_width = painter.fontMetrics().horizontalAdvance(arrows);
   const int right = width() - kMargin - arrows_width;

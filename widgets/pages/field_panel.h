@@ -1,0 +1,96 @@
+#pragma once
+
+#include <QWidget>
+
+#include "widgets/pages/compared_methods.h"
+#include "widgets/views/scale_strip.h"
+
+class QButtonGroup;
+class QCheckBox;
+class QComboBox;
+class QHBoxLayout;
+class QLabel;
+class QSlider;
+
+namespace fieldtrue {
+
+class FieldView;
+class FittedMethods;
+class VolumeBar;
+class VolumeStore;
+struct FieldScale;
+struct SceneCell;
+struct VolumeField;
+struct VolumeKey;
+
+/// The error fields of any two methods side by side, one alone, or their difference; with a slice and a surface through
+/// the volume. All views share camera, colours and selection.
+class FieldPanel : public QWidget {
+  Q_OBJECT
+ public:
+  enum class Mode { kSideBySide, kOne, kDifference };
+
+  FieldPanel(FittedMethods& fitted, VolumeStore& volumes, QWidget* parent = nullptr);
+
+  /// Keeps the methods shown where they are still compared.
+  void setComparison(const CalibrationTable& table, const std::optional<Comparison>& comparison);
+  void setLeft(MethodRow row);
+  void setRight(MethodRow row);
+  MethodRow left() const;
+  MethodRow right() const;
+  Mode mode() const;
+  void setMode(Mode mode);
+  /// Whose held-out angles are drawn beside a corrected position.
+  void setOrientation(MethodRow row);
+  void setSelected(int node);
+  void setHoles(const std::vector<SceneCell>& holes);
+  void setFolds(const std::vector<SceneCell>& cells);
+
+ signals:
+  void nodeClicked(int node);
+  void shownChanged();  ///< Other methods, or another way to show them.
+
+ private:
+  QWidget* makeViewBar();
+  void makeModes(QHBoxLayout* layout);
+  void makeArrows(QHBoxLayout* layout);
+  void makeCamera(QHBoxLayout* layout);
+  QWidget* makeChoosers();
+  QWidget* makeViews();
+  QWidget* makeLegend();
+  void fillChoosers();
+  void draw();
+  void drawVolume();
+  void drawSlice();
+  void showScale(const std::vector<const ErrorField*>& fields);
+  std::vector<const VolumeField*> volumesShown();
+  VolumeKey keyOf(const FieldView* view) const;
+  ErrorField fieldOf(MethodRow row);
+  void addUncertainty(ErrorField& field, MethodRow row);
+  void showCertainty(const std::vector<const ErrorField*>& fields);
+  void magnify(double magnification);
+
+  FittedMethods& fitted_;
+  VolumeStore& volumes_;
+  CalibrationTable table_;
+  std::optional<Comparison> comparison_;
+  MethodRow orientation_row_;
+  QButtonGroup* modes_;
+  QComboBox* left_choice_;
+  QComboBox* right_choice_;
+  QLabel* between_;
+  FieldView* left_;
+  FieldView* right_;
+  VolumeBar* volume_bar_;
+  ScaleStrip* strip_;
+  QComboBox* colors_to_;
+  QSlider* arrows_;
+  QLabel* arrows_text_;
+  QCheckBox* orientation_;
+  QCheckBox* certainty_;
+  QLabel* certainty_text_;
+  double suited_magnification_ = 1.0;  ///< To the fields shown.
+  double arrows_factor_ = 1.0;         ///< What a person made of it.
+};
+
+}  // namespace fieldtrue

@@ -1,0 +1,60 @@
+#include "widgets/pages/method_list.h"
+
+#include "calib/correctors/method_text.h"
+#include "calib/correctors/registry.h"
+#include "widgets/pages/compared_methods.h"
+
+namespace fieldtrue {
+namespace {
+
+template <class Method>
+std::vector<MethodEntry> entriesOf(std::span<const Method> methods) {
+  std::vector<MethodEntry> entries;
+  for (const Method& method : methods)
+    if (method.id != "none")
+      entries.push_back({method.id, defaultSettings(method.settings), method.most_folds == 0, false});
+  return entries;
+}
+
+template <class Method>
+MethodInfo infoOf(const Result<const Method*>& method, const std::string& id) {
+  if (!method) return {QString::fromStdString(id), {}, {}, false};
+  return {QString::fromStdString((*method)->label), (*method)->settings, QString::fromStdString((*method)->source),
+          (*method)->most_folds > 0};
+}
+
+}  // namespace
+
+std::vector<MethodEntry> registeredMethods(MethodPart part) {
+  return part == MethodPart::kPosition ? entriesOf(positionMethods()) : entriesOf(orientationMethods());
+}
+
+MethodInfo methodInfo(MethodPart part, const std::string& id) {
+  return part == MethodPart::kPosition ? infoOf(findPositionMethod(id), id) : infoOf(findOrientationMethod(id), id);
+}
+
+QString methodLabel(MethodPart part, const std::string& id, const Settings& settings) {
+  MethodScore score;
+  score.method = id;
+  score.settings = settings;
+  return part == MethodPart::kPosition ? positionLabel(score) : orientationLabel(score);
+}
+
+Settings defaultSettings(std::span<const Setting> declared) {
+  Settings settings;
+  for (const Setting& setting : declared) settings[setting.key] = setting.default_value;
+  return settings;
+}
+
+std::vector<MethodText> tickedMethods(std::span<const MethodEntry> entries) {
+  std::vector<MethodText> methods;
+  for (const MethodEntry& entry : entries)
+    if (entry.ticked) methods.push_back(methodTextOf(entry.id, entry.settings));
+  return methods;
+}
+
+MethodText methodTextOf(const std::string& id, const Settings& settings) {
+  return parseMethodText(methodText(id, settings)).value_or(MethodText{id, {}});
+}
+
+}  // namespace fieldtrue
