@@ -23,6 +23,7 @@
 #include "calib/correctors/local_kindratenko.h"
 #include "calib/correctors/local_linear.h"
 #include "calib/correctors/local_quaternion.h"
+#include "calib/correctors/neural_network.h"
 #include "calib/correctors/none.h"
 #include "calib/correctors/orientation_none.h"
 #include "calib/correctors/orientation_rigid.h"
@@ -53,13 +54,24 @@ Result<const CorrectionMethod<Model>*> findMethod(std::span<const CorrectionMeth
 }  // namespace
 
 std::span<const PositionMethod> positionMethods() {
-  static const std::vector<PositionMethod> methods = {
-      nonePosition(),          rigidPosition(),           affinePosition(),
-      trilinearPosition(),     hexahedralShapePosition(), tetrahedralPosition(),
-      localLinearPosition(),   localBumpPosition(),       localKindratenkoPosition(),
-      localBriggsPosition(),   polynomialPosition(),      hmqPosition(),
-      rbfPosition(),           gaussianProcessPosition(), bsplinePosition(),
-      harmonicFieldPosition(), automaticPosition()};
+  static const std::vector<PositionMethod> methods = {nonePosition(),
+                                                      rigidPosition(),
+                                                      affinePosition(),
+                                                      trilinearPosition(),
+                                                      hexahedralShapePosition(),
+                                                      tetrahedralPosition(),
+                                                      localLinearPosition(),
+                                                      localBumpPosition(),
+                                                      localKindratenkoPosition(),
+                                                      localBriggsPosition(),
+                                                      polynomialPosition(),
+                                                      hmqPosition(),
+                                                      neuralNetworkPosition(),
+                                                      rbfPosition(),
+                                                      gaussianProcessPosition(),
+                                                      bsplinePosition(),
+                                                      harmonicFieldPosition(),
+                                                      automaticPosition()};
   return methods;
 }
 
