@@ -75,7 +75,8 @@ std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& c
                      inMm(scores[chosen].rms_m());
   note += chosen == 0 ? ", since nothing else lowers it clearly"
                       : " against " + inMm(scores.front().rms_m()) + " without correction";
-  return note + "; " + std::to_string(n_scored) + " candidates over the same " + std::to_string(n_folds) + " folds.";
+  return note + "; " + std::to_string(n_scored) + " candidates scored over the same " + std::to_string(n_folds) +
+         " folds.";
 }
 
 CandidateSet candidateSetOf(const Settings& settings) {
@@ -98,17 +99,13 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
   if (auto checked = checkSpread(data); !checked) return tl::unexpected(checked.error());
   const std::vector<AutomaticCandidate> candidates = automaticCandidates(candidateSetOf(settings));
   const auto folds = innerFolds(data);
-  RunControl inner = control;
-  inner.progress = [](double) {};
-  std::vector<InnerScore> scores;
-  for (const AutomaticCandidate& candidate : candidates) {
-    auto score = scoreCandidate(candidate, data, folds, inner);
-    if (!score) return tl::unexpected(score.error());
-    scores.push_back(*std::move(score));
-    control.progress(static_cast<double>(scores.size()) / static_cast<double>(candidates.size() + 1));
-  }
+  const auto scored = scoreCandidates(candidates, data, folds, control);
+  if (!scored) return tl::unexpected(scored.error());
+  const std::vector<InnerScore>& scores = *scored;
   const std::size_t chosen = chooseCandidate(candidates, scores);
   const AutomaticCandidate& winner = candidates[chosen];
+  RunControl inner = control;
+  inner.progress = [](double) {};
   auto model = winner.method->fit(data, winner.settings, inner);
   if (!model) return tl::unexpected(model.error());
   control.progress(1.0);

@@ -10,7 +10,9 @@
 namespace fieldtrue {
 namespace {
 
-constexpr std::size_t kFolds = 10;
+constexpr std::size_t kFolds = 5;
+constexpr std::size_t kFoldsBeforeDropping = 2;
+constexpr double kDroppedFrom = 2.0;  ///< Standard errors.
 constexpr std::size_t kPlacesForFolds = 20;
 constexpr double kLeastGain = 0.05;
 constexpr double kOneSided95 = 1.645;
@@ -102,6 +104,18 @@ Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData&
   };
 }
 
+/// On the places scored so far, by their paired differences.
+bool isClearlyWorse(const InnerScore& score, const InnerScore& best, const std::vector<bool>& is_scored) {
+  std::vector<double> own, others;
+  for (std::size_t i = 0; i < is_scored.size(); ++i) {
+    if (!is_scored[i]) continue;
+    own.push_back(score.squares_m2[i]);
+    others.push_back(best.squares_m2[i]);
+  }
+  const PairedDifference excess(own, others);
+  return excess.mean > 0.0 && excess.mean > kDroppedFrom * excess.standard_error;
+}
+
 bool isIn(Origin origin, CandidateSet set) {
   if (origin == Origin::kBaseline || set == CandidateSet::kAll) return true;
   return (origin == Origin::kSurvey) == (set == CandidateSet::kSurvey);
@@ -158,30 +172,61 @@ FitData rowsOfFitData(const FitData& data, const std::vector<std::size_t>& rows)
 }
 
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
-                                  const std::vector<std::vector<std::size_t>>& folds, const RunControl& control) {
+                                  const std::vector<std::vector<std::size_t>>& folds, const InnerScore* best,
+                                  const RunControl& control) {
   const auto cancelled = [] { return fail(ErrorCode::kCancelled, "Stopped on request"); };
   if (control.stop.stop_requested()) return cancelled();
-  InnerScore score;
   const auto model_without = modelsOf(candidate, data, control);
   if (!model_without) {
     if (model_without.error().code == ErrorCode::kCancelled) return tl::unexpected(model_without.error());
-    score.skipped = model_without.error().message;
-    return score;
+    return InnerScore{{}, model_without.error().message};
   }
   const std::vector<std::size_t> slots = slotsOf(data);
   std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
   for (const std::size_t slot : slots) n_rows[slot] += 1.0;
+  InnerScore score;
   score.squares_m2.assign(n_rows.size(), 0.0);
-  for (const std::vector<std::size_t>& fold : folds) {
+  std::vector<bool> is_scored(n_rows.size(), false);
+  for (std::size_t k = 0; k < folds.size(); ++k) {
     if (control.stop.stop_requested()) return cancelled();
-    const auto model = (*model_without)(fold);
+    const auto model = (*model_without)(folds[k]);
     if (!model && model.error().code == ErrorCode::kCancelled) return tl::unexpected(model.error());
     if (!model) return InnerScore{{}, model.error().message};
-    for (const std::size_t row : fold)
+    for (const std::size_t row : folds[k]) {
       score.squares_m2[slots[row]] += squaredError_m2(**model, data, row) / n_rows[slots[row]];
+      is_scored[slots[row]] = true;
+    }
+    const bool may_drop = best != nullptr && candidate.method->most_folds > 0 && k + 1 < folds.size();
+    if (may_drop && k + 1 >= kFoldsBeforeDropping && isClearlyWorse(score, *best, is_scored))
+      return InnerScore{{},
+                        "dropped after " + std::to_string(k + 1) + " of " + std::to_string(folds.size()) +
+                            " folds, clearly worse than another candidate"};
   }
   if (!std::isfinite(meanOf(score.squares_m2))) return InnerScore{{}, "its errors at held-out places are not finite"};
   return score;
+}
+
+Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandidate>& candidates, const FitData& data,
+                                                const std::vector<std::vector<std::size_t>>& folds,
+                                                const RunControl& control) {
+  RunControl inner = control;
+  inner.progress = [](double) {};
+  std::vector<std::size_t> order(candidates.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return (candidates[a].method->most_folds > 0) < (candidates[b].method->most_folds > 0);
+  });
+  std::vector<InnerScore> scores(candidates.size());
+  const InnerScore* best = nullptr;
+  double n_done = 0.0;
+  for (const std::size_t i : order) {
+    auto score = scoreCandidate(candidates[i], data, folds, best, inner);
+    if (!score) return tl::unexpected(score.error());
+    scores[i] = *std::move(score);
+    if (!scores[i].skipped && (best == nullptr || scores[i].rms_m() < best->rms_m())) best = &scores[i];
+    control.progress(++n_done / static_cast<double>(candidates.size() + 1));
+  }
+  return scores;
 }
 
 std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores) {

@@ -35,13 +35,23 @@ struct InnerScore {
   double rms_m() const;
 };
 
-/// Rows in folds by place, the same for every candidate: ten, or one a place below twenty places.
+/// Rows in folds by place, the same for every candidate: five, or one a place below twenty places.
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data);
 
 /// Scores a candidate on places its fits did not see: in closed form where the method has one, by refits otherwise.
+/// @param best so far, or null: a costly method (most_folds) that after two folds or more is worse by two standard
+///        errors is dropped
 /// @error kCancelled only; what a method cannot do is in the score
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
-                                  const std::vector<std::vector<std::size_t>>& folds, const RunControl& control);
+                                  const std::vector<std::vector<std::size_t>>& folds, const InnerScore* best,
+                                  const RunControl& control);
+
+/// Scores every candidate, costly ones last; in the candidates' order.
+/// @param progress is told the fraction done
+/// @error kCancelled
+Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandidate>& candidates, const FitData& data,
+                                                const std::vector<std::vector<std::size_t>>& folds,
+                                                const RunControl& control);
 
 /// The simplest candidate whose mean squared error exceeds the least by no more than one standard error of the
 /// difference (paired by place), the better one among equally simple ones; and the first, which must be none, unless

@@ -1,0 +1,287 @@
+#include <QTest>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "calib/correctors/automatic_choice.h"
+#include "tests/calib/correctors/fit_fixtures.h"
+#include "tests/support/matchers.h"
+#include "tests/support/random_geometry.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
+
+Eigen::Vector3d quadratic_m(const Eigen::Vector3d& p) {
+  return {0.02 * p.x() * p.x() - 0.01 * p.y(), 0.03 * p.x() * p.z(), 0.02 * p.y() * p.y() + 0.01 * p.z() * p.x()};
+}
+
+/// A bump a few spacings wide, which no polynomial of low degree follows.
+Eigen::Vector3d bump_m(const Eigen::Vector3d& p) {
+  const double near = std::exp(-12.0 * (p - Eigen::Vector3d(0.9, 0.2, 0.1)).squaredNorm());
+  return near * Eigen::Vector3d(0.03, -0.02, 0.01);
+}
+
+FitData noisy(const Displacement& displacement_m, double noise_m, unsigned seed,
+              std::array<int, 3> counts = {5, 5, 5}) {
+  RandomGeometry random(seed);
+  FitData data = fitDataOf(shakenGrid(counts, 0.2, 0.02), displacement_m);
+  for (Eigen::Vector3d& truth_m : data.p_true_m)
+    truth_m += noise_m * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+  return data;
+}
+
+std::vector<AutomaticCandidate> ranked(const std::vector<int>& complexities) {
+  std::vector<AutomaticCandidate> candidates;
+  for (const int complexity : complexities) candidates.push_back({nullptr, {}, "", complexity});
+  return candidates;
+}
+
+double freshError_m(const PositionModel& model, const Displacement& truth_m) {
+  RandomGeometry random(99);
+  double squares_m2 = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    const Eigen::Vector3d p_m(random.between(0.45, 1.35), random.between(-0.25, 0.65), random.between(-0.15, 0.55));
+    const Eigen::Vector3d seen_m = model.covers(p_m) ? model.displacement_m(p_m) : Eigen::Vector3d::Zero();
+    squares_m2 += (seen_m - truth_m(p_m)).squaredNorm();
+  }
+  return std::sqrt(squares_m2 / 400.0);
+}
+
+std::string chosen(const PositionModel& model) { return model.parameters().at("method").get<std::string>(); }
+
+}  // namespace
+
+class AutomaticTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void takesTheSimplestWithinOneStandardError_data() {
+    QTest::addColumn<double>("excess");
+    QTest::addColumn<double>("scatter");
+    QTest::addColumn<int>("expected");
+    // Differences excess +- scatter over 100 places: standard error scatter / sqrt(99).
+    QTest::newRow("within") << 0.09 << 1.0 << 1;
+    QTest::newRow("beyond") << 0.11 << 1.0 << 2;
+    QTest::newRow("the same at every place, yet more") << 0.01 << 0.0 << 2;
+    QTest::newRow("better itself") << -0.5 << 0.1 << 1;
+  }
+  void takesTheSimplestWithinOneStandardError() {
+    QFETCH(double, excess);
+    QFETCH(double, scatter);
+    QFETCH(int, expected);
+    std::vector<InnerScore> scores(3);
+    for (int i = 0; i < 100; ++i) {
+      scores[0].squares_m2.push_back(20.0);
+      scores[1].squares_m2.push_back(4.0 + excess + (i % 2 == 0 ? scatter : -scatter));
+      scores[2].squares_m2.push_back(4.0);
+    }
+    QCOMPARE(chooseCandidate(ranked({0, 3, 10}), scores), static_cast<std::size_t>(expected));
+  }
+
+  void staysWithNoneUnlessTheGainIsClear_data() {
+    QTest::addColumn<double>("left");
+    QTest::addColumn<double>("scatter");
+    QTest::addColumn<int>("expected");
+    QTest::newRow("RMS lower by 4 %") << 0.96 * 0.96 << 0.0 << 0;
+    QTest::newRow("RMS lower by 6 %") << 0.94 * 0.94 << 0.0 << 1;
+    // Gain 0.5 with standard error 3.2 / sqrt(99) = 0.322, 1.55 of it; and 2.9 / sqrt(99) = 0.291, 1.72 of it.
+    QTest::newRow("1.55 standard errors") << 0.5 << 3.2 << 0;
+    QTest::newRow("1.72 standard errors") << 0.5 << 2.9 << 1;
+  }
+  void staysWithNoneUnlessTheGainIsClear() {
+    QFETCH(double, left);
+    QFETCH(double, scatter);
+    QFETCH(int, expected);
+    std::vector<InnerScore> scores(2);
+    for (int i = 0; i < 100; ++i) {
+      scores[0].squares_m2.push_back(1.0 + (i % 2 == 0 ? scatter : -scatter));
+      scores[1].squares_m2.push_back(left);
+    }
+    QCOMPARE(chooseCandidate(ranked({0, 3}), scores), static_cast<std::size_t>(expected));
+  }
+
+  void skippedCandidatesAreNeverChosen() {
+    std::vector<InnerScore> scores(3);
+    scores[0].squares_m2 = std::vector<double>(50, 1.0);
+    scores[1].skipped = "cannot";
+    scores[2].squares_m2 = std::vector<double>(50, 0.1);
+    QCOMPARE(chooseCandidate(ranked({0, 1, 2}), scores), std::size_t{2});
+  }
+
+  void foldsHoldEveryRowOnceAndNoPlaceTwice() {
+    FitData data = noisy(nothing_m, 0.001, 1, {6, 6, 5});
+    for (std::size_t row = 0; row < data.size(); ++row) data.node[row] = static_cast<int>(row / 2);
+    const auto folds = innerFolds(data);
+    QCOMPARE(folds.size(), std::size_t{5});
+    std::set<std::size_t> rows;
+    std::map<int, std::set<std::size_t>> folds_of_place;
+    for (std::size_t k = 0; k < folds.size(); ++k) {
+      QVERIFY(std::is_sorted(folds[k].begin(), folds[k].end()));
+      QCOMPARE(folds[k].size(), data.size() / 5);
+      for (const std::size_t row : folds[k]) {
+        QVERIFY(rows.insert(row).second);
+        folds_of_place[data.node[row]].insert(k);
+      }
+    }
+    QCOMPARE(rows.size(), data.size());
+    for (const auto& [place, in] : folds_of_place) QCOMPARE(in.size(), std::size_t{1});
+    QVERIFY(innerFolds(data) == folds);
+    const FitData few = rowsOfFitData(data, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
+    QCOMPARE(innerFolds(few).size(), std::size_t{5});
+  }
+
+  void candidatesAreThoseOfTheSetAndNeverItself() {
+    const auto idsOf = [](CandidateSet set) {
+      std::set<std::string> ids;
+      for (const AutomaticCandidate& candidate : automaticCandidates(set)) ids.insert(candidate.method->id);
+      return ids;
+    };
+    const auto survey = idsOf(CandidateSet::kSurvey), ours = idsOf(CandidateSet::kOurs),
+               all = idsOf(CandidateSet::kAll);
+    for (const std::string id : {"none", "rigid", "affine"}) QVERIFY(survey.contains(id) && ours.contains(id));
+    for (const std::string id : {"polynomial", "hmq"}) QVERIFY(survey.contains(id) && !ours.contains(id));
+    for (const std::string id : {"rbf", "gaussian_process", "bspline"})
+      QVERIFY(!survey.contains(id) && ours.contains(id));
+    QVERIFY(!all.contains("auto"));
+    QCOMPARE(all.size(), survey.size() + ours.size() - 3);
+    QCOMPARE(automaticCandidates(CandidateSet::kAll).front().method->id, std::string("none"));
+  }
+
+  void innerScoresAreThoseOfRefits_data() {
+    QTest::addColumn<QString>("id");
+    for (const char* id : {"none", "affine", "polynomial"}) QTest::newRow(id) << id;
+  }
+  void innerScoresAreThoseOfRefits() {
+    QFETCH(QString, id);
+    const FitData data = noisy(quadratic_m, 0.002, 4);
+    const auto folds = innerFolds(data);
+    const PositionMethod& method = *findPositionMethod(id.toStdString()).value();
+    const AutomaticCandidate candidate{&method, settingsOf(method), "", 0};
+    const auto score = scoreCandidate(candidate, data, folds, nullptr, {});
+    FT_VERIFY_OK(score);
+    QVERIFY(!score->skipped);
+    for (const auto& fold : folds) {
+      std::vector<std::size_t> kept;
+      for (std::size_t row = 0; row < data.size(); ++row)
+        if (!std::binary_search(fold.begin(), fold.end(), row)) kept.push_back(row);
+      const auto model = method.fit(rowsOfFitData(data, kept), candidate.settings, {});
+      FT_VERIFY_OK(model);
+      for (const std::size_t row : fold) {
+        const Eigen::Vector3d& p_m = data.p_tracked_m[row];
+        const double expected_m2 = (p_m + (*model)->displacement_m(p_m) - data.p_true_m[row]).squaredNorm();
+        FT_VERIFY_MATCH(near(score->squares_m2[row], expected_m2, 1e-9 * expected_m2 + 1e-18));
+      }
+    }
+  }
+
+  void aCostlyMethodThatIsClearlyWorseIsDroppedEarly() {
+    const FitData data = noisy(quadratic_m, 0.0005, 4);
+    const auto folds = innerFolds(data);
+    PositionMethod costly = *findPositionMethod("none").value();
+    costly.hold_out = nullptr;
+    costly.most_folds = 3;
+    const PositionMethod& good = *findPositionMethod("polynomial").value();
+    const auto best = scoreCandidate({&good, settingsOf(good), "", 0}, data, folds, nullptr, {});
+    FT_VERIFY_OK(best);
+    const auto dropped = scoreCandidate({&costly, {}, "", 0}, data, folds, &*best, {});
+    FT_VERIFY_OK(dropped);
+    QVERIFY(dropped->skipped);
+    FT_VERIFY_MATCH(holdsAll(*dropped->skipped, {"2 of 5 folds"}));
+    // Against something as bad as itself it is scored to the end.
+    const auto alone = scoreCandidate({&costly, {}, "", 0}, data, folds, nullptr, {});
+    FT_VERIFY_OK(alone);
+    QVERIFY(!alone->skipped);
+    const auto equal = scoreCandidate({&costly, {}, "", 0}, data, folds, &*alone, {});
+    FT_VERIFY_OK(equal);
+    QVERIFY(!equal->skipped);
+  }
+
+  void pureNoiseIsLeftAlone_data() {
+    QTest::addColumn<int>("seed");
+    for (int seed = 1; seed <= 4; ++seed) QTest::addRow("seed %d", seed) << seed;
+  }
+  void pureNoiseIsLeftAlone() {
+    QFETCH(int, seed);
+    const auto model = fitPosition("auto", noisy(nothing_m, 0.003, static_cast<unsigned>(seed)));
+    FT_VERIFY_OK(model);
+    QCOMPARE(chosen(**model), std::string("none"));
+    FT_VERIFY_MATCH(holdsAll((*model)->note(), {"Chosen: none"}));
+  }
+
+  void errsNoMoreThanTheBestCandidateAllows_data() {
+    QTest::addColumn<bool>("is_bump");
+    QTest::addColumn<double>("tolerance");
+    // The quadratic field is a candidate's own. For the bump, one standard error may cost more.
+    QTest::newRow("quadratic field") << false << 1.05;
+    QTest::newRow("narrow bump") << true << 1.3;
+  }
+  void errsNoMoreThanTheBestCandidateAllows() {
+    QFETCH(bool, is_bump);
+    QFETCH(double, tolerance);
+    const Displacement truth_m = is_bump ? Displacement(bump_m) : Displacement(quadratic_m);
+    const FitData data = noisy(truth_m, 0.0005, 21);
+    const auto model = fitPosition("auto", data);
+    FT_VERIFY_OK(model);
+    double best_m = HUGE_VAL, linear_m = HUGE_VAL;
+    for (const AutomaticCandidate& candidate : automaticCandidates(CandidateSet::kAll)) {
+      const auto fitted = candidate.method->fit(data, candidate.settings, {});
+      if (!fitted) continue;
+      best_m = std::min(best_m, freshError_m(**fitted, truth_m));
+      if (candidate.method->id == "affine") linear_m = freshError_m(**fitted, truth_m);
+    }
+    const double seen_m = freshError_m(**model, truth_m);
+    QVERIFY2(seen_m <= tolerance * best_m,
+             qPrintable(QString("%1 chosen: %2 against %3").arg(chosen(**model).c_str()).arg(seen_m).arg(best_m)));
+    QVERIFY(seen_m < 0.5 * linear_m);
+  }
+
+  void choosesAmongTheSetAskedFor() {
+    const FitData data = noisy(bump_m, 0.0005, 21);
+    const auto survey = fitPosition("auto", data, {{"candidates", "survey"}});
+    const auto ours = fitPosition("auto", data, {{"candidates", "ours"}});
+    FT_VERIFY_OK(survey);
+    FT_VERIFY_OK(ours);
+    const auto textsOf = [](const PositionModel& model) {
+      std::string texts;
+      const nlohmann::json parameters = model.parameters();
+      for (const nlohmann::json& row : parameters.at("candidates")) texts += row.at("method").get<std::string>() + " ";
+      return texts;
+    };
+    FT_VERIFY_MATCH(holdsAll(textsOf(**survey), {"none", "polynomial:degree=4", "hmq"}));
+    QVERIFY(textsOf(**survey).find("rbf") == std::string::npos);
+    FT_VERIFY_MATCH(holdsAll(textsOf(**ours), {"none", "rbf", "gaussian_process", "bspline"}));
+    QVERIFY(textsOf(**ours).find("polynomial") == std::string::npos);
+  }
+
+  void stopsOnRequestAndTellsHowFarItIs() {
+    std::stop_source source;
+    RunControl control;
+    control.stop = source.get_token();
+    double last = 0.0;
+    control.progress = [&](double fraction) {
+      QVERIFY(fraction >= last && fraction <= 1.0);
+      last = fraction;
+      if (fraction > 0.2) source.request_stop();
+    };
+    const PositionMethod& method = *findPositionMethod("auto").value();
+    const auto stopped = method.fit(noisy(quadratic_m, 0.001, 3), settingsOf(method), control);
+    QVERIFY(!stopped);
+    QCOMPARE(stopped.error().code, ErrorCode::kCancelled);
+    QVERIFY(last > 0.2 && last < 0.9);
+  }
+
+  void aFileCannotNameItselfOrAStranger() {
+    const PositionMethod& method = *findPositionMethod("auto").value();
+    nlohmann::json parameters = fitPosition("auto", noisy(quadratic_m, 0.001, 3)).value()->parameters();
+    parameters["method"] = "auto";
+    QVERIFY(!method.load(parameters));
+    parameters["method"] = "stranger";
+    QVERIFY(!method.load(parameters));
+  }
+};
+
+QTEST_GUILESS_MAIN(AutomaticTest)
+#include "automatic_test.moc"
