@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/correctors/hmq_kernel.h"
+#include "calib/correctors/hmq_mixed.h"
 #include "calib/correctors/hmq_system.h"
 #include "calib/correctors/json_values.h"
 
@@ -18,6 +19,11 @@ constexpr std::size_t kBlock = 256;
 Result<MultiquadricField> MultiquadricField::fit(const std::string& name, std::span<const Eigen::Vector3d> centers_m,
                                                  std::span<const int> node, const Eigen::MatrixXd& values, double r2_m2,
                                                  const RunControl& control) {
+  if (auto checked = checkMultiquadricCenters(name, centers_m, node, control); !checked)
+    return tl::unexpected(checked.error());
+  if (values.cols() == 3)
+    if (const auto alpha = solveMultiquadricMixed(centers_m, r2_m2, values))
+      return MultiquadricField(centers_m, *alpha, r2_m2);
   const auto system = MultiquadricSystem::factorise(name, centers_m, node, r2_m2, control);
   if (!system) return tl::unexpected(system.error());
   const auto alpha = system->solve(values);

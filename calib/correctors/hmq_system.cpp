@@ -29,8 +29,10 @@ namespace {
 constexpr std::size_t kMaxCenters = 10000;  // 800 MB for the matrix.
 /// Largest rounding error of a value that is accepted [m]; four digits below what any tracker resolves.
 constexpr double kRoundingLimit_m = 1e-6;
-/// c over the largest entry of M: 1/(1^T M^-1 1), which c must exceed, was at most 1.3 of that entry for grids of 125
-/// to 1728 places and R^2 from 10 to 1000 cm2 wherever M could be solved at all.
+/// Largest residual that is left as it is [m]; a larger one improves the solution once.
+constexpr double kResidualLimit_m = 1e-10;
+/// c over the largest entry that M may have: 1/(1^T M^-1 1), which c must exceed, was at most 1.3 of that entry for
+/// grids of 125 to 1728 places and R^2 from 10 to 1000 cm2 wherever M could be solved at all.
 constexpr double kShiftOfLargest = 4.0;
 
 /// Two centres at exactly the same position, as indices.
@@ -48,23 +50,27 @@ std::optional<std::pair<std::size_t, std::size_t>> findRepeated(std::span<const 
   return std::nullopt;
 }
 
-void useOneThread() {
-  // calib starts no thread; where OpenBLAS is built with threads it must be told, once.
-  static const bool told = [] {
-    openblas_set_num_threads(1);
-    return true;
-  }();
-  static_cast<void>(told);
-}
-
 tl::unexpected<Error> spoiltByRounding(const std::string& name, double r2_m2) {
   return fail(ErrorCode::kDegenerate, name + ": the places stand so close together, compared with R = " +
                                           std::to_string(std::lround(std::sqrt(r2_m2) * 1000.0)) +
                                           " mm, that rounding spoils the solution; use a smaller R squared");
 }
 
-Result<void> checkCenters(const std::string& name, std::span<const Eigen::Vector3d> centers_m,
-                          std::span<const int> node) {
+}  // namespace
+
+double multiquadricShift(std::span<const Eigen::Vector3d> centers_m, double r2_m2) {
+  Eigen::Vector3d low_m = centers_m.front();
+  Eigen::Vector3d high_m = low_m;
+  for (const Eigen::Vector3d& p_m : centers_m) {
+    low_m = low_m.cwiseMin(p_m);
+    high_m = high_m.cwiseMax(p_m);
+  }
+  return kShiftOfLargest * std::sqrt((high_m - low_m).squaredNorm() + r2_m2);
+}
+
+Result<void> checkMultiquadricCenters(const std::string& name, std::span<const Eigen::Vector3d> centers_m,
+                                      std::span<const int> node, const RunControl& control) {
+  FT_CHECK(!centers_m.empty() && node.size() == centers_m.size());
   if (centers_m.size() > kMaxCenters)
     return fail(ErrorCode::kUnsupported, name + " takes at most " + std::to_string(kMaxCenters) + " places, got " +
                                              std::to_string(centers_m.size()) + "; use a polynomial");
@@ -74,19 +80,23 @@ Result<void> checkCenters(const std::string& name, std::span<const Eigen::Vector
                     std::to_string(node[repeated->second]) +
                     " were tracked at exactly the same position, and one curve cannot pass through "
                     "both; measure one of them again or skip it");
+  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
+  // calib starts no thread; where OpenBLAS is built with threads it must be told, once.
+  static const bool told = [] {
+    openblas_set_num_threads(1);
+    return true;
+  }();
+  static_cast<void>(told);
   return {};
 }
-
-}  // namespace
 
 Result<MultiquadricSystem> MultiquadricSystem::factorise(const std::string& name,
                                                          std::span<const Eigen::Vector3d> centers_m,
                                                          std::span<const int> node, double r2_m2,
                                                          const RunControl& control) {
-  FT_CHECK(!centers_m.empty() && node.size() == centers_m.size() && r2_m2 > 0.0);
-  if (auto checked = checkCenters(name, centers_m, node); !checked) return tl::unexpected(checked.error());
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
-  useOneThread();
+  FT_CHECK(r2_m2 > 0.0);
+  if (auto checked = checkMultiquadricCenters(name, centers_m, node, control); !checked)
+    return tl::unexpected(checked.error());
   MultiquadricSystem system;
   system.name_ = name;
   system.r2_m2_ = r2_m2;
@@ -96,27 +106,32 @@ Result<MultiquadricSystem> MultiquadricSystem::factorise(const std::string& name
     system.y_m_.push_back(p_m.y());
     system.z_m_.push_back(p_m.z());
   }
-  if (!system.factoriseByCholesky() && !system.factoriseByLu()) return spoiltByRounding(name, r2_m2);
+  if (!(system.factoriseByCholesky() && system.solveForOnes()) && !system.factoriseByLu())
+    return spoiltByRounding(name, r2_m2);
   return system;
 }
 
 bool MultiquadricSystem::factoriseByCholesky() {
   const auto n = static_cast<int>(size());
   factors_.resize(n, n);
-  // The lower triangle, column by column from the diagonal on.
+  shift_ = multiquadricShift(centers_m_, r2_m2_);
+  // The lower triangle, column by column from the diagonal on; what lies above is never touched.
   for (std::size_t i = 0; i < size(); ++i) {
     const MultiquadricArrays below{x_m_.data() + i, y_m_.data() + i, z_m_.data() + i, size() - i, r2_m2_};
-    const auto column = static_cast<Eigen::Index>(i);
-    multiquadricWeights(below, centers_m_[i].data(), &factors_(column, column));
+    const auto at = static_cast<Eigen::Index>(i);
+    multiquadricWeights(below, centers_m_[i].data(), &factors_(at, at));
+    factors_.col(at).tail(n - at) = shift_ - factors_.col(at).tail(n - at).array();
   }
-  for (Eigen::Index i = 0; i < n; ++i) shift_ = std::max(shift_, factors_.col(i).tail(n - i).maxCoeff());
-  shift_ *= kShiftOfLargest;
-  for (Eigen::Index i = 0; i < n; ++i) factors_.col(i).tail(n - i) = shift_ - factors_.col(i).tail(n - i).array();
   int info = 0;
   dpotrf_("L", &n, factors_.data(), &n, &info);
-  if (info != 0) return false;
-  u_ = Eigen::VectorXd::Ones(n);
+  return info == 0;
+}
+
+bool MultiquadricSystem::solveForOnes() {
+  const auto n = static_cast<int>(size());
   const int one = 1;
+  int info = 0;
+  u_ = Eigen::VectorXd::Ones(n);
   dpotrs_("L", &n, &one, factors_.data(), &n, u_.data(), &n, &info);
   // 1 - c 1^T u = -1/(c 1^T M^-1 1 - 1) is negative where the factors mean anything.
   return info == 0 && u_.allFinite() && 1.0 - shift_ * u_.sum() < 0.0;
@@ -166,11 +181,15 @@ Result<Eigen::MatrixXd> MultiquadricSystem::solve(const Eigen::MatrixXd& values)
   FT_CHECK(static_cast<std::size_t>(values.rows()) == size() && factors_.size() > 0);
   Eigen::MatrixXd alpha = solveOnce(values);
   if (!alpha.allFinite()) return spoiltByRounding(name_, r2_m2_);
-  alpha += solveOnce(values - product(alpha));
+  Eigen::MatrixXd both(alpha.rows(), 2 * alpha.cols());
+  both << alpha, alpha.cwiseAbs();
+  both = product(both);
   // Rounding error of f near the centres: alphas of both signs cancel, so eps times the sum of magnitudes.
-  const double rounding_m =
-      alpha.allFinite() ? std::numeric_limits<double>::epsilon() * product(alpha.cwiseAbs()).maxCoeff() : HUGE_VAL;
-  if (rounding_m > kRoundingLimit_m) return spoiltByRounding(name_, r2_m2_);
+  if (std::numeric_limits<double>::epsilon() * both.rightCols(alpha.cols()).maxCoeff() > kRoundingLimit_m)
+    return spoiltByRounding(name_, r2_m2_);
+  const Eigen::MatrixXd residual = values - both.leftCols(alpha.cols());
+  if (residual.cwiseAbs().maxCoeff() > kResidualLimit_m) alpha += solveOnce(residual);
+  if (!alpha.allFinite()) return spoiltByRounding(name_, r2_m2_);
   return alpha;
 }
 

@@ -10,6 +10,14 @@
 
 namespace fieldtrue {
 
+/// What every multiquadric asks of its centres first, and of OpenBLAS: one thread.
+/// @error kDegenerate when two centres coincide; kUnsupported beyond 10,000; kCancelled
+Result<void> checkMultiquadricCenters(const std::string& name, std::span<const Eigen::Vector3d> centers_m,
+                                      std::span<const int> node, const RunControl& control);
+
+/// c for which c 1 1^T - M is positive definite, with room: four times the largest entry that M may have.
+double multiquadricShift(std::span<const Eigen::Vector3d> centers_m, double r2_m2);
+
 /// The factorised system of equations M alpha = values, M_ij = w_j(p_i), through centres at scattered positions.
 ///
 /// M has one positive eigenvalue and otherwise negative ones (Micchelli 1986), so A = c 1 1^T - M is positive definite
@@ -30,7 +38,8 @@ class MultiquadricSystem {
   double r2_m2() const { return r2_m2_; }
   std::span<const Eigen::Vector3d> centers_m() const { return centers_m_; }
 
-  /// Coefficients through values, one column an output, improved once by their own residual.
+  /// Coefficients through values, one column an output, improved once by their own residual where that exceeds
+  /// a tenth of a nanometre.
   /// @error kDegenerate when rounding would exceed a micrometre (or a millionth, where the values are no lengths)
   Result<Eigen::MatrixXd> solve(const Eigen::MatrixXd& values) const;
 
@@ -42,6 +51,7 @@ class MultiquadricSystem {
  private:
   MultiquadricSystem() = default;
   bool factoriseByCholesky();
+  bool solveForOnes();
   bool factoriseByLu();
   /// M^-1 from the inverse of A (Sherman and Morrison): -(A^-1 + k u u^T), u = A^-1 1.
   double shermanMorrison() const;
