@@ -1,45 +1,32 @@
-// Hardy's multiquadric against its peers on the same places, one thread: ALGLIB's multiquadric, VTK's thin-plate spline
-// and a plain loop over an array of structures. Ratios are printed at the end; times depend on the machine, ratios
+// Hardy's multiquadric against its peers on the same places, one thread: ALGLIB's multiquadric, VTK's thin-plate
+// spline, SciPy's RBFInterpolator where it is installed, and a plain loop over an array of structures; and its own ways
+// to be evaluated against the square roots alone. Ratios are printed at the end; times depend on the machine, ratios
 // hardly.
 #include <benchmark/benchmark.h>
-#include <interpolation.h>
-#include <vtkNew.h>
-#include <vtkPoints.h>
-#include <vtkSmartPointer.h>
-#include <vtkThinPlateSplineTransform.h>
 
-#include <cmath>
+#include <array>
 #include <cstdio>
 #include <map>
 #include <memory>
-#include <random>
+#include <nlohmann/json.hpp>
+#include <string>
 
+#include "calib/core/geometry.h"
+#include "calib/correctors/baked_lattice_maker.h"
+#include "calib/correctors/hmq_kernel.h"
 #include "calib/correctors/registry.h"
+#include "tests/bench/bent_grid.h"
+#include "tests/bench/hmq_peers.h"
+#include "tests/bench/square_roots.h"
 
 namespace {
 
-using fieldtrue::FitData;
-using fieldtrue::PositionModel;
+using namespace fieldtrue;
+using namespace fieldtrue::bench;
+using Model = std::unique_ptr<PositionModel>;
 
 constexpr std::size_t kBatch = 100000;
-constexpr double kR_m = 0.1;  // The default R squared, 100 cm2.
-
-/// A grid of n^3 places over 2 m, shaken and bent as a tracker would.
-FitData bentGrid(int n) {
-  std::mt19937_64 generator(1);
-  std::normal_distribution<double> noise_m(0.0, 0.002);
-  FitData data;
-  for (int i = 0; i < n * n * n; ++i) {
-    const Eigen::Vector3d p_true_m = 2.0 / n * Eigen::Vector3d(i % n, i / n % n, i / (n * n));
-    const Eigen::Vector3d bend_m(std::sin(2.0 * p_true_m.y()), std::cos(1.5 * p_true_m.z()),
-                                 p_true_m.x() * p_true_m.y());
-    data.p_true_m.push_back(p_true_m);
-    data.p_tracked_m.push_back(p_true_m + 0.05 * bend_m +
-                               Eigen::Vector3d(noise_m(generator), noise_m(generator), noise_m(generator)));
-    data.node.push_back(i);
-  }
-  return data;
-}
+constexpr double kLatticeBound_m = 50e-6;
 
 const FitData& grid(std::int64_t n) {
   static std::map<std::int64_t, FitData> grids;
@@ -48,144 +35,91 @@ const FitData& grid(std::int64_t n) {
 }
 
 const std::vector<Eigen::Vector3d>& batchPoints() {
-  static const std::vector<Eigen::Vector3d> points_m = [] {
-    std::mt19937_64 generator(2);
-    std::uniform_real_distribution<double> uniform(0.0, 1.8);
-    std::vector<Eigen::Vector3d> made(kBatch);
-    for (Eigen::Vector3d& p_m : made) p_m = Eigen::Vector3d(uniform(generator), uniform(generator), uniform(generator));
-    return made;
-  }();
+  static const std::vector<Eigen::Vector3d> points_m = pointsWithin(kBatch);
   return points_m;
 }
 
-std::unique_ptr<PositionModel> fitFieldtrue(const FitData& data) {
-  const fieldtrue::PositionMethod& method = *fieldtrue::findPositionMethod("hmq").value();
-  const fieldtrue::Settings settings = fieldtrue::resolveSettings(method.id, method.settings, {}).value();
-  return method.fit(data, settings, {}).value();
+Model fitWith(const FitData& data, const std::map<std::string, std::string>& given) {
+  const PositionMethod& method = *findPositionMethod("hmq").value();
+  return method.fit(data, resolveSettings(method.id, method.settings, given).value(), {}).value();
 }
 
-alglib::rbfmodel fitAlglib(const FitData& data) {
-  const auto count = static_cast<alglib::ae_int_t>(data.size());
-  alglib::real_2d_array xy;
-  xy.setlength(count, 6);
-  for (alglib::ae_int_t i = 0; i < count; ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
-      xy[i][axis] = data.p_tracked_m[static_cast<std::size_t>(i)][axis];
-      xy[i][3 + axis] = data.p_true_m[static_cast<std::size_t>(i)][axis];
+Model fitDouble(const FitData& data) { return fitWith(data, {}); }
+Model fitSingle(const FitData& data) { return fitWith(data, {{"precision", "single"}}); }
+
+/// The multiquadric baked within 50 um.
+Model fitLattice(const FitData& data) {
+  const Region region = Region::around(data.p_tracked_m, 3, 0.02);
+  auto lattice = bakeLattice(*fitDouble(data), region, data.p_tracked_m, kLatticeBound_m, {}).value();
+  std::printf("%s\n", lattice->note().c_str());
+  return lattice;
+}
+
+/// A multiquadric evaluated by one kernel's sums, to compare the ways that one processor has.
+class KernelModel : public PositionModel {
+ public:
+  KernelModel(const FitData& data, decltype(MultiquadricKernel::sums) sums) : sums_(sums) {
+    const nlohmann::json fitted = fitDouble(data)->parameters();
+    for (std::size_t j = 0; j < data.size(); ++j) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        numbers_[k].push_back(data.p_tracked_m[j][static_cast<Eigen::Index>(k)]);
+        numbers_[3 + k].push_back(fitted.at("alpha")[j][k].get<double>());
+      }
     }
+    arrays_ = {numbers_[0].data(), numbers_[1].data(), numbers_[2].data(), data.size(), kR_m * kR_m};
   }
-  alglib::rbfmodel model;
-  alglib::rbfcreate(3, 3, model);
-  alglib::rbfsetpoints(model, xy);
-  alglib::rbfsetalgomultiquadricmanual(model, kR_m, 0.0);
-  alglib::rbfreport report;
-  alglib::rbfbuildmodel(model, report);
-  if (report.terminationtype <= 0) std::fprintf(stderr, "ALGLIB did not solve the problem\n");
-  return model;
-}
 
-vtkSmartPointer<vtkThinPlateSplineTransform> fitVtk(const FitData& data) {
-  vtkNew<vtkPoints> source;
-  vtkNew<vtkPoints> target;
-  source->SetDataTypeToDouble();
-  target->SetDataTypeToDouble();
-  for (std::size_t i = 0; i < data.size(); ++i) {
-    source->InsertNextPoint(data.p_tracked_m[i].data());
-    target->InsertNextPoint(data.p_true_m[i].data());
+  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_m) const override {
+    Eigen::Vector3d f;
+    evaluate(&p_m, 1, &f);
+    return f - p_m;
   }
-  auto transform = vtkSmartPointer<vtkThinPlateSplineTransform>::New();
-  transform->SetBasisToR();
-  transform->SetSourceLandmarks(source);
-  transform->SetTargetLandmarks(target);
-  transform->Update();
-  return transform;
-}
-
-/// The textbook loop: one structure a centre.
-struct PlainMultiquadric {
-  struct Term {
-    Eigen::Vector3d center_m;
-    Eigen::Vector3d alpha;
-  };
-  std::vector<Term> terms;
-
-  Eigen::Vector3d value(const Eigen::Vector3d& p_m) const {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const Term& term : terms) sum += term.alpha * std::sqrt((p_m - term.center_m).squaredNorm() + kR_m * kR_m);
-    return sum;
+  void correct(std::span<const Eigen::Vector3d> p_m, std::span<Eigen::Vector3d> f) const override {
+    evaluate(p_m.data(), p_m.size(), f.data());
   }
+  nlohmann::json parameters() const override { return {}; }
+
+ private:
+  void evaluate(const Eigen::Vector3d* p_m, std::size_t count, Eigen::Vector3d* f) const {
+    sums_(arrays_, numbers_[3].data(), numbers_[4].data(), numbers_[5].data(), p_m->data(), count, f->data());
+  }
+
+  decltype(MultiquadricKernel::sums) sums_;
+  std::array<AlignedVector<double>, 6> numbers_;
+  MultiquadricArrays arrays_;
 };
 
-PlainMultiquadric plainTerms(const FitData& data) {
-  PlainMultiquadric plain;
-  for (std::size_t i = 0; i < data.size(); ++i) plain.terms.push_back({data.p_tracked_m[i], data.p_true_m[i]});
-  return plain;
+Model fitRoots(const FitData& data) {
+  return std::make_unique<KernelModel>(data, multiquadricKernels().front().sums_by_roots);
+}
+/// What a processor without wide registers runs.
+Model fitBaseline(const FitData& data) {
+  return std::make_unique<KernelModel>(data, multiquadricKernels().back().sums);
 }
 
 /// Fitted once a size: what is measured is evaluation.
-template <class Model>
-const Model& fittedOnce(std::int64_t n, Model (*fit)(const FitData&)) {
-  static std::map<std::int64_t, Model> models;
-  const auto found = models.find(n);
-  return found != models.end() ? found->second : models.emplace(n, fit(grid(n))).first->second;
+template <class Fitted>
+const Fitted& fittedOnce(std::int64_t n, Fitted (*fit)(const FitData&)) {
+  static std::map<std::pair<std::int64_t, Fitted (*)(const FitData&)>, Fitted> models;
+  const auto key = std::pair(n, fit);
+  const auto found = models.find(key);
+  return found != models.end() ? found->second : models.emplace(key, fit(grid(n))).first->second;
 }
 
-void fitOurs(benchmark::State& state) {
+template <class Fitted>
+void fitIt(benchmark::State& state, Fitted (*fit)(const FitData&)) {
   const FitData& data = grid(state.range(0));
-  for (auto _ : state) benchmark::DoNotOptimize(fitFieldtrue(data));
+  for (auto _ : state) benchmark::DoNotOptimize(fit(data));
 }
 
-void fitTheAlglib(benchmark::State& state) {
-  const FitData& data = grid(state.range(0));
-  for (auto _ : state) benchmark::DoNotOptimize(fitAlglib(data));
-}
-
-void fitTheVtk(benchmark::State& state) {
-  const FitData& data = grid(state.range(0));
-  for (auto _ : state) benchmark::DoNotOptimize(fitVtk(data));
-}
-
-void evaluateOurs(benchmark::State& state) {
-  const PositionModel& model = *fittedOnce(state.range(0), fitFieldtrue);
+void onePoint(benchmark::State& state, Model (*fit)(const FitData&)) {
+  const PositionModel& model = *fittedOnce(state.range(0), fit);
   std::size_t i = 0;
   for (auto _ : state) benchmark::DoNotOptimize(model.displacement_m(batchPoints()[i++ % kBatch]));
 }
 
-void evaluateAlglib(benchmark::State& state) {
-  const alglib::rbfmodel& model = fittedOnce(state.range(0), fitAlglib);
-  alglib::rbfcalcbuffer buffer;
-  alglib::rbfcreatecalcbuffer(model, buffer);
-  alglib::real_1d_array x;
-  alglib::real_1d_array y;
-  x.setlength(3);
-  y.setlength(3);
-  std::size_t i = 0;
-  for (auto _ : state) {
-    const Eigen::Vector3d& p_m = batchPoints()[i++ % kBatch];
-    for (int axis = 0; axis < 3; ++axis) x[axis] = p_m[axis];
-    alglib::rbftscalcbuf(model, buffer, x, y);
-    benchmark::DoNotOptimize(y[0]);
-  }
-}
-
-void evaluateVtk(benchmark::State& state) {
-  const vtkSmartPointer<vtkThinPlateSplineTransform>& model = fittedOnce(state.range(0), fitVtk);
-  std::size_t i = 0;
-  for (auto _ : state) {
-    double out_m[3];
-    model->InternalTransformPoint(batchPoints()[i++ % kBatch].data(), out_m);
-    benchmark::DoNotOptimize(out_m[0]);
-  }
-}
-
-void evaluatePlain(benchmark::State& state) {
-  const PlainMultiquadric& model = fittedOnce(state.range(0), plainTerms);
-  std::size_t i = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(model.value(batchPoints()[i++ % kBatch]));
-}
-
-void batchOurs(benchmark::State& state) {
-  const PositionModel& model = *fittedOnce(state.range(0), fitFieldtrue);
+void manyPoints(benchmark::State& state, Model (*fit)(const FitData&)) {
+  const PositionModel& model = *fittedOnce(state.range(0), fit);
   std::vector<Eigen::Vector3d> corrected_m(kBatch);
   for (auto _ : state) {
     model.correct(batchPoints(), corrected_m);
@@ -193,53 +127,90 @@ void batchOurs(benchmark::State& state) {
   }
 }
 
-void batchAlglib(benchmark::State& state) {
-  const alglib::rbfmodel& model = fittedOnce(state.range(0), fitAlglib);
+void rootsAlone(benchmark::State& state) {
+  const auto count = static_cast<std::size_t>(state.range(0) * state.range(0) * state.range(0));
+  AlignedVector<double> squares(count);
+  for (std::size_t j = 0; j < count; ++j) squares[j] = 1e-3 * static_cast<double>(j + 1);
+  std::size_t i = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(sumOfRoots(squares.data(), count, batchPoints()[i++ % kBatch].x()));
+}
+
+/// ALGLIB's arrays, made once.
+struct AlglibEvaluation {
+  explicit AlglibEvaluation(std::int64_t n) : model(fittedOnce(n, fitAlglib)) {
+    alglib::rbfcreatecalcbuffer(model, buffer);
+    x.setlength(3);
+    y.setlength(3);
+  }
+  void at(const Eigen::Vector3d& p_m) {
+    for (int axis = 0; axis < 3; ++axis) x[axis] = p_m[axis];
+    alglib::rbftscalcbuf(model, buffer, x, y);
+    benchmark::DoNotOptimize(y[0]);
+  }
+
+  const alglib::rbfmodel& model;
   alglib::rbfcalcbuffer buffer;
-  alglib::rbfcreatecalcbuffer(model, buffer);
   alglib::real_1d_array x;
   alglib::real_1d_array y;
-  x.setlength(3);
-  y.setlength(3);
-  for (auto _ : state) {
-    for (const Eigen::Vector3d& p_m : batchPoints()) {
-      for (int axis = 0; axis < 3; ++axis) x[axis] = p_m[axis];
-      alglib::rbftscalcbuf(model, buffer, x, y);
-      benchmark::DoNotOptimize(y[0]);
-    }
-  }
+};
+
+void onePointAlglib(benchmark::State& state) {
+  AlglibEvaluation evaluation(state.range(0));
+  std::size_t i = 0;
+  for (auto _ : state) evaluation.at(batchPoints()[i++ % kBatch]);
 }
 
-void batchVtk(benchmark::State& state) {
-  const vtkSmartPointer<vtkThinPlateSplineTransform>& model = fittedOnce(state.range(0), fitVtk);
-  for (auto _ : state) {
-    for (const Eigen::Vector3d& p_m : batchPoints()) {
-      double out_m[3];
-      model->InternalTransformPoint(p_m.data(), out_m);
-      benchmark::DoNotOptimize(out_m[0]);
-    }
-  }
-}
-
-void batchPlain(benchmark::State& state) {
-  const PlainMultiquadric& model = fittedOnce(state.range(0), plainTerms);
+void manyPointsAlglib(benchmark::State& state) {
+  AlglibEvaluation evaluation(state.range(0));
   for (auto _ : state)
-    for (const Eigen::Vector3d& p_m : batchPoints()) benchmark::DoNotOptimize(model.value(p_m));
+    for (const Eigen::Vector3d& p_m : batchPoints()) evaluation.at(p_m);
+}
+
+void onePointVtk(benchmark::State& state) {
+  const vtkSmartPointer<vtkThinPlateSplineTransform>& model = fittedOnce(state.range(0), fitVtk);
+  std::size_t i = 0;
+  double out_m[3];
+  for (auto _ : state) {
+    model->InternalTransformPoint(batchPoints()[i++ % kBatch].data(), out_m);
+    benchmark::DoNotOptimize(out_m[0]);
+  }
+}
+
+void onePointPlain(benchmark::State& state) {
+  const PlainMultiquadric& model = fittedOnce(state.range(0), plainTerms);
+  std::size_t i = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(model.value(batchPoints()[i++ % kBatch]));
 }
 
 // The argument is places along an axis: 8 -> 512, 13 -> 2197. VTK's fit takes minutes beyond 512.
-BENCHMARK(fitOurs)->Name("fit/fieldtrue")->Arg(8)->Arg(13)->Unit(benchmark::kMillisecond);
-BENCHMARK(fitTheAlglib)->Name("fit/alglib")->Arg(8)->Unit(benchmark::kMillisecond);
-BENCHMARK(fitTheAlglib)->Name("fit/alglib")->Arg(13)->Unit(benchmark::kMillisecond)->Iterations(1);
-BENCHMARK(fitTheVtk)->Name("fit/vtk")->Arg(8)->Unit(benchmark::kMillisecond)->Iterations(1);
-BENCHMARK(evaluateOurs)->Name("one point/fieldtrue")->Arg(8)->Arg(13);
-BENCHMARK(evaluateAlglib)->Name("one point/alglib")->Arg(8)->Arg(13);
-BENCHMARK(evaluateVtk)->Name("one point/vtk")->Arg(8);
-BENCHMARK(evaluatePlain)->Name("one point/plain loop")->Arg(8)->Arg(13);
-BENCHMARK(batchOurs)->Name("100,000 points/fieldtrue")->Arg(8)->Arg(13)->Unit(benchmark::kMillisecond);
-BENCHMARK(batchAlglib)->Name("100,000 points/alglib")->Arg(8)->Arg(13)->Unit(benchmark::kMillisecond);
-BENCHMARK(batchVtk)->Name("100,000 points/vtk")->Arg(8)->Unit(benchmark::kMillisecond);
-BENCHMARK(batchPlain)->Name("100,000 points/plain loop")->Arg(8)->Arg(13)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(fitIt, ours, fitDouble)->Name("fit/fieldtrue")->Arg(8)->Arg(13)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(fitIt, alglib, fitAlglib)->Name("fit/alglib")->Arg(8)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(fitIt, alglib, fitAlglib)->Name("fit/alglib")->Arg(13)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK_CAPTURE(fitIt, vtk, fitVtk)->Name("fit/vtk")->Arg(8)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK(rootsAlone)->Name("one point/square roots alone")->Arg(8)->Arg(13);
+BENCHMARK_CAPTURE(onePoint, ours, fitDouble)->Name("one point/fieldtrue")->Arg(8)->Arg(13);
+BENCHMARK_CAPTURE(onePoint, roots, fitRoots)->Name("one point/all roots exact")->Arg(8)->Arg(13);
+BENCHMARK_CAPTURE(onePoint, single, fitSingle)->Name("one point/single")->Arg(8)->Arg(13);
+BENCHMARK_CAPTURE(onePoint, baseline, fitBaseline)->Name("one point/baseline x86-64")->Arg(8)->Arg(13);
+BENCHMARK_CAPTURE(onePoint, lattice, fitLattice)->Name("one point/lattice")->Arg(8);
+BENCHMARK(onePointAlglib)->Name("one point/alglib")->Arg(8)->Arg(13);
+BENCHMARK(onePointVtk)->Name("one point/vtk")->Arg(8);
+BENCHMARK(onePointPlain)->Name("one point/plain loop")->Arg(8)->Arg(13);
+BENCHMARK_CAPTURE(manyPoints, ours, fitDouble)
+    ->Name("100,000 points/fieldtrue")
+    ->Arg(8)
+    ->Arg(13)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(manyPoints, single, fitSingle)
+    ->Name("100,000 points/single")
+    ->Arg(8)
+    ->Arg(13)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(manyPoints, lattice, fitLattice)
+    ->Name("100,000 points/lattice")
+    ->Arg(8)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(manyPointsAlglib)->Name("100,000 points/alglib")->Arg(8)->Unit(benchmark::kMillisecond);
 
 /// Prints as the console does and remembers the time of one iteration of each benchmark [s]; of repetitions the
 /// shortest.
@@ -255,31 +226,45 @@ class RememberingReporter : public benchmark::ConsoleReporter {
       const std::size_t first = name.find('/');
       const std::size_t second = name.find('/', first + 1);
       const std::size_t third = std::min(name.find('/', second + 1), name.size());
-      const Key key{name.substr(0, first), std::stoi(name.substr(second + 1, third - second - 1))};
-      const double time_s = run.cpu_accumulated_time / static_cast<double>(run.iterations);
-      double& shortest_s = times_s_[key].try_emplace(name.substr(first + 1, second - first - 1), time_s).first->second;
-      shortest_s = std::min(shortest_s, time_s);
+      add(name.substr(0, first), name.substr(first + 1, second - first - 1),
+          std::stoi(name.substr(second + 1, third - second - 1)),
+          run.cpu_accumulated_time / static_cast<double>(run.iterations));
     }
     ConsoleReporter::ReportRuns(runs);
   }
 
+  void add(const std::string& task, const std::string& who, int n, double time_s) {
+    double& shortest_s = times_s_[{task, n}].try_emplace(who, time_s).first->second;
+    shortest_s = std::min(shortest_s, time_s);
+  }
+
+  bool hasOurFit(int n) const { return times_s_.contains({"fit", n}) && times_s_.at({"fit", n}).contains("fieldtrue"); }
+
   void printRatios() const {
-    std::printf("\nHow many times as long the peers take (CPU time, one thread)\n");
+    std::printf("\nTime of the others over ours (CPU time, one thread, shortest of the repetitions)\n");
     for (const auto& [key, times_s] : times_s_) {
       const auto ours = times_s.find("fieldtrue");
       if (ours == times_s.end()) continue;
-      const int n_places = key.second * key.second * key.second;
-      std::printf("%-16s n=%-5d fieldtrue %.3g us", key.first.c_str(), n_places, 1e6 * ours->second);
+      std::printf("%-16s n=%-5d fieldtrue %.4g us\n", key.first.c_str(), key.second * key.second * key.second,
+                  1e6 * ours->second);
       for (const auto& [who, time_s] : times_s)
-        if (who != "fieldtrue") std::printf("   %s %.1fx", who.c_str(), time_s / ours->second);
-      std::printf("\n");
+        if (who != "fieldtrue")
+          std::printf("    %-20s %10.4g us  %8.2fx\n", who.c_str(), 1e6 * time_s, time_s / ours->second);
     }
   }
 
  private:
-  using Key = std::pair<std::string, int>;
-  std::map<Key, std::map<std::string, double>> times_s_;
+  std::map<std::pair<std::string, int>, std::map<std::string, double>> times_s_;
 };
+
+void addScipy(RememberingReporter& reporter) {
+  for (const int n : {8, 13}) {
+    if (!reporter.hasOurFit(n)) continue;
+    const auto scipy = runScipy(grid(n), batchPoints());
+    if (!scipy) return;
+    for (const auto& [task, time_s] : scipy->times_s) reporter.add(task, "scipy " + scipy->version, n, time_s);
+  }
+}
 
 }  // namespace
 
@@ -288,6 +273,7 @@ int main(int argc, char** argv) {
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   RememberingReporter reporter;
   benchmark::RunSpecifiedBenchmarks(&reporter);
+  addScipy(reporter);
   reporter.printRatios();
   return 0;
 }
