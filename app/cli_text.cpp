@@ -26,18 +26,19 @@ struct ScoreTable {
   const ErrorStats& before;
   const std::vector<MethodScore>& scores;
   std::optional<std::size_t> best_row;
+  std::string (*name)(const MethodScore& score);
 };
 
 /// The method as one would ask for it, with the settings that are not at their defaults.
-std::string methodName(const MethodScore& score) {
-  const auto position = findPositionMethod(score.method);
-  const auto orientation = findOrientationMethod(score.method);
-  std::string settings = position      ? givenSettingsText(score.settings, (*position)->settings)
-                         : orientation ? givenSettingsText(score.settings, (*orientation)->settings)
-                                       : settingsText(score.settings);
+template <class Method>
+std::string methodName(const MethodScore& score, const Result<const Method*>& method) {
+  std::string settings = method ? givenSettingsText(score.settings, (*method)->settings) : settingsText(score.settings);
   settings.erase(std::remove(settings.begin(), settings.end(), ' '), settings.end());
   return score.method + (settings.empty() ? "" : ":" + settings);
 }
+
+std::string positionName(const MethodScore& score) { return methodName(score, findPositionMethod(score.method)); }
+std::string orientationName(const MethodScore& score) { return methodName(score, findOrientationMethod(score.method)); }
 
 Row statsRow(const std::string& name, const ErrorStats& stats) {
   return {name,
@@ -48,9 +49,9 @@ Row statsRow(const std::string& name, const ErrorStats& stats) {
           errorFigure(stats.max)};
 }
 
-Row scoreRow(const MethodScore& score, bool is_best) {
-  if (score.skipped) return {methodName(score) + "  not used: " + *score.skipped};
-  Row row = statsRow(methodName(score), score.stats);
+Row scoreRow(const std::string& name, const MethodScore& score, bool is_best) {
+  if (score.skipped) return {name + "  not used: " + *score.skipped};
+  Row row = statsRow(name, score.stats);
   row.push_back(toBestText(score, is_best));
   row.push_back(std::to_string(score.n_uncovered));
   row.push_back(durationText(score.fit_s));
@@ -63,7 +64,8 @@ std::string scoreTable(const ScoreTable& table) {
                          "uncovered", "fit", "evaluation"}};
   rows.push_back(statsRow("before", table.before));
   rows.back().resize(rows.front().size());
-  for (std::size_t i = 0; i < table.scores.size(); ++i) rows.push_back(scoreRow(table.scores[i], table.best_row == i));
+  for (std::size_t i = 0; i < table.scores.size(); ++i)
+    rows.push_back(scoreRow(table.name(table.scores[i]), table.scores[i], table.best_row == i));
   return alignedColumns(rows);
 }
 
@@ -148,10 +150,10 @@ std::string comparisonText(const Comparison& comparison, const std::vector<Learn
   std::string text = std::to_string(comparison.places.size()) + " places scored by " + toText(comparison.validation) +
                      ", align " + toText(comparison.align) + ". Noise floor " + floorText(comparison);
   text += ".\n\n" + scoreTable({"position (mm)", comparison.before_position_mm, comparison.position,
-                                comparison.best_position_row});
+                                comparison.best_position_row, positionName});
   if (comparison.before_orientation_deg)
     text += "\n" + scoreTable({"orientation (deg)", *comparison.before_orientation_deg, comparison.orientation,
-                               comparison.best_orientation_row});
+                               comparison.best_orientation_row, orientationName});
   text += learningText(curves);
   std::string notes;
   appendNotes(notes, "", comparison.notes);
