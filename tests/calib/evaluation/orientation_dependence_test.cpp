@@ -186,16 +186,16 @@ class OrientationDependenceTest : public QObject {
     FT_VERIFY_MATCH(holdsAll(seen.error().message, {"1 of 90 rows"}));
   }
 
-  void realLandmarksAreTooFew() {
+  void realLandmarksHaveNoOrientation() {
     FT_REQUIRE_REAL_DATA();
     const Importer& importer = *findImporter("plus").value();
-    const auto read = importer.read(*realData("pluslib_fcal/nodes.csv"), std::nullopt,
+    const auto read = importer.read(*realData("pluslib_fcal/samples.csv"), std::nullopt,
                                     resolveSettings("plus", importer.settings, {}).value());
-    if (!read || !read->table) QSKIP("this importer does not read the landmarks' table");
-    const auto seen = orientationDependence(*read->table);
-    if (!seen) QSKIP(seen.error().message.c_str());
-    QCOMPARE(seen->answer, Answer::kCannotTell);
-    FT_VERIFY_MATCH(holdsAll(seen->text, {"at least 3 orientations at 20 places"}));
+    FT_VERIFY_OK(read);
+    const auto seen = orientationDependence(read->table.value());
+    // A pivoting stylus has a place and no orientation.
+    QVERIFY(!seen && seen.error().code == ErrorCode::kUnsupported);
+    FT_VERIFY_MATCH(holdsAll(seen.error().message, {"8 of 8 rows have none"}));
   }
 };
 
