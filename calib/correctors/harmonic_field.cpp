@@ -1,8 +1,6 @@
 #include "calib/correctors/harmonic_field.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "calib/correctors/fit_checks.h"
 #include "calib/correctors/harmonic_field_fit.h"
@@ -12,7 +10,6 @@ namespace fieldtrue {
 namespace {
 
 constexpr const char* kName = "The harmonic field";
-constexpr int kProbes = 7;  ///< Along each axis, for the uncertainty.
 
 /// The box of tracked positions in which the model is evaluated: beyond it the sources are near and nothing is known.
 struct TrackedBox {
@@ -26,28 +23,17 @@ struct TrackedBox {
     if (inside_m.norm() >= least_m) return inside_m;
     return inside_m.isZero() ? Eigen::Vector3d(least_m, 0.0, 0.0) : Eigen::Vector3d(least_m * inside_m.normalized());
   }
-
-  std::vector<Eigen::Vector3d> probes_m() const {
-    std::vector<Eigen::Vector3d> probes_m;
-    for (int i = 0; i < kProbes; ++i)
-      for (int j = 0; j < kProbes; ++j)
-        for (int k = 0; k < kProbes; ++k) {
-          const Eigen::Vector3d share = Eigen::Vector3d(i, j, k) / (kProbes - 1);
-          probes_m.push_back(nearest_m(low_m + share.cwiseProduct(high_m - low_m)));
-        }
-    return probes_m;
-  }
 };
 
 class HarmonicField : public PositionModel {
  public:
-  HarmonicField(DisturbedField field, const Pose& field_from_truth, const TrackedBox& box, std::vector<double> sd_m,
+  HarmonicField(DisturbedField field, const Pose& field_from_truth, const TrackedBox& box, FieldPosterior posterior,
                 std::string note)
       : field_(std::move(field)),
         field_from_truth_(field_from_truth),
         truth_from_field_(inverse(field_from_truth)),
         box_(box),
-        sd_m_(std::move(sd_m)),
+        posterior_(std::move(posterior)),
         note_(std::move(note)) {}
 
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
@@ -56,27 +42,9 @@ class HarmonicField : public PositionModel {
     return truth_from_field_ * in_field_m - p_tracked_m;
   }
 
-  /// Between the probes by trilinear interpolation; outside the box that of its nearest point.
+  /// Outside the box that of its nearest point.
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
-    const Eigen::Vector3d share =
-        (box_.nearest_m(p_tracked_m) - box_.low_m).cwiseQuotient((box_.high_m - box_.low_m).cwiseMax(1e-12));
-    std::array<std::size_t, 3> cell{};
-    Eigen::Vector3d part;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double place = std::clamp(share[axis], 0.0, 1.0) * (kProbes - 1);
-      const double start = std::min(std::floor(place), kProbes - 2.0);
-      cell[static_cast<std::size_t>(axis)] = static_cast<std::size_t>(start);
-      part[axis] = place - start;
-    }
-    double sd_m = 0.0;
-    for (std::size_t corner = 0; corner < 8; ++corner) {
-      const std::array<std::size_t, 3> up{corner >> 2U & 1U, corner >> 1U & 1U, corner & 1U};
-      double weight = 1.0;
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        weight *= up[axis] == 1 ? part[static_cast<Eigen::Index>(axis)] : 1.0 - part[static_cast<Eigen::Index>(axis)];
-      sd_m += weight * sd_m_[((cell[0] + up[0]) * kProbes + cell[1] + up[1]) * kProbes + cell[2] + up[2]];
-    }
-    return sd_m;
+    return posterior_.sd_m(PlaceDerivative::of(field_, box_.nearest_m(p_tracked_m)));
   }
 
   std::string note() const override { return note_; }
@@ -88,11 +56,16 @@ class HarmonicField : public PositionModel {
       sources.row(k).head<3>() = source.at_m.transpose();
       sources.row(k).tail<9>() = Eigen::Map<const Eigen::RowVector<double, 9>>(source.response.data());
     }
+    nlohmann::json root = nlohmann::json::array();
+    for (Eigen::Index row = 0; row < posterior_.root.rows(); ++row)
+      for (Eigen::Index column = row; column < posterior_.root.cols(); ++column)
+        root.push_back(posterior_.root(row, column));
     return {{"sources", jsonOf(sources)},
             {"field_from_truth", jsonOf(field_from_truth_)},
+            {"turned_about_m", jsonOf(posterior_.about_m)},
+            {"covariance_root", std::move(root)},
             {"low_m", jsonOf(box_.low_m)},
             {"high_m", jsonOf(box_.high_m)},
-            {"sd_m", sd_m_},
             {"note", note_}};
   }
 
@@ -101,7 +74,7 @@ class HarmonicField : public PositionModel {
   Pose field_from_truth_;
   Pose truth_from_field_;
   TrackedBox box_;
-  std::vector<double> sd_m_;
+  FieldPosterior posterior_;
   std::string note_;
 };
 
@@ -133,9 +106,25 @@ Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Se
   box.high_m.array() += margin_m;
   const HarmonicOptions options{numberSetting(settings, "least_gain"),
                                 static_cast<std::size_t>(integerSetting(settings, "most_sources"))};
-  auto fit = fitHarmonicField(data, options, box.probes_m(), control);
+  auto fit = fitHarmonicField(data, options, control);
   if (!fit) return tl::unexpected(fit.error());
-  return std::make_unique<HarmonicField>(fit->field, fit->field_from_truth, box, fit->sd_m, noteOf(data, *fit));
+  return std::make_unique<HarmonicField>(fit->field, fit->field_from_truth, box, fit->posterior, noteOf(data, *fit));
+}
+
+FieldPosterior posteriorFrom(const nlohmann::json& parameters, const std::vector<FieldSource>& sources) {
+  FieldPosterior posterior;
+  for (const FieldSource& source : sources) posterior.source_at_m.push_back(source.at_m);
+  posterior.about_m = vectorFrom(parameters.at("turned_about_m"));
+  const auto packed = parameters.at("covariance_root").get<std::vector<double>>();
+  const auto n = kPerSource * static_cast<Eigen::Index>(sources.size()) + 6;
+  if (packed.size() != static_cast<std::size_t>(n * (n + 1) / 2))
+    throwMalformed("covariance_root needs " + std::to_string(n * (n + 1) / 2) + " numbers, got " +
+                   std::to_string(packed.size()));
+  posterior.root = Eigen::MatrixXd::Zero(n, n);
+  auto next = packed.begin();
+  for (Eigen::Index row = 0; row < n; ++row)
+    for (Eigen::Index column = row; column < n; ++column) posterior.root(row, column) = *next++;
+  return posterior;
 }
 
 Result<std::unique_ptr<PositionModel>> loadHarmonic(const nlohmann::json& parameters) {
@@ -149,12 +138,9 @@ Result<std::unique_ptr<PositionModel>> loadHarmonic(const nlohmann::json& parame
                                               Eigen::Map<const Eigen::Matrix3d>(response.data())};
     }
     const TrackedBox box{vectorFrom(parameters.at("low_m")), vectorFrom(parameters.at("high_m"))};
-    auto sd_m = parameters.at("sd_m").get<std::vector<double>>();
-    if (sd_m.size() != static_cast<std::size_t>(kProbes) * kProbes * kProbes)
-      throwMalformed("sd_m needs " + std::to_string(kProbes * kProbes * kProbes) + " numbers, got " +
-                     std::to_string(sd_m.size()));
+    FieldPosterior posterior = posteriorFrom(parameters, sources);
     return std::make_unique<HarmonicField>(DisturbedField(std::move(sources)),
-                                           poseFrom(parameters.at("field_from_truth")), box, std::move(sd_m),
+                                           poseFrom(parameters.at("field_from_truth")), box, std::move(posterior),
                                            parameters.at("note").get<std::string>());
   });
 }
@@ -168,7 +154,7 @@ PositionMethod harmonicFieldPosition() {
                            .unit = "nats",
                            .min = 0.5,
                            .max = 50.0,
-                           .default_value = 4.0,
+                           .default_value = 6.0,
                            .choices = {},
                            .help =
                                "A further source of disturbance is believed in when it raises the logarithm of the "

@@ -24,7 +24,7 @@ struct GroupedSystem {
 
 /// What decides how many groups enter.
 struct SelectionOptions {
-  double least_gain = 4.0;  ///< Log evidence a further group must add [nats].
+  double least_gain = 6.0;  ///< Log evidence a further group must add [nats].
   std::size_t most_groups = 40;
   double noise_factor = 1.0;   ///< Variance of the noise in units of the one stated.
   bool noise_unknown = false;  ///< Found anew after every group, starting from y itself.

@@ -34,6 +34,8 @@ void addSurface(const Box& box, double distance_m, double pitch_m, std::vector<S
 
 }  // namespace
 
+bool isAllowedSite(const Site& site, const Box& box) { return site.at_m.isZero() || isAllowed(site.at_m, box); }
+
 double Box::distance_m(const Eigen::Vector3d& p_m) const {
   return (low_m - p_m).cwiseMax(p_m - high_m).cwiseMax(0.0).norm();
 }

@@ -20,6 +20,9 @@ struct Site {
   double reach_m = 0.0;  ///< Half the way to its neighbours; 0: not to be refined.
 };
 
+/// Whether a source may stand there: not among the places nor close to the transmitter, but at it is allowed.
+bool isAllowedSite(const Site& site, const Box& box);
+
 /// Places on the surfaces of three boxes around the measured one, 0.16, 0.4 and 1 of its extent away, each with a pitch
 /// of about one and a half such distances; and the transmitter itself, for what is wrong with its coils. A field that
 /// is harmonic inside can be made by sources on any one such surface; three tell near metal from far.

@@ -1,0 +1,111 @@
+#include "calib/correctors/harmonic_field_linear.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+
+#include "calib/core/error.h"
+#include "calib/field/coupling.h"
+
+namespace fieldtrue {
+namespace {
+
+const std::array<Eigen::Matrix3d, kPerSource>& symmetricTensors() {
+  static const std::array<Eigen::Matrix3d, kPerSource> kTensors = [] {
+    std::array<Eigen::Matrix3d, kPerSource> tensors;
+    std::size_t next = 0;
+    for (int a = 0; a < 3; ++a) {
+      for (int b = a; b < 3; ++b) {
+        Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();
+        tensor(a, b) = tensor(b, a) = a == b ? 1.0 : std::sqrt(0.5);
+        tensors[next++] = tensor;
+      }
+    }
+    return tensors;
+  }();
+  return kTensors;
+}
+
+/// What excites a source: the transmitter's field there; at the transmitter, its coils themselves.
+Eigen::Matrix3d excitationAt(const Eigen::Vector3d& at_m) {
+  return at_m.isZero() ? Eigen::Matrix3d::Identity() : dipoleField(at_m, 1.0);
+}
+
+Eigen::MatrixXd allEffects(const PlaceDerivative& place, std::span<const Eigen::Vector3d> source_at_m,
+                           const Eigen::Vector3d& about_m) {
+  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(source_at_m.size());
+  Eigen::MatrixXd effects(3, n_amplitudes + 6);
+  for (std::size_t k = 0; k < source_at_m.size(); ++k)
+    effects.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)) = effectOfSource(place, source_at_m[k]);
+  effects.rightCols<6>() = effectOfMotion(place.at_m, about_m);
+  return effects;
+}
+
+}  // namespace
+
+FieldSource sourceOf(const Eigen::Vector3d& at_m, const TensorAmplitudes& amplitudes) {
+  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();
+  for (Eigen::Index e = 0; e < kPerSource; ++e)
+    tensor += amplitudes[e] * symmetricTensors()[static_cast<std::size_t>(e)];
+  return {at_m, tensor * excitationAt(at_m)};
+}
+
+PlaceDerivative PlaceDerivative::of(const DisturbedField& field, const Eigen::Vector3d& p_tracked_m) {
+  PlaceDerivative place;
+  place.at_m = field.truePosition_m(p_tracked_m);
+  place.by_field =
+      -field.trackedJacobian(place.at_m).inverse() * solvedPositionDerivative(field.at(place.at_m), place.at_m);
+  return place;
+}
+
+Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place, const Eigen::Vector3d& source_at_m) {
+  const Eigen::Matrix3d from_source = dipoleField(place.at_m - source_at_m, 1.0);
+  const Eigen::Matrix3d excitation = excitationAt(source_at_m);
+  Eigen::Matrix<double, 3, kPerSource> effect;
+  for (Eigen::Index e = 0; e < kPerSource; ++e) {
+    const Eigen::Matrix3d field = from_source * symmetricTensors()[static_cast<std::size_t>(e)] * excitation;
+    effect.col(e) = place.by_field * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(field.data());
+  }
+  return effect;
+}
+
+Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eigen::Vector3d& about_m) {
+  const Eigen::Vector3d d = p_m - about_m;
+  Eigen::Matrix3d cross;
+  cross << 0.0, -d.z(), d.y(), d.z(), 0.0, -d.x(), -d.y(), d.x(), 0.0;
+  Eigen::Matrix<double, 3, 6> effect;
+  effect << -Eigen::Matrix3d::Identity(), cross;
+  return effect;
+}
+
+double FieldPosterior::sd_m(const PlaceDerivative& place) const {
+  const Eigen::MatrixXd effects = allEffects(place, source_at_m, about_m);
+  return (effects * root.triangularView<Eigen::Upper>()).norm();
+}
+
+FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<Eigen::Vector3d>& source_at_m,
+                           const std::vector<double>& prior_variance, const Eigen::Vector3d& about_m,
+                           double noise_factor) {
+  FT_CHECK(source_at_m.size() == prior_variance.size());
+  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(source_at_m.size());
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(n_amplitudes + 6, n_amplitudes + 6);
+  for (const PlaceRow& row : rows) {
+    const Eigen::MatrixXd effects = row.whitening * allEffects(row.derivative, source_at_m, about_m);
+    precision.noalias() += effects.transpose() * effects / noise_factor;
+  }
+  for (std::size_t k = 0; k < prior_variance.size(); ++k)
+    precision.diagonal().segment<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)).array() +=
+        1.0 / prior_variance[k];
+  // The unknowns differ by many orders of magnitude: a unit diagonal first, and no direction without any precision.
+  const Eigen::VectorXd scale = precision.diagonal().cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd scaled = scale.asDiagonal() * precision * scale.asDiagonal();
+  scaled.diagonal().array() += 1e-12;
+  const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
+  FieldPosterior posterior{source_at_m, about_m, Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())};
+  llt.matrixU().solveInPlace(posterior.root);
+  posterior.root = scale.asDiagonal() * posterior.root;
+  return posterior;
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,278 @@
+#include "calib/correctors/harmonic_field.h"
+
+#include <QTest>
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "calib/core/geometry.h"
+#include "calib/correctors/harmonic_field_evidence.h"
+#include "calib/correctors/harmonic_field_linear.h"
+#include "calib/effects/compact_metal.h"
+#include "calib/field/pose_solver.h"
+#include "tests/calib/correctors/fit_fixtures.h"
+#include "tests/support/matchers.h"
+#include "tests/support/random_geometry.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+/// A sphere beside the grid of `roomGrid`, 0.45 m from its nearest places.
+std::unique_ptr<CouplingDistortion> cabinet() {
+  return makeCompactMetal({2.0, 0.9, 0.1}, spherePolarizability_m3(0.2, false, 1.0) * Eigen::Matrix3d::Identity(), 0.2);
+}
+
+Eigen::Vector3d tracked_m(const CouplingDistortion& metal, const Eigen::Vector3d& p_true_m) {
+  const Eigen::Matrix3d field = dipoleField(p_true_m, 1.0) + metal.fieldChange(p_true_m, 1.0, 0.0);
+  return solvePose(field, 1.0, p_true_m).value().tracker_from_sensor.position_m;
+}
+
+/// 6x6x5 true places 0.2 m apart beside the transmitter.
+std::vector<Eigen::Vector3d> roomGrid() {
+  std::vector<Eigen::Vector3d> places_m;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      for (int k = 0; k < 5; ++k) places_m.emplace_back(0.8 + 0.2 * i, -0.5 + 0.2 * j, -0.4 + 0.2 * k);
+  return places_m;
+}
+
+/// Truth off by the jig, readings exact.
+FitData roomData(const CouplingDistortion* metal, double jig_sd_m, unsigned seed) {
+  RandomGeometry random(seed);
+  FitData data;
+  for (const Eigen::Vector3d& p_m : roomGrid()) {
+    data.p_tracked_m.push_back(metal == nullptr ? p_m : tracked_m(*metal, p_m));
+    data.p_true_m.push_back(p_m + jig_sd_m * Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
+    data.node.push_back(static_cast<int>(data.node.size()));
+  }
+  data.jig_sd_m = jig_sd_m;
+  return data;
+}
+
+/// True places between those of the grid.
+std::vector<Eigen::Vector3d> placesBetween(unsigned seed) {
+  RandomGeometry random(seed);
+  std::vector<Eigen::Vector3d> places_m(200);
+  for (Eigen::Vector3d& p_m : places_m)
+    p_m = {random.between(0.8, 1.8), random.between(-0.5, 0.5), random.between(-0.4, 0.4)};
+  return places_m;
+}
+
+double rms_m(const PositionModel& model, const CouplingDistortion& metal,
+             const std::vector<Eigen::Vector3d>& places_m) {
+  double sum_m2 = 0.0;
+  for (const Eigen::Vector3d& p_true_m : places_m) {
+    const Eigen::Vector3d p_m = tracked_m(metal, p_true_m);
+    sum_m2 += (p_m + model.displacement_m(p_m) - p_true_m).squaredNorm();
+  }
+  return std::sqrt(sum_m2 / static_cast<double>(places_m.size()));
+}
+
+std::size_t sourcesOf(const PositionModel& model) { return model.parameters().at("sources").size(); }
+
+/// One group whose columns are orthogonal with the squared length s; another that explains nothing.
+GroupedSystem twoGroups(double s, double q) {
+  GroupedSystem system;
+  system.gram = s * Eigen::MatrixXd::Identity(2 * kPerSource, 2 * kPerSource);
+  system.right = Eigen::VectorXd::Zero(2 * kPerSource);
+  system.right[kPerSource + 2] = q;
+  system.y_squared = q * q / s + 500.0;
+  system.n_rows = 500.0;
+  return system;
+}
+
+}  // namespace
+
+class HarmonicFieldTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void solvesAsTheTrackerDoes();
+  void differentiatesTheSolution();
+  void invertsTheTracker();
+  void followsTheFieldWithASource();
+  void addsAGroupByItsEvidence();
+  void removesWhatMetalDoes();
+  void isFarBetterThanASmoothFit();
+  void seesNoMetalInNoise();
+  void knowsItsUncertainty();
+  void doesNoHarmToAnotherTracker();
+  void isRigidWithoutSources();
+  void stops();
+};
+
+void HarmonicFieldTest::solvesAsTheTrackerDoes() {
+  RandomGeometry random(1);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d p_m = random.between(0.3, 3.0) * random.direction();
+    const Eigen::Matrix3d field = dipoleField(p_m, 1.0) + 0.1 / std::pow(p_m.norm(), 3) * random.matrix();
+    const Eigen::Vector3d expected_m = solvePose(field, 1.0, p_m).value().tracker_from_sensor.position_m;
+    FT_VERIFY_MATCH(near(solvedPosition_m(field, p_m), expected_m, 1e-11));
+    FT_VERIFY_MATCH(near(solvedPosition_m(field, -p_m), Eigen::Vector3d(-expected_m), 1e-11));
+  }
+}
+
+void HarmonicFieldTest::differentiatesTheSolution() {
+  RandomGeometry random(2);
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector3d p_m = random.between(0.5, 2.0) * random.direction();
+    const Eigen::Matrix3d field = dipoleField(p_m, 1.0) + 0.1 / std::pow(p_m.norm(), 3) * random.matrix();
+    const PositionDerivative derivative = solvedPositionDerivative(field, p_m);
+    const double step = 1e-6 * field.norm();
+    for (Eigen::Index element = 0; element < 9; ++element) {
+      Eigen::Matrix3d change = Eigen::Matrix3d::Zero();
+      change(element % 3, element / 3) = step;
+      const Eigen::Vector3d expected =
+          (solvedPosition_m(field + change, p_m) - solvedPosition_m(field - change, p_m)) / (2.0 * step);
+      FT_VERIFY_MATCH(near(Eigen::Vector3d(derivative.col(element)), expected, 1e-6 * derivative.norm()));
+    }
+  }
+}
+
+void HarmonicFieldTest::invertsTheTracker() {
+  RandomGeometry random(3);
+  const DisturbedField field({{{2.0, 0.9, 0.1}, 0.002 * random.matrix()}, {{0.5, -1.2, 0.3}, 0.002 * random.matrix()}});
+  for (const Eigen::Vector3d& p_m : placesBetween(4))
+    FT_VERIFY_MATCH(near(field.truePosition_m(field.trackedPosition_m(p_m)), p_m, 1e-9));
+}
+
+// Corrected positions against amplitudes, by differences of the whole chain.
+void HarmonicFieldTest::followsTheFieldWithASource() {
+  RandomGeometry random(5);
+  const Eigen::Vector3d at_m(1.4, 1.1, -0.2);
+  TensorAmplitudes amplitudes;
+  for (Eigen::Index e = 0; e < kPerSource; ++e) amplitudes[e] = 0.01 * random.normal();
+  for (const Eigen::Vector3d& p_m : {Eigen::Vector3d(1.5, 0.3, 0.1), Eigen::Vector3d(0.9, -0.4, 0.3)}) {
+    const auto corrected_m = [&](Eigen::Index e, double change) {
+      TensorAmplitudes changed = amplitudes;
+      changed[e] += change;
+      return DisturbedField({sourceOf(at_m, changed)}).truePosition_m(p_m);
+    };
+    const auto effects = effectOfSource(PlaceDerivative::of(DisturbedField({sourceOf(at_m, amplitudes)}), p_m), at_m);
+    constexpr double kStep = 1e-5;
+    for (Eigen::Index e = 0; e < kPerSource; ++e) {
+      const Eigen::Vector3d expected = (corrected_m(e, kStep) - corrected_m(e, -kStep)) / (2.0 * kStep);
+      FT_VERIFY_MATCH(near(Eigen::Vector3d(effects.col(e)), expected, 1e-5 * effects.norm()));
+    }
+  }
+}
+
+// With six orthogonal columns of squared length s and the pull q on one of them the log evidence at prior variance v is
+// -3 log(1 + v s) + v q^2 / (2 (1 + v s)), greatest where 1 + v s = q^2 / (6 s), where it is
+// (q^2/s - 6)/2 - 3 log(q^2 / (6 s)): for s = 10 and q^2 = 300 that is 12 - 3 log 5 = 7.1717.
+void HarmonicFieldTest::addsAGroupByItsEvidence() {
+  const GroupedSystem system = twoGroups(10.0, std::sqrt(300.0));
+  SelectionOptions options;
+  options.least_gain = 7.05;  // The variance is looked for in quarter decades, which costs up to a tenth.
+  const Selection chosen = selectGroups(system, options, {});
+  QCOMPARE(chosen.groups.size(), std::size_t{1});
+  QCOMPARE(chosen.groups.front(), Eigen::Index{1});
+  // MacKay's fixed point is the greatest evidence: v = (5 - 1)/10, shrinking q/s by v s / (1 + v s) = 0.8.
+  FT_VERIFY_MATCH(near(chosen.prior_variance[0], 0.4, 0.01));
+  FT_VERIFY_MATCH(near(chosen.amplitudes[2], 0.8 * std::sqrt(300.0) / 10.0, 0.01));
+  options.least_gain = 7.18;
+  QVERIFY(selectGroups(system, options, {}).groups.empty());
+}
+
+// Without noise the sphere's field, off the candidates, is matched until little is left of it.
+void HarmonicFieldTest::removesWhatMetalDoes() {
+  const auto metal = cabinet();
+  const auto model = fitPosition("harmonic_field", roomData(metal.get(), 0.0, 1));
+  FT_VERIFY_OK(model);
+  const auto nothing = fitPosition("none", roomData(metal.get(), 0.0, 1));
+  const double before_m = rms_m(**nothing, *metal, placesBetween(6));
+  QVERIFY2(before_m > 0.005, "the metal must matter");
+  const double after_m = rms_m(**model, *metal, placesBetween(6));
+  QVERIFY2(after_m < 0.02 * before_m, qPrintable(QString("%1 of %2 m left").arg(after_m).arg(before_m)));
+}
+
+void HarmonicFieldTest::isFarBetterThanASmoothFit() {
+  const auto metal = cabinet();
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    const FitData data = roomData(metal.get(), 0.005, seed);
+    const auto model = fitPosition("harmonic_field", data);
+    FT_VERIFY_OK(model);
+    const double ours_m = rms_m(**model, *metal, placesBetween(7));
+    for (const char* degree : {"2", "3", "4"}) {
+      const auto polynomial = fitPosition("polynomial", data, {{"degree", degree}});
+      FT_VERIFY_OK(polynomial);
+      QVERIFY(ours_m < 0.7 * rms_m(**polynomial, *metal, placesBetween(7)));
+    }
+  }
+}
+
+// A source must add 6 nats: by the likelihood ratio that is rare among some hundred candidates, not impossible.
+void HarmonicFieldTest::seesNoMetalInNoise() {
+  int n_seen = 0;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const auto model = fitPosition("harmonic_field", roomData(nullptr, 0.005, seed));
+    FT_VERIFY_OK(model);
+    n_seen += sourcesOf(**model) > 0 ? 1 : 0;
+    if (sourcesOf(**model) == 0) FT_VERIFY_MATCH(holdsAll((*model)->note(), {"No disturbance"}));
+    const auto strict = fitPosition("harmonic_field", roomData(nullptr, 0.005, seed), {{"least_gain", "20"}});
+    FT_VERIFY_OK(strict);
+    QCOMPARE(sourcesOf(**strict), std::size_t{0});
+  }
+  QVERIFY2(n_seen <= 1, qPrintable(QString("metal seen in %1 of 5 empty rooms").arg(n_seen)));
+}
+
+// The errors of many calibrations of one room against what each says of itself.
+void HarmonicFieldTest::knowsItsUncertainty() {
+  const auto metal = cabinet();
+  double errors_m2 = 0.0;
+  double said_m2 = 0.0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const auto model = fitPosition("harmonic_field", roomData(metal.get(), 0.005, seed));
+    FT_VERIFY_OK(model);
+    errors_m2 += std::pow(rms_m(**model, *metal, placesBetween(8)), 2);
+    for (const Eigen::Vector3d& p_true_m : placesBetween(8))
+      said_m2 += std::pow((*model)->uncertainty_m(tracked_m(*metal, p_true_m)).value(), 2) / 200.0;
+  }
+  const double ratio = std::sqrt(errors_m2 / said_m2);
+  QVERIFY2(ratio > 0.6 && ratio < 1.8, qPrintable(QString("errors are %1 of what is said").arg(ratio)));
+}
+
+// An error that no dipole tracker makes, stronger in every respect than the noise: little may be gained, nothing lost.
+void HarmonicFieldTest::doesNoHarmToAnotherTracker() {
+  const auto bend_m = [](const Eigen::Vector3d& p) {
+    return Eigen::Vector3d(0.01 * std::sin(3.0 * p.y()), 0.01 * std::cos(3.0 * p.z()), 0.01 * std::sin(3.0 * p.x()));
+  };
+  const FitData data = fitDataOf(roomGrid(), bend_m);
+  const auto model = fitPosition("harmonic_field", data);
+  const auto rigid = fitPosition("rigid", data);
+  FT_VERIFY_OK(model);
+  FT_VERIFY_OK(rigid);
+  double with_m2 = 0.0;
+  double without_m2 = 0.0;
+  for (const Eigen::Vector3d& p_m : placesBetween(9)) {
+    with_m2 += ((*model)->displacement_m(p_m) - bend_m(p_m)).squaredNorm();
+    without_m2 += ((*rigid)->displacement_m(p_m) - bend_m(p_m)).squaredNorm();
+  }
+  QVERIFY2(with_m2 < 1.1 * without_m2, qPrintable(QString("%1 of it left").arg(std::sqrt(with_m2 / without_m2))));
+}
+
+void HarmonicFieldTest::isRigidWithoutSources() {
+  const auto metal = cabinet();
+  const FitData data = roomData(metal.get(), 0.005, 1);
+  const auto model = fitPosition("harmonic_field", data, {{"most_sources", "0"}});
+  const auto rigid = fitPosition("rigid", data);
+  FT_VERIFY_OK(model);
+  FT_VERIFY_OK(rigid);
+  QCOMPARE(sourcesOf(**model), std::size_t{0});
+  for (const Eigen::Vector3d& p_m : placesBetween(10))
+    FT_VERIFY_MATCH(near((*model)->displacement_m(p_m), (*rigid)->displacement_m(p_m), 1e-6));
+}
+
+void HarmonicFieldTest::stops() {
+  std::stop_source source;
+  source.request_stop();
+  RunControl control;
+  control.stop = source.get_token();
+  const PositionMethod& method = *findPositionMethod("harmonic_field").value();
+  const auto model = method.fit(roomData(nullptr, 0.005, 1), settingsOf(method), control);
+  QVERIFY(!model && model.error().code == ErrorCode::kCancelled);
+}
+
+QTEST_GUILESS_MAIN(HarmonicFieldTest)
+#include "harmonic_field_test.moc"
