@@ -11,7 +11,6 @@ namespace fieldtrue {
 namespace {
 
 constexpr std::size_t kFolds = 5;
-constexpr std::size_t kFoldsBeforeDropping = 2;
 constexpr double kDroppedFrom = 2.0;  ///< Standard errors.
 constexpr std::size_t kPlacesForFolds = 20;
 constexpr double kLeastGain = 0.05;
@@ -25,6 +24,7 @@ struct ListedCandidate {
   int complexity;
 };
 
+constexpr int kPhysical = 9;
 constexpr int kSmoothing = 10;
 constexpr int kInterpolating = 20;
 
@@ -36,11 +36,12 @@ constexpr std::array<ListedCandidate, 23> kListed = {{
     {"polynomial:degree=3", Origin::kSurvey, 4},
     {"polynomial:degree=4", Origin::kSurvey, 5},
     {"polynomial:degree=5", Origin::kSurvey, 6},
+    {"polynomial:degree=6", Origin::kSurvey, 7},
     {"gaussian_process", Origin::kOurs, kSmoothing},
     {"bspline", Origin::kOurs, kSmoothing},
     {"rbf", Origin::kOurs, kSmoothing},
     {"rbf:kernel=thin_plate", Origin::kOurs, kSmoothing},
-    {"harmonic_field", Origin::kOurs, kSmoothing},
+    {"harmonic_field", Origin::kOurs, kPhysical},
     {"hmq:r2_cm2=10", Origin::kSurvey, kInterpolating},
     {"hmq:r2_cm2=100", Origin::kSurvey, kInterpolating},
     {"hmq:r2_cm2=1000", Origin::kSurvey, kInterpolating},
@@ -51,24 +52,25 @@ constexpr std::array<ListedCandidate, 23> kListed = {{
     {"local_bump", Origin::kSurvey, kInterpolating},
     {"local_kindratenko", Origin::kSurvey, kInterpolating},
     {"local_briggs", Origin::kSurvey, kInterpolating},
-    {"divergence_aware", Origin::kOurs, kSmoothing},
 }};
 
-double meanOf(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-/// Mean of a - b, and its standard error.
+/// Mean of a - b over the places that both were scored on, and its standard error.
 struct PairedDifference {
   double mean = 0.0;
-  double standard_error = 0.0;
+  double standard_error = HUGE_VAL;
 
-  PairedDifference(const std::vector<double>& a, const std::vector<double>& b) {
-    const auto n = static_cast<double>(a.size());
-    for (std::size_t i = 0; i < a.size(); ++i) mean += (a[i] - b[i]) / n;
+  PairedDifference(const InnerScore& a, const InnerScore& b) {
+    std::vector<double> differences;
+    for (std::size_t i = 0; i < a.squares_m2.size(); ++i) {
+      const double difference = a.squares_m2[i] - b.squares_m2[i];
+      if (!std::isnan(difference)) differences.push_back(difference);
+    }
+    const auto n = static_cast<double>(differences.size());
+    if (n < 1.0) return;
+    mean = std::accumulate(differences.begin(), differences.end(), 0.0) / n;
     double squares = 0.0;
-    for (std::size_t i = 0; i < a.size(); ++i) squares += (a[i] - b[i] - mean) * (a[i] - b[i] - mean);
-    standard_error = n > 1.0 ? std::sqrt(squares / (n * (n - 1.0))) : HUGE_VAL;
+    for (const double difference : differences) squares += (difference - mean) * (difference - mean);
+    if (n > 1.0) standard_error = std::sqrt(squares / (n * (n - 1.0)));
   }
 };
 
@@ -104,16 +106,21 @@ Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData&
   };
 }
 
-/// On the places scored so far, by their paired differences.
-bool isClearlyWorse(const InnerScore& score, const InnerScore& best, const std::vector<bool>& is_scored) {
-  std::vector<double> own, others;
-  for (std::size_t i = 0; i < is_scored.size(); ++i) {
-    if (!is_scored[i]) continue;
-    own.push_back(score.squares_m2[i]);
-    others.push_back(best.squares_m2[i]);
-  }
-  const PairedDifference excess(own, others);
+/// On the places scored so far.
+bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
+  const PairedDifference excess(score, best);
   return excess.mean > 0.0 && excess.mean > kDroppedFrom * excess.standard_error;
+}
+
+std::size_t foldsToScore(const AutomaticCandidate& candidate, std::size_t n_folds) {
+  return candidate.method->most_folds > 0 ? std::min(n_folds, std::max<std::size_t>(2, (2 * n_folds + 4) / 5))
+                                          : n_folds;
+}
+
+InnerScore skippedScore(std::string why) {
+  InnerScore score;
+  score.skipped = std::move(why);
+  return score;
 }
 
 bool isIn(Origin origin, CandidateSet set) {
@@ -138,7 +145,15 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set) {
   return candidates;
 }
 
-double InnerScore::rms_m() const { return std::sqrt(meanOf(squares_m2)); }
+double InnerScore::rms_m(const InnerScore* elsewhere) const {
+  double sum_m2 = 0.0, n = 0.0;
+  for (std::size_t i = 0; i < squares_m2.size(); ++i) {
+    if (std::isnan(squares_m2[i]) || (elsewhere != nullptr && std::isnan(elsewhere->squares_m2[i]))) continue;
+    sum_m2 += squares_m2[i];
+    n += 1.0;
+  }
+  return std::sqrt(sum_m2 / n);
+}
 
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data) {
   const std::vector<std::size_t> slots = slotsOf(data);
@@ -179,30 +194,30 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
   const auto model_without = modelsOf(candidate, data, control);
   if (!model_without) {
     if (model_without.error().code == ErrorCode::kCancelled) return tl::unexpected(model_without.error());
-    return InnerScore{{}, model_without.error().message};
+    return skippedScore(model_without.error().message);
   }
   const std::vector<std::size_t> slots = slotsOf(data);
   std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
   for (const std::size_t slot : slots) n_rows[slot] += 1.0;
   InnerScore score;
-  score.squares_m2.assign(n_rows.size(), 0.0);
-  std::vector<bool> is_scored(n_rows.size(), false);
-  for (std::size_t k = 0; k < folds.size(); ++k) {
+  score.squares_m2.assign(n_rows.size(), std::nan(""));
+  score.n_folds = foldsToScore(candidate, folds.size());
+  for (std::size_t k = 0; k < score.n_folds; ++k) {
     if (control.stop.stop_requested()) return cancelled();
     const auto model = (*model_without)(folds[k]);
     if (!model && model.error().code == ErrorCode::kCancelled) return tl::unexpected(model.error());
-    if (!model) return InnerScore{{}, model.error().message};
+    if (!model) return skippedScore(model.error().message);
+    for (const std::size_t row : folds[k]) score.squares_m2[slots[row]] = 0.0;
     for (const std::size_t row : folds[k]) {
-      score.squares_m2[slots[row]] += squaredError_m2(**model, data, row) / n_rows[slots[row]];
-      is_scored[slots[row]] = true;
+      const double square_m2 = squaredError_m2(**model, data, row);
+      if (!std::isfinite(square_m2)) return skippedScore("its errors at held-out places are not finite");
+      score.squares_m2[slots[row]] += square_m2 / n_rows[slots[row]];
     }
-    const bool may_drop = best != nullptr && candidate.method->most_folds > 0 && k + 1 < folds.size();
-    if (may_drop && k + 1 >= kFoldsBeforeDropping && isClearlyWorse(score, *best, is_scored))
-      return InnerScore{{},
-                        "dropped after " + std::to_string(k + 1) + " of " + std::to_string(folds.size()) +
-                            " folds, clearly worse than another candidate"};
+    const bool may_drop = best != nullptr && candidate.method->most_folds > 0 && k + 1 < score.n_folds;
+    if (may_drop && isClearlyWorse(score, *best))
+      return skippedScore("dropped after " + std::to_string(k + 1) + " of " + std::to_string(folds.size()) +
+                          " folds, clearly worse than another candidate");
   }
-  if (!std::isfinite(meanOf(score.squares_m2))) return InnerScore{{}, "its errors at held-out places are not finite"};
   return score;
 }
 
@@ -223,7 +238,7 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
     auto score = scoreCandidate(candidates[i], data, folds, best, inner);
     if (!score) return tl::unexpected(score.error());
     scores[i] = *std::move(score);
-    if (!scores[i].skipped && (best == nullptr || scores[i].rms_m() < best->rms_m())) best = &scores[i];
+    if (!scores[i].skipped && (best == nullptr || PairedDifference(scores[i], *best).mean < 0.0)) best = &scores[i];
     control.progress(++n_done / static_cast<double>(candidates.size() + 1));
   }
   return scores;
@@ -233,18 +248,19 @@ std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, c
   FT_CHECK(candidates.size() == scores.size() && !scores.empty() && !scores.front().skipped);
   std::size_t best = 0;
   for (std::size_t i = 1; i < scores.size(); ++i)
-    if (!scores[i].skipped && meanOf(scores[i].squares_m2) < meanOf(scores[best].squares_m2)) best = i;
+    if (!scores[i].skipped && PairedDifference(scores[i], scores[best]).mean < 0.0) best = i;
   std::size_t chosen = best;
   for (std::size_t i = 0; i < scores.size(); ++i) {
     if (scores[i].skipped) continue;
-    const PairedDifference excess(scores[i].squares_m2, scores[best].squares_m2);
+    const PairedDifference excess(scores[i], scores[best]);
     if (excess.mean > excess.standard_error) continue;
     const bool is_simpler = candidates[i].complexity < candidates[chosen].complexity;
     const bool is_as_simple = candidates[i].complexity == candidates[chosen].complexity;
-    if (is_simpler || (is_as_simple && scores[i].rms_m() < scores[chosen].rms_m())) chosen = i;
+    if (is_simpler || (is_as_simple && PairedDifference(scores[i], scores[chosen]).mean < 0.0)) chosen = i;
   }
-  const PairedDifference gain(scores.front().squares_m2, scores[chosen].squares_m2);
-  const bool is_worth_it = scores[chosen].rms_m() <= (1.0 - kLeastGain) * scores.front().rms_m() &&
+  const InnerScore& none = scores.front();
+  const PairedDifference gain(none, scores[chosen]);
+  const bool is_worth_it = scores[chosen].rms_m(&none) <= (1.0 - kLeastGain) * none.rms_m(&scores[chosen]) &&
                            gain.mean > kOneSided95 * gain.standard_error;
   return is_worth_it ? chosen : 0;
 }

@@ -21,7 +21,8 @@ struct AutomaticCandidate {
   const PositionMethod* method = nullptr;
   Settings settings;
   std::string text;    ///< As a person writes it, settings that differ from the defaults only.
-  int complexity = 0;  ///< Rank: none, rigid, affine, polynomials by degree, smoothing fits, interpolations.
+  int complexity = 0;  ///< Rank: none, rigid, affine, polynomials by degree, fields that obey the physics, smoothing
+                       ///< fits that follow any field, interpolations.
 };
 
 /// The candidates of a set that the registry has; the baselines none, rigid and affine are in every set. A method that
@@ -30,17 +31,19 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set);
 
 /// What inner cross-validation found about one candidate.
 struct InnerScore {
-  std::vector<double> squares_m2;      ///< Held-out squared error of each place; empty when skipped.
-  std::optional<std::string> skipped;  ///< Why it cannot be used here.
-  double rms_m() const;
+  std::vector<double> squares_m2;      ///< Held-out squared error of each place; NaN where it was not held out.
+  std::size_t n_folds = 0;             ///< Folds that were held out.
+  std::optional<std::string> skipped;  ///< Why it cannot be used here; then nothing else is set.
+  /// Over the places held out here and, where given, there [m].
+  double rms_m(const InnerScore* elsewhere = nullptr) const;
 };
 
 /// Rows in folds by place, the same for every candidate: five, or one a place below twenty places.
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data);
 
-/// Scores a candidate on places its fits did not see: in closed form where the method has one, by refits otherwise.
-/// @param best so far, or null: a costly method (most_folds) that after two folds or more is worse by two standard
-///        errors is dropped
+/// Scores a candidate on places its fits did not see: in closed form where the method has one, by refits otherwise. A
+/// costly method (most_folds) is scored on two fifths of the folds.
+/// @param best so far, or null: a costly method that after any fold is worse by two standard errors is dropped
 /// @error kCancelled only; what a method cannot do is in the score
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
                                   const std::vector<std::vector<std::size_t>>& folds, const InnerScore* best,
@@ -54,8 +57,9 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
                                                 const RunControl& control);
 
 /// The simplest candidate whose mean squared error exceeds the least by no more than one standard error of the
-/// difference (paired by place), the better one among equally simple ones; and the first, which must be none, unless
-/// that lowers its RMS by 5 % at least and its mean square by 1.645 standard errors (one-sided 95 %).
+/// difference, the better one among equally simple ones, each pair compared on the places that both were scored on; and
+/// the first, which must be none, unless that lowers its RMS by 5 % at least and its mean square by 1.645 standard
+/// errors (one-sided 95 %).
 /// @source the one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984, section 3.4.3
 std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores);
 
