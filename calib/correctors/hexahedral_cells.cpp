@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "calib/correctors/cell_json.h"
 #include "calib/correctors/face_pairs.h"
@@ -20,6 +21,11 @@ double corner(std::size_t c, int axis) { return ((c >> static_cast<unsigned>(axi
 /// By how much natural coordinates leave the cell; 0 inside.
 double overshoot(const Eigen::Vector3d& natural) {
   return std::max(0.0, (natural.array() - 0.5).abs().maxCoeff() - 0.5);
+}
+
+/// Squared distance from the cell in natural coordinates.
+double outsideSquared(const Eigen::Vector3d& natural) {
+  return ((natural.array() - 0.5).abs() - 0.5).max(0.0).square().sum();
 }
 
 /// Corners of the six faces of a cell, around each face.
@@ -168,14 +174,16 @@ std::optional<HexahedralCells::Location> HexahedralCells::locateInside(const Eig
 
 std::optional<HexahedralCells::Location> HexahedralCells::locateAround(const Eigen::Vector3d& p_tracked_m) const {
   std::optional<Location> nearest;
-  double least = kMargin + kOnFace;
+  double least = std::numeric_limits<double>::infinity();
   for (const int item : outer_lookup_.near(p_tracked_m)) {
     const auto i = static_cast<std::size_t>(item);
     if (!outer_boxes_[i].contains(p_tracked_m)) continue;
     const auto at = natural(outer_[i], p_tracked_m);
-    if (!at || overshoot(*at) > least) continue;
-    if (nearest && overshoot(*at) == least) continue;
-    least = overshoot(*at);
+    if (!at || overshoot(*at) > kMargin + kOnFace) continue;
+    // The largest overshoot alone is the same for neighbours: over their face, and over it and a side.
+    const double out = outsideSquared(*at);
+    if (out >= least) continue;
+    least = out;
     nearest = Location{outer_[i], *at};
   }
   return nearest;

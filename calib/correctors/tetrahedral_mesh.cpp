@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "calib/correctors/cell_json.h"
 #include "calib/correctors/face_pairs.h"
@@ -129,13 +130,15 @@ double TetrahedralMesh::overshoot(const Outer& outer, const std::array<double, 4
 
 std::optional<TetrahedralMesh::Location> TetrahedralMesh::locateAround(const Eigen::Vector3d& p_tracked_m) const {
   std::optional<Location> nearest;
-  double least_out = kMargin + kOnFace;
+  double least = std::numeric_limits<double>::infinity();
   for (const int item : outer_lookup_.near(p_tracked_m)) {
     const Outer& outer = outer_[static_cast<std::size_t>(item)];
     const Location at{outer.cell, weights(cells_[outer.cell], p_tracked_m)};
-    const double out = overshoot(outer, at.weights);
-    if (out > least_out || (nearest && out == least_out)) continue;
-    least_out = out;
+    if (overshoot(outer, at.weights) > kMargin + kOnFace) continue;
+    double out = 0.0;
+    for (const double weight : at.weights) out += std::min(0.0, weight) * std::min(0.0, weight);
+    if (out >= least) continue;
+    least = out;
     nearest = at;
   }
   return nearest;

@@ -120,7 +120,7 @@ std::array<std::size_t, 3> trackerAxes(const std::array<Eigen::Vector3d, 3>& dir
   return best;
 }
 
-/// As many levels as the index has, between the innermost readings of its outermost levels.
+/// As many levels as the index has, between its outermost levels.
 Levels levelsOfIndex_m(const Places& places, const Eigen::AlignedBox3d& bounds) {
   std::vector<std::array<int, 3>> index = places.index;
   const std::array<int, 3> counts = rankLevels(index);
@@ -136,20 +136,23 @@ Levels levelsOfIndex_m(const Places& places, const Eigen::AlignedBox3d& bounds) 
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto along = static_cast<Eigen::Index>(tracker_axes[axis]);
     const bool runs_up = directions[axis][along] > 0.0;
-    double low_m = bounds.min()[along];
-    double high_m = bounds.max()[along];
-    const double extent_m = high_m - low_m;
+    // In a bent grid the innermost reading of an outer level leaves out much, the outermost has little around it. On a
+    // floor that shifts places by more than a pitch, half way between the two covers most.
+    double innermost_low_m = bounds.min()[along];
+    double innermost_high_m = bounds.max()[along];
     for (std::size_t i = 0; i < places.size(); ++i) {
+      const double at_m = places.p_tracked_m[i][along];
       const bool is_first = index[i][axis] == 0;
       const bool is_last = index[i][axis] == counts[axis] - 1;
-      if (runs_up ? is_first : is_last) low_m = std::max(low_m, places.p_tracked_m[i][along]);
-      if (runs_up ? is_last : is_first) high_m = std::min(high_m, places.p_tracked_m[i][along]);
+      if (runs_up ? is_first : is_last) innermost_low_m = std::max(innermost_low_m, at_m);
+      if (runs_up ? is_last : is_first) innermost_high_m = std::min(innermost_high_m, at_m);
     }
-    // A grid that stands askew to the tracker leaves little between them: then all of its extent is used.
-    const bool is_askew = high_m - low_m < 0.5 * extent_m;
-    levels_m[tracker_axes[axis]] = is_askew
-                                       ? evenLevels(bounds.min()[along], bounds.max()[along], std::max(2, counts[axis]))
-                                       : evenLevels(low_m, high_m, std::max(2, counts[axis]));
+    // A grid that stands askew to the tracker has readings of every level on either side of the middle.
+    innermost_low_m = std::min(innermost_low_m, bounds.center()[along]);
+    innermost_high_m = std::max(innermost_high_m, bounds.center()[along]);
+    levels_m[tracker_axes[axis]] =
+        evenLevels(0.5 * (bounds.min()[along] + innermost_low_m), 0.5 * (bounds.max()[along] + innermost_high_m),
+                   std::max(2, counts[axis]));
   }
   return levels_m;
 }

@@ -22,8 +22,9 @@ struct TrackedGrid {
 inline constexpr double kRectilinearTolerance = 0.02;
 
 /// The grid that the tracked positions form, or with `resample` one of as many levels, to which the error vectors are
-/// brought. The levels then lie between the innermost readings of the outermost levels, so that few nodes lie outside
-/// the places. Nodes without support are missing; they are never extrapolated.
+/// brought. The first and last level lie half way between the innermost and outermost readings of the outermost
+/// levels, so that few nodes lie outside the places and few places outside the nodes. Nodes without support are
+/// missing; they are never extrapolated.
 /// @param method named in messages
 /// @error as checkVolume and placeGrid; kUnsupported when the tracked positions form no such grid and `resample` is
 ///        none, naming what would help

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/calib/correctors/fit_fixtures.h"
 
@@ -40,6 +41,26 @@ inline std::vector<Eigen::Vector3d> cube(double side_m, const Eigen::Vector3d& l
   for (unsigned c = 0; c < 8; ++c)
     corners_m.push_back(low_m + side_m * Eigen::Vector3d(c & 1U, (c >> 1U) & 1U, (c >> 2U) & 1U));
   return corners_m;
+}
+
+using Given = std::map<std::string, std::string>;
+
+/// Fits what must be fitted.
+inline std::unique_ptr<PositionModel> fitted(const std::string& id, const FitData& data, const Given& given = {}) {
+  auto model = fitPosition(id, data, given);
+  FT_CHECK(model.has_value());
+  return *std::move(model);
+}
+
+/// A grid of cubes turned about z.
+inline FitData turnedGrid(double angle_rad, const std::array<int, 3>& counts) {
+  std::vector<Eigen::Vector3d> points_m = shakenGrid(counts, 0.2, 0.0);
+  FitData straight = fitDataOf(points_m, linear_m);
+  const Eigen::AngleAxisd turn(angle_rad, Eigen::Vector3d::UnitZ());
+  for (Eigen::Vector3d& p_m : points_m) p_m = turn * p_m;
+  FitData data = fitDataOf(points_m, linear_m);
+  data.index = straight.index;
+  return data;
 }
 
 }  // namespace fieldtrue::testing

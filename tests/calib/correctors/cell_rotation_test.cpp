@@ -10,8 +10,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-using Given = std::map<std::string, std::string>;
-
 Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
 
 Eigen::Quaterniond about(const Eigen::Vector3d& axis, double angle_rad) { return rotationFromVector(angle_rad * axis); }

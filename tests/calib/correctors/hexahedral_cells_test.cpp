@@ -181,6 +181,20 @@ class HexahedralCellsTest : public QObject {
     QVERIFY(!cells.locate(within + 0.251 * outwards).has_value());
   }
 
+  void outsideTheNearestCellHasIt() {
+    // Off the high x face, over the lower cell in y and z: neighbours are as far off in x, and to a side as well.
+    const PlaceGrid grid = gridOf(fitDataOf(shakenGrid({3, 3, 3}, 0.2, 0.0), bending_m));
+    const HexahedralCells cells = HexahedralCells::of(grid);
+    std::mt19937_64 generator(4);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    for (int n = 0; n < 500; ++n) {
+      const Eigen::Vector3d natural(1.0 + 0.24 * uniform(generator), uniform(generator), uniform(generator));
+      const auto at = cells.locate(Eigen::Vector3d(0.6, -0.3, -0.2) + 0.2 * natural);
+      QVERIFY(at.has_value());
+      FT_VERIFY_MATCH(near(at->natural, natural, 1e-9));
+    }
+  }
+
   void sharedFacesEdgesAndCornersBelongToTheLowestCell() {
     const PlaceGrid grid = gridOf(shakenData({3, 3, 3}));
     const HexahedralCells cells = HexahedralCells::of(grid);

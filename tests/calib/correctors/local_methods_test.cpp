@@ -13,31 +13,12 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-using Given = std::map<std::string, std::string>;
-
-std::unique_ptr<PositionModel> fitted(const std::string& id, const FitData& data, const Given& given = {}) {
-  auto model = fitPosition(id, data, given);
-  FT_CHECK(model.has_value());
-  return *std::move(model);
-}
-
 /// A cube of 200 mm whose corners have error vectors along x of as many millimetres as the survey numbers them by.
 FitData numberedCube() {
   constexpr std::array<double, 8> kSurveyNumber = {1, 2, 4, 3, 5, 6, 8, 7};
   FitData data = fitDataOf(cube(0.2, {0.5, 0.1, -0.3}),
                            [](const Eigen::Vector3d&) -> Eigen::Vector3d { return Eigen::Vector3d::Zero(); });
   for (std::size_t c = 0; c < 8; ++c) data.p_true_m[c].x() += 0.001 * kSurveyNumber[c];
-  return data;
-}
-
-/// A grid of cubes turned about z.
-FitData turnedGrid(double angle_rad, const std::array<int, 3>& counts) {
-  std::vector<Eigen::Vector3d> points_m = shakenGrid(counts, 0.2, 0.0);
-  FitData straight = fitDataOf(points_m, linear_m);
-  const Eigen::AngleAxisd turn(angle_rad, Eigen::Vector3d::UnitZ());
-  for (Eigen::Vector3d& p_m : points_m) p_m = turn * p_m;
-  FitData data = fitDataOf(points_m, linear_m);
-  data.index = straight.index;
   return data;
 }
 
@@ -370,60 +351,6 @@ class LocalMethodsTest : public QObject {
       QVERIFY(!flat && flat.error().code == ErrorCode::kDegenerate);
       FT_VERIFY_MATCH(holdsAll(flat.error().message, {"one plane", "hmq"}));
     }
-  }
-
-  void trueSpaceGridsAreRefusedWithTheResamplingThatHelps_data() {
-    QTest::addColumn<QString>("id");
-    QTest::newRow("trilinear") << "trilinear";
-    QTest::newRow("local_briggs") << "local_briggs";
-  }
-  void trueSpaceGridsAreRefusedWithTheResamplingThatHelps() {
-    QFETCH(QString, id);
-    // Places within 2 % of the pitch of their level pass: 3 mm of 0.2 m, where 6 mm do not.
-    FT_VERIFY_OK(fitPosition(id.toStdString(), fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.003), linear_m)));
-    const auto shaken = fitPosition(id.toStdString(), fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.006), linear_m));
-    QVERIFY(!shaken && shaken.error().code == ErrorCode::kUnsupported);
-    FT_VERIFY_MATCH(holdsAll(shaken.error().message, {"tracked space", "2 %", "resample=briggs", "hexahedral_shape"}));
-    const auto scattered = fitPosition(id.toStdString(), fitDataOf(randomPoints(200), linear_m));
-    QVERIFY(!scattered && scattered.error().code == ErrorCode::kUnsupported);
-    FT_VERIFY_MATCH(holdsAll(scattered.error().message, {"tracked space", "resample=briggs"}));
-  }
-
-  void aTrackedGridNeedsNoIndexInTheTable() {
-    // The truth of a grid in tracked space is crooked and shows no index: the tracked positions do.
-    FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.0), linear_m);
-    data.index.clear();
-    FT_VERIFY_MATCH(
-        near(fitted("trilinear", data)->displacement_m({0.66, 0.07, 0.11}), linear_m({0.66, 0.07, 0.11}), 1e-12));
-  }
-
-  void resamplingMakesTrueSpaceAndScatteredDataUsable_data() {
-    QTest::addColumn<QString>("id");
-    QTest::addColumn<QString>("resample");
-    for (const char* id : {"trilinear", "local_briggs"})
-      for (const char* resample : {"briggs", "livingston", "czernuszenko"})
-        QTest::addRow("%s, %s", id, resample) << id << resample;
-  }
-  void resamplingMakesTrueSpaceAndScatteredDataUsable() {
-    QFETCH(QString, id);
-    QFETCH(QString, resample);
-    const Eigen::Vector3d shift_m(0.02, -0.01, 0.03);
-    const auto constant_m = [&](const Eigen::Vector3d&) { return shift_m; };
-    FitData turned = turnedGrid(M_PI / 2.0, {5, 4, 4});
-    for (std::size_t i = 0; i < turned.size(); ++i) turned.p_true_m[i] = turned.p_tracked_m[i] + shift_m;
-    FitData scattered = fitDataOf(randomPoints(300), constant_m);
-    scattered.index.clear();
-    for (const FitData& data : {fitDataOf(shakenGrid({5, 4, 4}, 0.2, 0.03), constant_m), turned, scattered}) {
-      const auto model = fitted(id.toStdString(), data, {{"resample", resample.toStdString()}});
-      FT_VERIFY_MATCH(holdsAll(model->note(), {"resampled to a grid", resample.toUtf8()}));
-      Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
-      for (const Eigen::Vector3d& p_m : data.p_tracked_m) middle_m += p_m / static_cast<double>(data.size());
-      QVERIFY(model->covers(middle_m));
-      // Every way of resampling leaves a constant as it is.
-      FT_VERIFY_MATCH(near(model->displacement_m(middle_m), shift_m, 1e-12));
-    }
-    FT_VERIFY_MATCH(
-        holdsAll(fitted(id.toStdString(), turned, {{"resample", resample.toStdString()}})->note(), {"4 x 5 x 4"}));
   }
 
   void settingsSurviveReloading() {
