@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
-#include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "calib/core/settings.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/automatic_choice.h"
 #include "calib/evaluation/noise_floor.h"
 #include "tests/studies/rooms.h"
+#include "tests/studies/table2.h"
 #include "tests/studies/workers.h"
 
 namespace fieldtrue::testing {
@@ -176,53 +175,34 @@ void printPicks(const std::map<std::string, std::vector<Outcome>>& by_room) {
   }
 }
 
-/// One technique of the survey's table 2, by the best of its variants.
-struct Technique {
-  const char* name;
-  const char* survey_says;
-  std::vector<std::string> variants;
-};
-
-const std::vector<Technique>& techniques() {
-  static const std::vector<Technique> kTechniques = {
-      {"trilinear", "average", {"trilinear:resample=briggs", "trilinear:resample=livingston"}},
-      {"tetrahedral", "average", {"tetrahedral"}},
-      {"local", "average", {"local_linear", "local_bump", "local_kindratenko:weight=linear"}},
-      {"polynomial, degree 4", "best", {"polynomial:degree=4"}},
-      {"neural network", "fair", {"neural_network"}},
-      {"multiquadric", "best", {"hmq:r2_cm2=10", "hmq:r2_cm2=100", "hmq:r2_cm2=1000"}}};
-  return kTechniques;
-}
-
 void printTable2(const std::map<std::string, std::vector<Outcome>>& by_room) {
-  printHead("technique (survey, table 2): rank here, 1 = lowest median error against exact truth");
-  std::map<std::string, std::map<std::string, double>> median_mm;
+  printHead("technique (survey, table 2): rank here, by the lowest median error against exact truth");
+  std::map<std::string, std::map<std::string, double>> errors_of_room;
   for (const std::string& room : kRooms) {
-    for (const Technique& technique : techniques()) {
-      double best_mm = 0.0;
-      for (const std::string& variant : technique.variants) {
-        const auto values = gather(by_room.at(room), [&](const Outcome& o) { return valueOr0(o.exact_mm, variant); });
-        const double middle_mm = median(values);
-        if (middle_mm > 0.0 && (best_mm == 0.0 || middle_mm < best_mm)) best_mm = middle_mm;
-      }
-      if (best_mm > 0.0) median_mm[room][technique.name] = best_mm;
+    std::map<std::string, double> median_mm;
+    for (const Entry& entry : entries()) {
+      const auto values = gather(by_room.at(room), [&](const Outcome& o) { return valueOr0(o.exact_mm, entry.text); });
+      if (median(values) > 0.0) median_mm[entry.text] = median(values);
     }
+    errors_of_room[room] = techniqueErrors(median_mm);
   }
-  for (const Technique& technique : techniques()) {
-    std::printf("| %s (%s) |", technique.name, technique.survey_says);
+  for (const Technique& technique : techniquesOfTable2()) {
+    std::printf("| %s (%s) |", technique.name.c_str(), technique.survey_says.c_str());
     for (const std::string& room : kRooms) {
-      const auto& row = median_mm.at(room);
-      const auto found = row.find(technique.name);
-      if (found == row.end()) {
+      const auto& errors = errors_of_room.at(room);
+      if (errors.contains(technique.name))
+        std::printf(" %d (%.1f mm) |", ranksOf(errors).at(technique.name), errors.at(technique.name));
+      else
         std::printf(" - |");
-        continue;
-      }
-      const auto rank =
-          1 + std::count_if(row.begin(), row.end(), [&](const auto& r) { return r.second < found->second; });
-      std::printf(" %d (%.1f mm) |", static_cast<int>(rank), found->second);
     }
     std::printf("\n");
   }
+  std::printf("| pairs in the survey's order |");
+  for (const std::string& room : kRooms) {
+    const Agreement agreement = agreementWithTable2(errors_of_room.at(room));
+    std::printf(" %d of %d |", agreement.in_order, agreement.pairs);
+  }
+  std::printf("\n");
 }
 
 nlohmann::json toJson(const Outcome& outcome) {

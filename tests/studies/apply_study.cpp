@@ -75,8 +75,7 @@ nlohmann::json applyStudy(const StudyOptions& options) {
     Tally& tally = tallies[t];
     const bool is_room = t + 1 == tables.size();
     tally.helps = helpsByAllPlaces(tables[t]);
-    const int n_splits = is_room ? kSplits : (kSplits + 5) / 6;
-    for (int split = 0; split < n_splits; ++split) {
+    for (int split = 0; split < kSplits; ++split) {
       const auto seed = static_cast<std::uint64_t>(split + 1);
       addSplit(is_room ? tableToFit(recordRoom(mixed, seed, 0, 2)) : tables[t], seed, tally);
     }

@@ -13,8 +13,9 @@
 namespace fieldtrue::testing {
 
 /// The conditions of the real recordings in anser_duplo.
-inline constexpr std::array<const char*, 6> kAnserConditions = {"standard",     "interpolate", "probe_calibrate",
-                                                                "finer_points", "finer_3axis", "steel_shield"};
+inline constexpr std::array<const char*, 6> kAnserConditions = {
+    "standard_data_grid", "interpolate_data_grid", "interpolate_data_grid_probe_calibrate",
+    "finer_mesh_points",  "finer_mesh_3axis",      "steel_shield"};
 
 inline CalibrationTable readAnser(const std::filesystem::path& nodes_csv, const std::string& condition) {
   const Importer& importer = *orThrow(findImporter("anser"));
@@ -49,9 +50,9 @@ inline bool saysApply(const CalibrationTable& table, const std::vector<MethodTex
 }
 
 /// What all places say when each is left out in turn: the best that can be known of whether a correction helps.
-inline bool helpsByAllPlaces(CalibrationTable table) {
+inline bool helpsByAllPlaces(CalibrationTable table, const std::vector<MethodText>& methods = {}) {
   for (Node& node : table.nodes) node.role = NodeRole::kFit;
-  return saysApply(table, {});
+  return saysApply(table, methods);
 }
 
 }  // namespace fieldtrue::testing
