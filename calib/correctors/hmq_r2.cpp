@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
+#include <cstdio>
+#include <cstdlib>
 
 #include "calib/core/file_io.h"
 #include "calib/correctors/hmq_system.h"
@@ -20,11 +21,11 @@ constexpr int kRefinements = 8;
 /// Above this many places each trial's matrix (50 MB and more) stands alone in memory.
 constexpr std::size_t kMostSideBySide = 2500;
 
-/// Three digits: what the note says is what was used.
+/// Three digits, as the decimal text of the note reads back: what is said is what was used.
 double roundedR2_cm2(double power) {
-  const double value = std::pow(10.0, power);
-  const double step = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
-  return std::clamp(std::round(value / step) * step, 10.0, 1000.0);
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", std::pow(10.0, power));
+  return std::clamp(std::strtod(text, nullptr), 10.0, 1000.0);
 }
 
 /// Tries values of R squared and remembers the best; where a system cannot be solved the residual counts as infinite.
