@@ -22,5 +22,8 @@ cp "$work/light/4-acquire.png" "$target/acquire.png"
 cp "$work/light/5-compare.png" "$target/compare.png"
 cp "$work/dark/5-compare.png" "$target/compare-dark.png"
 cp "$work/light/3-plan.png" "$target/plan.png"
+cp "$work/light/5-compare-two.png" "$target/compare-two.png"
+cp "$work/light/5-compare-slice.png" "$target/compare-slice.png"
+cp "$work/light/5-place-and-curve.png" "$target/node.png"
 if [ -n "${FIELDTRUE_ALL_PICTURES:-}" ]; then cp -r "$work/light" "$work/dark" "$target/"; fi
 echo "Pictures: $target"

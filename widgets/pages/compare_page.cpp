@@ -29,6 +29,17 @@ constexpr int kInspectorWidth = 432;
 constexpr int kNarrowestInspector = 320;
 constexpr std::size_t kFewestPlaces = 5;
 
+void restyle(QWidget* widget) {
+  widget->style()->unpolish(widget);
+  widget->style()->polish(widget);
+}
+
+void setPrimary(QPushButton* button, bool primary) {
+  if (button->property("primary").toBool() == primary) return;
+  button->setProperty("primary", primary);
+  restyle(button);
+}
+
 }  // namespace
 
 ComparePage::ComparePage(Workbench& workbench, QWidget* parent)
@@ -119,15 +130,16 @@ QWidget* ComparePage::makeControls(QWidget* header) {
   validation_->addItem(tr("8 blocks of space"), QStringLiteral("block:8"));
   validation_->addItem(tr("Validation places"), QStringLiteral("role"));
   validation_->setAccessibleName(tr("How methods are judged"));
-  connect(validation_, &QComboBox::activated, this, &ComparePage::runComparison);
+  connect(validation_, &QComboBox::activated, this, [this] { runComparison(true); });
   run_ = new QPushButton(tr("Compare"), controls);
   run_->setObjectName(QStringLiteral("runComparison"));
   run_->setProperty("primary", true);
   connect(run_, &QPushButton::clicked, this, [this] {
     if (workbench_.isComparing()) {
+      slow_to_come_ = false;
       workbench_.stopComparing();
     } else {
-      runComparison();
+      runComparison(false);
     }
   });
   progress_ = new QProgressBar(controls);
@@ -189,7 +201,7 @@ QWidget* ComparePage::makeInspector() {
 
 void ComparePage::showEvent(QShowEvent* event) {
   QWidget::showEvent(event);
-  if (out_of_date_ && stack_->currentIndex() == 1) runComparison();
+  if (out_of_date_ && stack_->currentIndex() == 1) runComparison(true);
 }
 
 void ComparePage::onTable() {
@@ -198,16 +210,18 @@ void ComparePage::onTable() {
   stack_->setCurrentIndex(usable >= kFewestPlaces ? 1 : 0);
   out_of_date_ = true;
   place_->setData(workbench_.table(), workbench_.samples(), workbench_.comparison());
-  if (stack_->currentIndex() == 1 && isVisible()) runComparison();
+  if (stack_->currentIndex() == 1 && isVisible()) runComparison(true);
 }
 
-void ComparePage::runComparison() {
+void ComparePage::runComparison(bool quick_first) {
   out_of_date_ = false;
   ComparisonOptions options;
   const auto validation = parseValidation(validation_->currentData().toString().toStdString());
   if (validation) options.validation = *validation;
-  options.position_methods = position_->ticked();
-  options.orientation_methods = rotation_->ticked();
+  options.position_methods = quick_first ? position_->tickedQuick() : position_->ticked();
+  options.orientation_methods = quick_first ? rotation_->tickedQuick() : rotation_->ticked();
+  n_compared_ = static_cast<int>(options.position_methods.size() + options.orientation_methods.size());
+  slow_to_come_ = n_compared_ < position_->tickedCount() + rotation_->tickedCount();
   // An empty list would mean all methods; none ticked means the error before alone.
   for (auto* methods : {&options.position_methods, &options.orientation_methods})
     methods->insert(methods->begin(), MethodText{"none", {}});
@@ -216,9 +230,10 @@ void ComparePage::runComparison() {
 
 void ComparePage::onProgress(double fraction) {
   progress_->setValue(static_cast<int>(fraction * 1000.0));
-  progress_text_->setText(tr("%1 % of %2 methods")
-                              .arg(static_cast<int>(100.0 * fraction))
-                              .arg(position_->tickedCount() + rotation_->tickedCount()));
+  const QString done = QString::number(static_cast<int>(100.0 * fraction));
+  progress_text_->setText(workbench_.comparison() && n_compared_ > 0
+                              ? tr("%1 % of %2 methods; the figures are the last ones").arg(done).arg(n_compared_)
+                              : tr("%1 % of %2 methods").arg(done).arg(n_compared_));
 }
 
 void ComparePage::onComparison() {
@@ -226,6 +241,7 @@ void ComparePage::onComparison() {
   progress_->setVisible(running);
   progress_text_->setVisible(running);
   run_->setText(running ? tr("Stop") : tr("Compare again"));
+  setPrimary(run_, !workbench_.comparison());
   if (running) {
     onProgress(0.0);
     if (!workbench_.comparison()) {
@@ -235,10 +251,13 @@ void ComparePage::onComparison() {
     return;
   }
   showComparison();
+  if (slow_to_come_ && workbench_.comparison()) runComparison(false);
 }
 
 void ComparePage::showComparison() {
   const std::optional<Comparison>& comparison = workbench_.comparison();
+  // A view that shows the best goes on showing the best, whichever that is now.
+  const bool follows_best = fields_->right() == shown_best_;
   fitted_methods_->reset(workbench_.table(), comparison);
   volumes_->reset(workbench_.table(), comparison);
   position_->setComparison(comparison);
@@ -256,7 +275,8 @@ void ComparePage::showComparison() {
   position_->choose(QString::fromStdString(comparison->best_position));
   rotation_->choose(QString::fromStdString(comparison->best_orientation));
   fields_->setOrientation(comparison->best_orientation_row);
-  if (!fields_->right()) fields_->setRight(comparison->best_position_row);
+  shown_best_ = comparison->best_position_row;
+  if (follows_best || !fields_->right()) fields_->setRight(shown_best_);
   onShown();
   showMarks();
 }
@@ -270,10 +290,7 @@ void ComparePage::showHeadline(const Comparison& comparison) {
           ? tr("Apply it: %1 \u2192 %2 mm").arg(threeFigures(comparison.before_position_mm.rms), threeFigures(after_mm))
           : tr("Do not correct: %1 mm as it is").arg(threeFigures(comparison.before_position_mm.rms)));
   header_->setProperty("state", apply ? "apply" : "leave");
-  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) {
-    widget->style()->unpolish(widget);
-    widget->style()->polish(widget);
-  }
+  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(widget);
   verdict_->setText(QString::fromStdString(comparison.verdict.text));
 }
 

@@ -37,7 +37,8 @@ class ComparePage : public QWidget {
   QWidget* makeInspector();
   void connectParts();
   void onTable();
-  void runComparison();
+  /// @param quick_first without the slow methods, and with them as soon as that is shown
+  void runComparison(bool quick_first);
   void onComparison();
   void onProgress(double fraction);
   void onCorrector();
@@ -70,6 +71,9 @@ class ComparePage : public QWidget {
   QPushButton* fit_;
   QLabel* fitted_;
   bool out_of_date_ = true;
+  bool slow_to_come_ = false;
+  int n_compared_ = 0;
+  std::optional<std::size_t> shown_best_;  ///< Row of the best in the comparison shown.
 };
 
 }  // namespace fieldtrue

@@ -18,6 +18,7 @@
 #include "calib/exporters/registry.h"
 #include "widgets/pages/background.h"
 #include "widgets/pages/empty_page.h"
+#include "widgets/pages/method_list.h"
 #include "widgets/pages/units.h"
 #include "widgets/report/report.h"
 #include "widgets/report/thread_pool.h"
@@ -188,7 +189,8 @@ void ExportPage::onData() {
   const CorrectorChoice& choice = corrector->choice();
   calibration_->setText(
       tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows.%4")
-          .arg(QString::fromStdString(choice.position_id), QString::fromStdString(choice.orientation_id))
+          .arg(methodLabel(MethodPart::kPosition, choice.position_id, choice.position_settings),
+               methodLabel(MethodPart::kOrientation, choice.orientation_id, choice.orientation_settings))
           .arg(corrector->report().n_nodes)
           .arg(warning));
   onTarget();

@@ -1,12 +1,11 @@
 #include "widgets/pages/field_panel.h"
 
-#include <QButtonGroup>
-#include <QCheckBox>
+#include <QApplication>
 #include <QComboBox>
+#include <QFrame>
 #include <QHBoxLayout>
 #include <QLabel>
-#include <QPushButton>
-#include <QSlider>
+#include <QStyle>
 #include <QVBoxLayout>
 #include <algorithm>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "widgets/pages/field_scales.h"
 #include "widgets/pages/fitted_methods.h"
 #include "widgets/pages/units.h"
+#include "widgets/pages/view_bar.h"
 #include "widgets/pages/volume_bar.h"
 #include "widgets/pages/volume_store.h"
 #include "widgets/views/field_scale.h"
@@ -26,14 +26,26 @@ namespace {
 constexpr int kBefore = -1;
 constexpr double kColorEnds_mm[] = {0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200};
 
-// The slider runs over magnifications 1 to 1000 in even ratios.
-double magnificationOf(int slider) { return std::pow(10.0, slider / 50.0); }
-int sliderOf(double magnification) { return static_cast<int>(std::lround(50.0 * std::log10(magnification))); }
-
 MethodRow rowOf(const QComboBox* choice) {
   const QVariant data = choice->currentData();
   if (!data.isValid() || data.toInt() == kBefore) return std::nullopt;
   return static_cast<std::size_t>(data.toInt());
+}
+
+/// A frame that tells where the keys go.
+QFrame* framed(QWidget* view) {
+  auto* frame = new QFrame;
+  frame->setObjectName(QStringLiteral("viewFrame"));
+  auto* layout = new QVBoxLayout(frame);
+  layout->setContentsMargins(2, 2, 2, 2);
+  layout->addWidget(view);
+  QObject::connect(qApp, &QApplication::focusChanged, frame, [frame, view](QWidget*, QWidget* now) {
+    if (frame->property("focused").toBool() == (now == view)) return;
+    frame->setProperty("focused", now == view);
+    frame->style()->unpolish(frame);
+    frame->style()->polish(frame);
+  });
+  return frame;
 }
 
 void chooseRow(QComboBox* choice, MethodRow row) {
@@ -48,93 +60,36 @@ FieldPanel::FieldPanel(FittedMethods& fitted, VolumeStore& volumes, QWidget* par
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   layout->setSpacing(0);
-  layout->addWidget(makeViewBar());
+  view_bar_ = new ViewBar(this);
+  layout->addWidget(view_bar_);
   layout->addWidget(makeChoosers());
   layout->addWidget(makeViews(), 1);
   layout->addWidget(makeLegend());
   volume_bar_ = new VolumeBar(this);
   layout->addWidget(volume_bar_);
+  connectBars();
+}
+
+void FieldPanel::connectBars() {
+  connect(view_bar_, &ViewBar::modeChanged, this, [this] {
+    draw();
+    emit shownChanged();
+  });
+  connect(view_bar_, &ViewBar::certaintyChanged, this, &FieldPanel::draw);
+  connect(view_bar_, &ViewBar::cameraChosen, right_, &FieldView::setCamera);
+  connect(view_bar_, &ViewBar::turnsShown, this, [this](bool on) {
+    left_->setShowOrientation(on);
+    right_->setShowOrientation(on);
+  });
+  connect(view_bar_, &ViewBar::magnified, this, [this](double magnification) {
+    left_->setMagnification(magnification);
+    right_->setMagnification(magnification);
+    strip_->setMagnification(magnification);
+  });
   connect(volume_bar_, &VolumeBar::quantityChanged, this, &FieldPanel::draw);
   connect(volume_bar_, &VolumeBar::sliceChanged, this, &FieldPanel::drawSlice);
   connect(volume_bar_, &VolumeBar::isoChanged, this, &FieldPanel::drawSlice);
   connect(&volumes_, &VolumeStore::changed, this, &FieldPanel::draw);
-}
-
-QWidget* FieldPanel::makeViewBar() {
-  auto* bar = new QWidget(this);
-  bar->setObjectName(QStringLiteral("viewBar"));
-  bar->setAttribute(Qt::WA_StyledBackground);
-  auto* layout = new QHBoxLayout(bar);
-  layout->setContentsMargins(12, 4, 12, 4);
-  makeModes(layout);
-  layout->addSpacing(8);
-  makeArrows(layout);
-  orientation_ = new QCheckBox(tr("Turns"), bar);
-  orientation_->setObjectName(QStringLiteral("showOrientation"));
-  orientation_->setToolTip(tr("Draw the orientation error as arcs"));
-  connect(orientation_, &QCheckBox::toggled, this, [this](bool on) {
-    left_->setShowOrientation(on);
-    right_->setShowOrientation(on);
-  });
-  certainty_ = new QCheckBox(tr("Certainty"), bar);
-  certainty_->setObjectName(QStringLiteral("showCertainty"));
-  certainty_->setToolTip(tr("Fade the arrows where the method states a large uncertainty"));
-  connect(certainty_, &QCheckBox::toggled, this, &FieldPanel::draw);
-  layout->addWidget(orientation_);
-  layout->addWidget(certainty_);
-  makeCamera(layout);
-  return bar;
-}
-
-void FieldPanel::makeModes(QHBoxLayout* layout) {
-  modes_ = new QButtonGroup(this);
-  const std::tuple<QString, Mode, const char*> modes[] = {{tr("Two"), Mode::kSideBySide, "modeTwo"},
-                                                          {tr("One"), Mode::kOne, "modeOne"},
-                                                          {tr("Difference"), Mode::kDifference, "modeDifference"}};
-  for (const auto& [label, mode, name] : modes) {
-    auto* button = new QPushButton(label, this);
-    button->setObjectName(QString::fromLatin1(name));
-    button->setCheckable(true);
-    button->setProperty("segment", true);
-    modes_->addButton(button, static_cast<int>(mode));
-    layout->addWidget(button);
-  }
-  modes_->button(static_cast<int>(Mode::kSideBySide))->setChecked(true);
-  connect(modes_, &QButtonGroup::idToggled, this, [this](int, bool on) {
-    if (!on) return;
-    draw();
-    emit shownChanged();
-  });
-}
-
-void FieldPanel::makeArrows(QHBoxLayout* layout) {
-  layout->addWidget(new QLabel(tr("Arrows"), this));
-  arrows_ = new QSlider(Qt::Horizontal, this);
-  arrows_->setObjectName(QStringLiteral("glyphScale"));
-  arrows_->setRange(0, 150);
-  arrows_->setMinimumWidth(60);
-  arrows_->setAccessibleName(tr("Magnification of the arrows"));
-  arrows_text_ = new QLabel(this);
-  arrows_text_->setMinimumWidth(44);
-  connect(arrows_, &QSlider::valueChanged, this, [this](int value) {
-    arrows_factor_ = magnificationOf(value) / suited_magnification_;
-    magnify(magnificationOf(value));
-  });
-  layout->addWidget(arrows_, 1);
-  layout->addWidget(arrows_text_);
-}
-
-void FieldPanel::makeCamera(QHBoxLayout* layout) {
-  auto* camera = new QComboBox(this);
-  camera->setObjectName(QStringLiteral("camera"));
-  camera->setAccessibleName(tr("Where to look from"));
-  for (const auto& [label, preset] :
-       {std::pair(tr("Operator"), CameraPreset::kOperator), std::pair(tr("Front"), CameraPreset::kFront),
-        std::pair(tr("Side"), CameraPreset::kSide), std::pair(tr("Top"), CameraPreset::kTop)})
-    camera->addItem(label, static_cast<int>(preset));
-  connect(camera, &QComboBox::activated, this,
-          [this, camera] { right_->setCamera(static_cast<CameraPreset>(camera->currentData().toInt())); });
-  layout->addWidget(camera);
 }
 
 QWidget* FieldPanel::makeChoosers() {
@@ -169,14 +124,14 @@ QWidget* FieldPanel::makeViews() {
   auto* layout = new QHBoxLayout(views);
   layout->setContentsMargins(0, 0, 0, 0);
   layout->setSpacing(1);
-  left_ = new FieldView(views);
-  right_ = new FieldView(views);
+  left_ = new FieldView(this);
+  right_ = new FieldView(this);
   left_->setObjectName(QStringLiteral("fieldLeft"));
   right_->setObjectName(QStringLiteral("fieldRight"));
   right_->linkCamera(left_);
   for (FieldView* view : {left_, right_}) {
     view->setLegendShown(false);
-    layout->addWidget(view, 1);
+    layout->addWidget(framed(view), 1);
     connect(view, &FieldView::nodeClicked, this, &FieldPanel::nodeClicked);
   }
   return views;
@@ -243,8 +198,6 @@ void FieldPanel::setLeft(MethodRow row) { chooseRow(left_choice_, row); }
 void FieldPanel::setRight(MethodRow row) { chooseRow(right_choice_, row); }
 MethodRow FieldPanel::left() const { return rowOf(left_choice_); }
 MethodRow FieldPanel::right() const { return rowOf(right_choice_); }
-FieldPanel::Mode FieldPanel::mode() const { return static_cast<Mode>(modes_->checkedId()); }
-void FieldPanel::setMode(Mode mode) { modes_->button(static_cast<int>(mode))->setChecked(true); }
 
 void FieldPanel::setOrientation(MethodRow row) {
   orientation_row_ = row;
@@ -268,7 +221,7 @@ void FieldPanel::setFolds(const std::vector<SceneCell>& cells) {
 
 ErrorField FieldPanel::fieldOf(MethodRow row) {
   ErrorField field = heldOutField(*comparison_, table_, row, row ? orientation_row_ : MethodRow());
-  if (certainty_->isChecked()) addUncertainty(field, row);
+  if (view_bar_->certaintyShown()) addUncertainty(field, row);
   return field;
 }
 
@@ -283,9 +236,9 @@ void FieldPanel::addUncertainty(ErrorField& field, MethodRow row) {
 
 void FieldPanel::draw() {
   if (!comparison_) return;
-  const bool difference = mode() == Mode::kDifference;
-  left_->setVisible(mode() == Mode::kSideBySide);
-  left_choice_->setVisible(mode() != Mode::kOne);
+  const bool difference = view_bar_->mode() == ViewBar::Mode::kDifference;
+  left_->parentWidget()->setVisible(view_bar_->mode() == ViewBar::Mode::kSideBySide);
+  left_choice_->setVisible(view_bar_->mode() != ViewBar::Mode::kOne);
   between_->setVisible(difference);
   between_->setText(tr("minus"));
   volume_bar_->setDifference(difference);
@@ -293,7 +246,7 @@ void FieldPanel::draw() {
       difference ? differenceField(*comparison_, table_, this->left(), this->right()) : fieldOf(this->right());
   std::vector<const ErrorField*> shown = {&right};
   ErrorField left;
-  if (mode() == Mode::kSideBySide) {
+  if (view_bar_->mode() == ViewBar::Mode::kSideBySide) {
     left = fieldOf(this->left());
     left_->setField(left);
     shown.push_back(&left);
@@ -306,7 +259,7 @@ void FieldPanel::draw() {
 
 VolumeKey FieldPanel::keyOf(const FieldView* view) const {
   const VolumeQuantity quantity = volume_bar_->quantity();
-  if (quantity != VolumeQuantity::kNone && mode() == Mode::kDifference)
+  if (quantity != VolumeQuantity::kNone && view_bar_->mode() == ViewBar::Mode::kDifference)
     return {VolumeQuantity::kCorrection, left(), right(), true};
   return {quantity, view == left_ ? left() : right(), std::nullopt, false};
 }
@@ -315,7 +268,7 @@ void FieldPanel::drawVolume() {
   QStringList texts;
   double largest_mm = 0.0;
   for (FieldView* view : {left_, right_}) {
-    if (!view->isVisibleTo(this)) continue;
+    if (!view->parentWidget()->isVisibleTo(this)) continue;
     const VolumeKey key = keyOf(view);
     const VolumeField* volume = volumes_.get(key);
     view->setVolume(volume ? *volume : VolumeField{});
@@ -338,13 +291,13 @@ void FieldPanel::drawSlice() {
 std::vector<const VolumeField*> FieldPanel::volumesShown() {
   std::vector<const VolumeField*> volumes;
   for (const FieldView* view : {left_, right_})
-    if (view->isVisibleTo(this))
+    if (view->parentWidget()->isVisibleTo(this))
       if (const VolumeField* volume = volumes_.get(keyOf(view))) volumes.push_back(volume);
   return volumes;
 }
 
 void FieldPanel::showScale(const std::vector<const ErrorField*>& fields) {
-  const bool difference = mode() == Mode::kDifference;
+  const bool difference = view_bar_->mode() == ViewBar::Mode::kDifference;
   const FieldScale scale = sharedScale(fields, volumesShown());
   const double chosen_mm = colors_to_->currentData().toDouble();
   const double max_mm = chosen_mm > 0.0 ? chosen_mm : scale.max_mm;
@@ -353,20 +306,22 @@ void FieldPanel::showScale(const std::vector<const ErrorField*>& fields) {
   strip_->setScale(difference ? ScaleStrip::Scale::kDifference : ScaleStrip::Scale::kMagnitude, max_mm,
                    exceeds(fields, max_mm));
   strip_->setEnds(tr("A nearer the truth"), tr("B nearer the truth"));
-  suited_magnification_ = scale.magnification;
-  const QSignalBlocker quiet(arrows_);
-  arrows_->setValue(sliderOf(suited_magnification_ * arrows_factor_));
-  magnify(arrows_factor_ == 1.0 ? suited_magnification_ : magnificationOf(arrows_->value()));
+  const VolumeQuantity quantity = volume_bar_->quantity();
+  strip_->setMeaning(quantity == VolumeQuantity::kCorrection    ? tr("error, correction")
+                     : quantity == VolumeQuantity::kUncertainty ? tr("error, SD")
+                                                                : tr("error"));
+  strip_->setVolumeMeaning(difference && quantity != VolumeQuantity::kNone ? tr("distance") : QString());
+  view_bar_->suitMagnification(scale.magnification);
 }
 
 void FieldPanel::showCertainty(const std::vector<const ErrorField*>& fields) {
-  const bool wanted = certainty_->isChecked() && mode() != Mode::kDifference;
+  const bool wanted = view_bar_->certaintyShown() && view_bar_->mode() != ViewBar::Mode::kDifference;
   const std::optional<OpacityRange> range = wanted ? opacityRange(fields) : std::nullopt;
   left_->setOpacityRange(range);
   right_->setOpacityRange(range);
   strip_->setOpacityRange(range);
   QString text;
-  if (certainty_->isChecked() && mode() == Mode::kDifference)
+  if (view_bar_->certaintyShown() && view_bar_->mode() == ViewBar::Mode::kDifference)
     text = tr("Certainty belongs to one method, not to a difference.");
   if (wanted && !range) {
     const MethodRow row = right() ? right() : left();
@@ -377,13 +332,6 @@ void FieldPanel::showCertainty(const std::vector<const ErrorField*>& fields) {
   }
   certainty_text_->setText(text);
   certainty_text_->setVisible(!text.isEmpty());
-}
-
-void FieldPanel::magnify(double magnification) {
-  arrows_text_->setText(tr("\u00d7%1").arg(threeFigures(magnification)));
-  left_->setMagnification(magnification);
-  right_->setMagnification(magnification);
-  strip_->setMagnification(magnification);
 }
 
 }  // namespace fieldtrue

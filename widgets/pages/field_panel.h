@@ -5,17 +5,14 @@
 #include "widgets/pages/compared_methods.h"
 #include "widgets/views/scale_strip.h"
 
-class QButtonGroup;
-class QCheckBox;
 class QComboBox;
-class QHBoxLayout;
 class QLabel;
-class QSlider;
 
 namespace fieldtrue {
 
 class FieldView;
 class FittedMethods;
+class ViewBar;
 class VolumeBar;
 class VolumeStore;
 struct FieldScale;
@@ -28,8 +25,6 @@ struct VolumeKey;
 class FieldPanel : public QWidget {
   Q_OBJECT
  public:
-  enum class Mode { kSideBySide, kOne, kDifference };
-
   FieldPanel(FittedMethods& fitted, VolumeStore& volumes, QWidget* parent = nullptr);
 
   /// Keeps the methods shown where they are still compared.
@@ -38,8 +33,6 @@ class FieldPanel : public QWidget {
   void setRight(MethodRow row);
   MethodRow left() const;
   MethodRow right() const;
-  Mode mode() const;
-  void setMode(Mode mode);
   /// Whose held-out angles are drawn beside a corrected position.
   void setOrientation(MethodRow row);
   void setSelected(int node);
@@ -51,10 +44,7 @@ class FieldPanel : public QWidget {
   void shownChanged();  ///< Other methods, or another way to show them.
 
  private:
-  QWidget* makeViewBar();
-  void makeModes(QHBoxLayout* layout);
-  void makeArrows(QHBoxLayout* layout);
-  void makeCamera(QHBoxLayout* layout);
+  void connectBars();
   QWidget* makeChoosers();
   QWidget* makeViews();
   QWidget* makeLegend();
@@ -68,29 +58,22 @@ class FieldPanel : public QWidget {
   ErrorField fieldOf(MethodRow row);
   void addUncertainty(ErrorField& field, MethodRow row);
   void showCertainty(const std::vector<const ErrorField*>& fields);
-  void magnify(double magnification);
 
   FittedMethods& fitted_;
   VolumeStore& volumes_;
   CalibrationTable table_;
   std::optional<Comparison> comparison_;
   MethodRow orientation_row_;
-  QButtonGroup* modes_;
   QComboBox* left_choice_;
   QComboBox* right_choice_;
   QLabel* between_;
   FieldView* left_;
   FieldView* right_;
+  ViewBar* view_bar_;
   VolumeBar* volume_bar_;
   ScaleStrip* strip_;
   QComboBox* colors_to_;
-  QSlider* arrows_;
-  QLabel* arrows_text_;
-  QCheckBox* orientation_;
-  QCheckBox* certainty_;
   QLabel* certainty_text_;
-  double suited_magnification_ = 1.0;  ///< To the fields shown.
-  double arrows_factor_ = 1.0;         ///< What a person made of it.
 };
 
 }  // namespace fieldtrue

@@ -7,12 +7,21 @@
 namespace fieldtrue {
 namespace {
 
+/// Methods that a comparison refits less often than this take so long that a person asks for them.
+constexpr int kFewFolds = 10;
+
+template <class Method>
+bool isSlow(const Method& method) {
+  return method.most_folds > 0;
+}
+
 template <class Method>
 std::vector<MethodEntry> entriesOf(std::span<const Method> methods) {
   std::vector<MethodEntry> entries;
   for (const Method& method : methods)
     if (method.id != "none")
-      entries.push_back({method.id, defaultSettings(method.settings), method.most_folds == 0, false});
+      entries.push_back(
+          {method.id, defaultSettings(method.settings), !isSlow(method) || method.most_folds >= kFewFolds, false});
   return entries;
 }
 
@@ -20,7 +29,7 @@ template <class Method>
 MethodInfo infoOf(const Result<const Method*>& method, const std::string& id) {
   if (!method) return {QString::fromStdString(id), {}, {}, false};
   return {QString::fromStdString((*method)->label), (*method)->settings, QString::fromStdString((*method)->source),
-          (*method)->most_folds > 0};
+          isSlow(**method)};
 }
 
 }  // namespace
@@ -44,6 +53,11 @@ Settings defaultSettings(std::span<const Setting> declared) {
   Settings settings;
   for (const Setting& setting : declared) settings[setting.key] = setting.default_value;
   return settings;
+}
+
+std::vector<MethodText> quickMethods(MethodPart part, std::vector<MethodEntry> entries) {
+  for (MethodEntry& entry : entries) entry.ticked = entry.ticked && !methodInfo(part, entry.id).slow;
+  return tickedMethods(entries);
 }
 
 std::vector<MethodText> tickedMethods(std::span<const MethodEntry> entries) {

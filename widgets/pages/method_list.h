@@ -24,10 +24,10 @@ struct MethodInfo {
   QString label;
   std::span<const Setting> settings;
   QString source;
-  bool slow = false;
+  bool slow = false;  ///< A comparison refits it less often than asked.
 };
 
-/// Every method of the registry with its defaults, all but the slow ones ticked; "none" is left out, for it is the
+/// Every method of the registry with its defaults, all but the slowest ones ticked; "none" is left out, for it is the
 /// error before.
 std::vector<MethodEntry> registeredMethods(MethodPart part);
 MethodInfo methodInfo(MethodPart part, const std::string& id);
@@ -38,6 +38,8 @@ Settings defaultSettings(std::span<const Setting> declared);
 
 /// The ticked ones as a comparison wants them.
 std::vector<MethodText> tickedMethods(std::span<const MethodEntry> entries);
+/// Those of the ticked ones that are not slow.
+std::vector<MethodText> quickMethods(MethodPart part, std::vector<MethodEntry> entries);
 MethodText methodTextOf(const std::string& id, const Settings& settings);
 
 }  // namespace fieldtrue

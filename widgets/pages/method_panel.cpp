@@ -18,7 +18,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr int kRowHeight = 26;
-constexpr int kMethodWidth = 158;
+constexpr int kMethodWidth = 168;
 constexpr int kFormHeight = 132;
 
 }  // namespace

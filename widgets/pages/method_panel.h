@@ -28,6 +28,7 @@ class MethodPanel : public QWidget {
   void choose(const QString& method);
   /// The methods the next comparison takes.
   std::vector<MethodText> ticked() const { return tickedMethods(scores_->entries()); }
+  std::vector<MethodText> tickedQuick() const { return quickMethods(part_, scores_->entries()); }
   int tickedCount() const;
 
  signals:

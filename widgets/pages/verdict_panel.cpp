@@ -14,6 +14,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr int kHistogramHeight = 170;
+constexpr int kNameWidth = 162;
 
 void clear(QLayout* layout) {
   while (QLayoutItem* item = layout->takeAt(0)) {
@@ -32,7 +33,7 @@ VerdictPanel::VerdictPanel(QWidget* parent)
       notes_(new QWidget(this)),
       notes_layout_(new QVBoxLayout(notes_)) {
   figures_layout_->setContentsMargins(0, 4, 0, 4);
-  figures_layout_->setHorizontalSpacing(12);
+  figures_layout_->setHorizontalSpacing(9);
   figures_layout_->setVerticalSpacing(4);
   figures_layout_->setColumnStretch(0, 1);
   histogram_->setObjectName(QStringLiteral("histogram"));
@@ -107,7 +108,10 @@ void VerdictPanel::addFigures(int row, const QString& name, const ErrorStats& st
     QFont font = label->font();
     font.setBold(bold);
     label->setFont(font);
-    label->setWordWrap(column == 0);
+    if (column == 0) {
+      label->setText(label->fontMetrics().elidedText(name, Qt::ElideRight, kNameWidth));
+      label->setToolTip(name);
+    }
     figures_layout_->addWidget(label, row, column, (column == 0 ? Qt::AlignLeft : Qt::AlignRight) | Qt::AlignTop);
   }
 }

@@ -31,8 +31,8 @@ namespace fieldtrue {
 namespace {
 
 constexpr int kTextSize = 12;
-constexpr double kLetter_px = 7.4;  ///< Mean width of a bold letter.
-constexpr double kMostLabelShare = 0.42;
+constexpr double kLetter_px = 6.9;  ///< Mean width of a bold letter.
+constexpr double kMostLabelShare = 0.45;
 constexpr std::size_t kFewestLetters = 8;
 constexpr double kLabelGap_px = 16.0;
 constexpr double kPick_px = 14.0;

@@ -31,6 +31,8 @@ constexpr int kMostBins = 30;
 constexpr int kTextSize = 12;
 constexpr double kBarShare = 0.86;
 constexpr double kHeadroom = 1.08;
+constexpr double kGoldenAngle = 137.508;
+constexpr double kFirstHue = 330.0;
 
 int mostCounted(const Histogram& histogram) {
   int most = 1;
@@ -54,13 +56,14 @@ void setText(vtkTextProperty* text, const QColor& color, bool bold = false) {
 
 QColor seriesColor(std::size_t series, const Theme& theme) {
   if (series == 0) return theme.dark ? QColor(0x84, 0x91, 0x9e) : QColor(0x8b, 0x97, 0xa3);
-  // Neighbours differ in lightness as well as in hue.
-  static const std::array<QRgb, 11> light = {0x0a63c2, 0x13744f, 0xc65a00, 0x8a4aa0, 0x4aa3df, 0x7d6200,
-                                             0xc2407a, 0x3b3f8f, 0x5a9a1e, 0x8c3b1e, 0x2a8f8f};
-  static const std::array<QRgb, 11> dark = {0x5aaeff, 0x4fc78f, 0xf59b4a, 0xd093e0, 0xa8dcff, 0xd8c15a,
-                                            0xff8fbd, 0x9aa0ff, 0xb4e07a, 0xe09a7a, 0x7fdede};
-  const std::size_t k = (series - 1) % light.size();
-  return QColor(theme.dark ? dark[k] : light[k]);
+  static const std::array<QRgb, 4> light = {0x0a63c2, 0x13744f, 0xc65a00, 0x8a4aa0};
+  static const std::array<QRgb, 4> dark = {0x5aaeff, 0x4fc78f, 0xf59b4a, 0xd093e0};
+  if (series <= light.size()) return QColor(theme.dark ? dark[series - 1] : light[series - 1]);
+  // The golden angle keeps any number of hues apart; neighbours differ in lightness as well.
+  const std::size_t k = series - 1 - light.size();
+  const double hue = std::fmod(kFirstHue + kGoldenAngle * static_cast<double>(k), 360.0) / 360.0;
+  const std::array<double, 3> lightness = theme.dark ? std::array{0.78, 0.62, 0.70} : std::array{0.27, 0.45, 0.36};
+  return QColor::fromHslF(static_cast<float>(hue), 0.62F, static_cast<float>(lightness[k % lightness.size()]));
 }
 
 Histogram histogramOf(const std::vector<std::vector<double>>& values_mm) {

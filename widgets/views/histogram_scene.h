@@ -23,7 +23,7 @@ struct Histogram {
 /// Bins of a round width, at most 30, from 0 to the largest value; values that are not finite are left out.
 Histogram histogramOf(const std::vector<std::vector<double>>& values_mm);
 
-/// The colour of the n-th series of every chart: 0 is before correction, then the methods; there are twelve.
+/// The colour of the n-th series of every chart: 0 is before correction, then the methods, all different.
 QColor seriesColor(std::size_t series, const Theme& theme);
 
 /// What HistogramView and renderHistogramPicture draw.

@@ -16,8 +16,10 @@ constexpr int kMargin = 12;
 constexpr int kGap = 24;
 constexpr int kBarTop = 8;
 constexpr int kBarHeight = 12;
-constexpr int kOpacityWidth = 96;
+constexpr int kOpacityWidth = 124;
 constexpr int kWidestBar = 420;
+constexpr int kNarrowestBar = 60;
+constexpr int kRoomForTicks = 200;
 
 QString number(double value) { return QString::fromStdString(shortNumber(value)); }
 
@@ -42,6 +44,16 @@ void ScaleStrip::setEnds(const QString& low_name, const QString& high_name) {
   changed();
 }
 
+void ScaleStrip::setMeaning(const QString& meaning) {
+  meaning_ = meaning;
+  changed();
+}
+
+void ScaleStrip::setVolumeMeaning(const QString& meaning) {
+  volume_meaning_ = meaning;
+  changed();
+}
+
 void ScaleStrip::setMagnification(double magnification) {
   magnification_ = magnification;
   changed();
@@ -60,9 +72,10 @@ void ScaleStrip::changed() {
 
 QString ScaleStrip::text() const {
   const QString more = exceeded_ ? tr(" and more") : QString();
-  QString words = scale_ == Scale::kMagnitude ? tr("Colours: error from 0 to %1 mm%2.").arg(number(maximum_mm_), more)
-                                              : tr("Colours: from %1 better by %3 mm to %2 better by %3 mm%4.")
-                                                    .arg(low_name_, high_name_, number(maximum_mm_), more);
+  QString words = scale_ == Scale::kMagnitude
+                      ? tr("Colours: %3 from 0 to %1 mm%2.").arg(number(maximum_mm_), more, meaning_)
+                      : tr("Colours: from %1 better by %3 mm to %2 better by %3 mm%4.")
+                            .arg(low_name_, high_name_, number(maximum_mm_), more);
   words += tr(" Arrows are drawn %1 times as long as they are.").arg(number(magnification_));
   if (opacity_)
     words += tr(" Faint arrows are uncertain: full colour up to an SD of %1 mm, faintest from %2 mm.")
@@ -73,10 +86,8 @@ QString ScaleStrip::text() const {
 QSize ScaleStrip::sizeHint() const { return {600, kHeight}; }
 QSize ScaleStrip::minimumSizeHint() const { return {280, kHeight}; }
 
-int ScaleStrip::paintColors(QPainter& painter, int left, int width) const {
+int ScaleStrip::paintColors(QPainter& painter, Scale scale, const QString& title, int left, int width) const {
   const Theme& colors = theme();
-  const bool difference = scale_ == Scale::kDifference;
-  const QString title = difference ? tr("difference (mm)") : tr("error (mm)");
   QFont bold = painter.font();
   bold.setBold(true);
   painter.setFont(bold);
@@ -86,14 +97,20 @@ int ScaleStrip::paintColors(QPainter& painter, int left, int width) const {
   bold.setBold(false);
   painter.setFont(bold);
   const int bar_left = left + title_width + 16;
-  const int bar = std::max(60, std::min(kWidestBar, width - title_width - 32));
+  const int bar = std::clamp(width - title_width - 32, kNarrowestBar, kWidestBar);
   for (int x = 0; x < bar; ++x) {
     const double share = (x + 0.5) / bar;
     painter.fillRect(bar_left + x, kBarTop, 1, kBarHeight,
-                     difference ? differenceColor(2.0 * share - 1.0) : magnitudeColor(share));
+                     scale == Scale::kDifference ? differenceColor(2.0 * share - 1.0) : magnitudeColor(share));
   }
   painter.setPen(colors.line);
   painter.drawRect(bar_left, kBarTop, bar - 1, kBarHeight - 1);
+  paintTicks(painter, scale, bar_left, bar);
+  return bar_left + bar;
+}
+
+void ScaleStrip::paintTicks(QPainter& painter, Scale scale, int bar_left, int bar) const {
+  const Theme& colors = theme();
   const auto tick = [&](double share, const QString& label) {
     const int x = bar_left + static_cast<int>(share * (bar - 1));
     painter.setPen(colors.text_muted);
@@ -101,20 +118,27 @@ int ScaleStrip::paintColors(QPainter& painter, int left, int width) const {
     painter.setPen(colors.text);
     painter.drawText(QRect(x - 60, kBarTop + kBarHeight + 3, 120, 18), Qt::AlignHCenter | Qt::AlignTop, label);
   };
-  const QString plus = exceeded_ ? QStringLiteral("+") : QString();
-  if (difference) {
-    tick(0.0, number(maximum_mm_) + plus);
-    tick(0.5, QStringLiteral("0"));
-    tick(1.0, number(maximum_mm_) + plus);
-    painter.setPen(colors.text_muted);
-    const QRect below(bar_left + 24, kBarTop + kBarHeight + 3, bar - 48, 18);
-    painter.drawText(below, Qt::AlignLeft, QStringLiteral("  ") + low_name_);
-    painter.drawText(below, Qt::AlignRight, high_name_ + QStringLiteral("  "));
-  } else {
-    for (const double value : scaleTicks(maximum_mm_))
-      tick(value / maximum_mm_, number(value) + (value == maximum_mm_ ? plus : QString()));
+  const QString end = number(maximum_mm_) + (exceeded_ ? QStringLiteral("+") : QString());
+  if (scale == Scale::kMagnitude && bar < kRoomForTicks) {
+    tick(0.0, QStringLiteral("0"));
+    tick(1.0, end);
+    return;
   }
-  return bar_left + bar;
+  if (scale == Scale::kMagnitude) {
+    for (const double value : scaleTicks(maximum_mm_))
+      tick(value / maximum_mm_, value == maximum_mm_ ? end : number(value));
+    return;
+  }
+  tick(0.0, end);
+  tick(0.5, QStringLiteral("0"));
+  tick(1.0, end);
+  const int half = bar / 2 - 36;
+  const QFontMetrics metrics = painter.fontMetrics();
+  painter.setPen(colors.text_muted);
+  painter.drawText(QRect(bar_left + 22, kBarTop + kBarHeight + 3, half, 18), Qt::AlignLeft | Qt::AlignTop,
+                   metrics.elidedText(low_name_, Qt::ElideRight, half));
+  painter.drawText(QRect(bar_left + bar - 22 - half, kBarTop + kBarHeight + 3, half, 18), Qt::AlignRight | Qt::AlignTop,
+                   metrics.elidedText(high_name_, Qt::ElideRight, half));
 }
 
 void ScaleStrip::paintOpacity(QPainter& painter, int left, int width) const {
@@ -127,7 +151,7 @@ void ScaleStrip::paintOpacity(QPainter& painter, int left, int width) const {
     painter.fillRect(left + x, kBarTop, 1, kBarHeight, color);
   }
   painter.setPen(colors.text);
-  painter.drawText(QRect(left - 10, kBarTop + kBarHeight + 3, width + 20, 18), Qt::AlignHCenter | Qt::AlignTop,
+  painter.drawText(QRect(left - 20, kBarTop + kBarHeight + 3, width + 40, 18), Qt::AlignHCenter | Qt::AlignTop,
                    tr("SD %1 to %2 mm").arg(number(opacity_->opaque_mm), number(opacity_->faint_mm)));
 }
 
@@ -140,7 +164,12 @@ void ScaleStrip::paintEvent(QPaintEvent*) {
   painter.setPen(colors.text);
   painter.drawText(QRect(right, kBarTop - 3, arrows_width, kBarHeight + 6), Qt::AlignVCenter, arrows);
   const int opacity_room = opacity_ ? kOpacityWidth + kGap + 16 : 0;
-  const int bar_end = paintColors(painter, kMargin, right - kGap - opacity_room - kMargin);
+  const int room = right - kGap - opacity_room - kMargin;
+  const QString title = scale_ == Scale::kDifference ? tr("difference (mm)") : tr("%1 (mm)").arg(meaning_);
+  const bool two = scale_ == Scale::kDifference && !volume_meaning_.isEmpty();
+  const int bar_end = paintColors(painter, scale_, title, kMargin, two ? room / 2 : room);
+  if (two)
+    paintColors(painter, Scale::kMagnitude, tr("%1 (mm)").arg(volume_meaning_), bar_end + kGap, room - bar_end - kGap);
   if (opacity_) paintOpacity(painter, bar_end + kGap + 8, kOpacityWidth);
 }
 

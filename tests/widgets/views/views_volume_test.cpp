@@ -7,11 +7,13 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "tests/widgets/views/view_test.h"
 #include "widgets/views/camera.h"
 #include "widgets/views/curve_scene.h"
 #include "widgets/views/field_scene.h"
+#include "widgets/views/histogram_scene.h"
 #include "widgets/views/offscreen_gl.h"
 #include "widgets/views/volume_field.h"
 
@@ -165,11 +167,48 @@ class ViewsVolumeTest : public QObject {
     QVERIFY(uncertain != pictureFromAbove({}, std::nullopt, std::nullopt, uniformField({0, 0, 0})));
   }
 
+  void holesAndFoldedCellsAreDrawn() {
+    const QSize size(600, 600);
+    const auto picture = [&](const std::vector<SceneCell>& holes, const std::vector<SceneCell>& folds) {
+      const auto build = [&](vtkRenderer* renderer) {
+        auto scene = std::make_shared<FieldScene>(renderer);
+        scene->setField(uniformField({0.0, 0.0, 0.0}));
+        scene->setHoles(holes);
+        scene->setFolds(folds);
+        scene->update();
+        apply(presetPose(CameraPreset::kTop, scene->space(), ViewFrame{600, 600, 60, 120, 30, 50}),
+              renderer->GetActiveCamera());
+        scene->faceCamera();
+        renderer->ResetCameraClippingRange();
+        return scene;
+      };
+      return drawOffscreen(size, 72, build).value_or(QImage());
+    };
+    const QImage none = picture({}, {});
+    if (none.isNull()) QSKIP("no pictures here");
+    const QColor amber = Theme::of(false).attention;
+    QCOMPARE(countColor(none, amber, 3), 0);
+    const SceneCell cell{Eigen::Vector3d(0.7, 0.0, 0.3), 0.3};
+    QVERIFY2(countColor(picture({}, {cell}), amber, 3) > 100, "edges and the name of a folded cell");
+    const QImage hole = picture({{cell.center_m, 0.15}}, {});
+    QVERIFY(hole != none);
+    QCOMPARE(countColor(hole, amber, 3), 0);  // Translucent: the scene shines through everywhere.
+  }
+
   void differencesDiverge() {
     QVERIFY(differenceColor(-1.0).blue() > differenceColor(-1.0).red());
     QVERIFY(differenceColor(1.0).red() > differenceColor(1.0).blue());
     QCOMPARE(differenceColor(0.0).red(), differenceColor(0.0).blue());
     QCOMPARE(differenceColor(-3.0), differenceColor(-1.0));
+  }
+
+  void methodsHaveColorsOfTheirOwn() {
+    for (const bool dark : {false, true}) {
+      std::set<QRgb> colors;
+      for (std::size_t series = 0; series < 32; ++series) colors.insert(seriesColor(series, Theme::of(dark)).rgb());
+      QCOMPARE(colors.size(), std::size_t{32});
+      QCOMPARE(seriesColor(1, Theme::of(dark)), Theme::of(dark).accent);
+    }
   }
 
   void logTicksAreRound() {
