@@ -80,6 +80,7 @@ void ComparePage::connectParts() {
   connect(&workbench_, &Workbench::tableChanged, this, &ComparePage::onTable);
   connect(&workbench_, &Workbench::comparisonChanged, this, &ComparePage::onComparison);
   connect(&workbench_, &Workbench::correctorChanged, this, &ComparePage::onCorrector);
+  connect(&workbench_, &Workbench::fittingChanged, this, &ComparePage::showChoice);
   connect(&workbench_, &Workbench::comparisonProgress, this, &ComparePage::onProgress);
   connect(&workbench_, &Workbench::closing, this, [this] {
     fitted_methods_->stop();
@@ -295,7 +296,8 @@ void ComparePage::showHeadline(const Comparison& comparison) {
 }
 
 void ComparePage::showChoice() {
-  fit_->setText(tr("Fit these methods"));
+  fit_->setText(workbench_.isFitting() ? tr("Fitting...") : tr("Fit these methods"));
+  fit_->setEnabled(!workbench_.isFitting());
   fit_->setToolTip(tr("%1 for position, %2 for orientation").arg(position_->label(), rotation_->label()));
   if (!workbench_.corrector())
     fitted_->setText(tr("%1 for position, %2 for orientation.").arg(position_->label(), rotation_->label()));

@@ -67,6 +67,7 @@ QTableWidget* PlacePanel::makeTable(const QString& name, const QString& title, c
   table->setObjectName(name);
   table->setHorizontalHeaderLabels({title, unit});
   table->horizontalHeaderItem(0)->setTextAlignment(Qt::AlignLeft | Qt::AlignVCenter);
+  table->horizontalHeaderItem(1)->setTextAlignment(Qt::AlignRight | Qt::AlignVCenter);
   table->horizontalHeader()->setSectionResizeMode(0, QHeaderView::Stretch);
   table->horizontalHeader()->setSectionResizeMode(1, QHeaderView::ResizeToContents);
   table->verticalHeader()->hide();

@@ -42,7 +42,8 @@ VolumeStore::Sampling VolumeStore::samplingOf(const VolumeKey& key, QString* why
   // Before correction nothing is moved: there is no fit to ask.
   if (!key.a || (key.difference && !key.b)) {
     *why = key.difference ? tr("A volume difference needs two methods; before correction there is nothing to subtract.")
-                          : tr("Before correction nothing is moved.");
+           : key.quantity == VolumeQuantity::kUncertainty ? tr("Before correction no method states an uncertainty.")
+                                                          : tr("Before correction nothing is moved.");
     return {};
   }
   const auto a = fitted_.get(*key.a);

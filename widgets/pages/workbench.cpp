@@ -55,6 +55,7 @@ Workbench::Workbench(QObject* parent) : QObject(parent) {
 
 Workbench::~Workbench() {
   emit closing();
+  fit_stop_.request_stop();
   comparison_stop_.request_stop();
   QMetaObject::invokeMethod(controller_, &AcquisitionController::closeSession, Qt::BlockingQueuedConnection);
   QMetaObject::invokeMethod(controller_, &AcquisitionController::disconnectDevice, Qt::BlockingQueuedConnection);
@@ -228,9 +229,20 @@ void Workbench::stopComparing() {
 }
 
 void Workbench::fit(const CorrectorChoice& choice, AlignMode align) {
+  if (fitting_) return;
+  fitting_ = true;
+  emit fittingChanged();
+  RunControl control;
+  control.parallel_for = threadedFor(0);
+  control.stop = fit_stop_.get_token();
   runInBackground(
-      this, [table = table_, choice, align] { return Corrector::fit(fitRows(table), table.metadata, choice, align); },
+      this,
+      [table = table_, choice, align, control] {
+        return Corrector::fit(fitRows(table), table.metadata, choice, align, control);
+      },
       [this](Result<Corrector> result) {
+        fitting_ = false;
+        emit fittingChanged();
         if (!result) {
           showMessage({QString::fromStdString(result.error().message), Severity::kAttention, {}, {}});
           return;

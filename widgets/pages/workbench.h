@@ -48,6 +48,7 @@ class Workbench : public QObject {
   /// Whether the calibration was fitted on the rows the session has now.
   bool correctorIsCurrent() const;
   bool isComparing() const { return comparing_; }
+  bool isFitting() const { return fitting_; }
 
   // Each of these answers by signal.
   void startDemonstration();
@@ -66,7 +67,7 @@ class Workbench : public QObject {
   /// Scores the methods on the session's table in the background; an earlier run is stopped.
   void compare(const ComparisonOptions& options);
   void stopComparing();
-  /// Fits the chosen methods on every row of role fit and makes the result the session's calibration.
+  /// Fits the chosen methods on every row of role fit and makes the result the session's calibration; one at a time.
   void fit(const CorrectorChoice& choice, AlignMode align);
 
   void goToStep(Step step);
@@ -86,6 +87,7 @@ class Workbench : public QObject {
   void comparisonChanged();  ///< A comparison started, ended or failed.
   void comparisonProgress(double fraction);
   void correctorChanged();
+  void fittingChanged();  ///< A fit of the session's calibration began or ended.
   void stepRequested(fieldtrue::Step step);
   void messageShown(const fieldtrue::Message& message);
   void closing();  ///< The window goes: long work of the pages must stop.
@@ -113,6 +115,8 @@ class Workbench : public QObject {
   std::stop_source comparison_stop_;
   int comparison_run_ = 0;
   bool comparing_ = false;
+  std::stop_source fit_stop_;
+  bool fitting_ = false;
   bool start_when_connected_ = false;
 };
 
