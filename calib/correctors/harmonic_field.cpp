@@ -113,7 +113,7 @@ Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Se
 
 FieldPosterior posteriorFrom(const nlohmann::json& parameters, const std::vector<FieldSource>& sources) {
   FieldPosterior posterior;
-  for (const FieldSource& source : sources) posterior.source_at_m.push_back(source.at_m);
+  for (const FieldSource& source : sources) posterior.sources.emplace_back(source.at_m);
   posterior.about_m = vectorFrom(parameters.at("turned_about_m"));
   const auto packed = parameters.at("covariance_root").get<std::vector<double>>();
   const auto n = kPerSource * static_cast<Eigen::Index>(sources.size()) + 6;

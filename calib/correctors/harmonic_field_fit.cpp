@@ -17,8 +17,7 @@
 namespace fieldtrue {
 namespace {
 
-constexpr int kMostSteps = 12;
-constexpr int kLastRefinement = 5;           ///< Step after which the candidates stay where they are.
+constexpr int kMostSteps = 10;
 constexpr std::size_t kCandidatesKept = 90;  ///< Of the first step's, by what each would still add.
 
 /// The linear model of one step, rows whitened, unknowns scaled so that each source moves the places by about its
@@ -60,7 +59,7 @@ class Fitter {
       if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The harmonic field's fit was stopped");
       const double moved_m = improve(linearise(step == 0 ? firstRows() : rowsAtField()), step);
       control_.progress(static_cast<double>(step + 1) / kMostSteps);
-      if (step > 0 && moved_m < 0.02 * jig_sd_m_) break;
+      if (step > 0 && moved_m < 0.04 * jig_sd_m_) break;
     }
     if (misfit_m2_ > without_sources_m2) forgetSources();
     return HarmonicFit{DisturbedField(sources()), field_from_truth_, posterior()};
@@ -122,10 +121,11 @@ class Fitter {
     linear.scale.resize(sites_.size());
     control_.parallel_for(sites_.size(), [&](std::size_t s) {
       auto columns = linear.design.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(s));
+      const SourceBasis source(sites_[s].at_m);
       double sum = 0.0;
       for (Eigen::Index i = 0; i < n; ++i) {
         const PlaceRow& row = rows[static_cast<std::size_t>(i)];
-        const Eigen::Matrix<double, 3, kPerSource> effect = effectOfSource(row.derivative, sites_[s].at_m);
+        const Eigen::Matrix<double, 3, kPerSource> effect = effectOfSource(row.derivative, source);
         sum += effect.squaredNorm();
         columns.middleRows<3>(3 * i).noalias() = row.whitening * effect;
       }
@@ -284,17 +284,22 @@ class Fitter {
     noise_factor_ = std::max(noise_factor_, misfit.mean_square_m2 / (jig_sd_m_ * jig_sd_m_));
   }
 
-  /// Candidates of the next step: those chosen, their closer neighbours, and the rest; after the first steps, when the
-  /// places are known to stand where they are believed, only those of the rest that offered most.
+  /// Candidates of the next step: those chosen, their closer neighbours, and of the rest those that offered most; all
+  /// of a new lattice when the places turn out to stand elsewhere.
   void refine(const Eigen::VectorXd& gain, int step) {
+    const Box before = box_;
     findBox();
+    constexpr double kMoved = 0.02;  // Of the extent: by so much a lattice may be amiss.
+    const bool has_moved =
+        (box_.low_m - before.low_m).norm() + (box_.high_m - before.high_m).norm() > kMoved * box_.extent_m();
     std::vector<Site> next;
     for (const Eigen::Index site : chosen_.sites) next.push_back(sites_[static_cast<std::size_t>(site)]);
-    for (std::size_t k = 0; k < chosen_.sites.size() && step < kLastRefinement; ++k) {
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) {
       for (const Site& site : refinedSites(next[k], box_)) next.push_back(site);
       next[k].reach_m *= 0.5;
     }
-    for (const Site& site : step == 0 ? candidateSites(box_) : bestOthers(gain)) next.push_back(site);
+    const bool is_new_lattice = step == 0 && has_moved;
+    for (const Site& site : is_new_lattice ? candidateSites(box_) : bestOthers(gain)) next.push_back(site);
     sites_ = std::move(next);
     std::iota(chosen_.sites.begin(), chosen_.sites.end(), Eigen::Index{0});
   }
@@ -323,9 +328,9 @@ class Fitter {
   }
 
   FieldPosterior posterior() const {
-    std::vector<Eigen::Vector3d> source_at_m;
-    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) source_at_m.push_back(placeOf_m(k));
-    return posteriorOf(rowsAtField(), source_at_m, chosen_.variances, center_m_, noise_factor_);
+    std::vector<SourceBasis> bases;
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) bases.emplace_back(placeOf_m(k));
+    return posteriorOf(rowsAtField(), bases, chosen_.variances, center_m_, noise_factor_);
   }
 
   const FitData& data_;

@@ -32,23 +32,29 @@ Eigen::Matrix3d excitationAt(const Eigen::Vector3d& at_m) {
   return at_m.isZero() ? Eigen::Matrix3d::Identity() : dipoleField(at_m, 1.0);
 }
 
-Eigen::MatrixXd allEffects(const PlaceDerivative& place, std::span<const Eigen::Vector3d> source_at_m,
+Eigen::MatrixXd allEffects(const PlaceDerivative& place, std::span<const SourceBasis> sources,
                            const Eigen::Vector3d& about_m) {
-  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(source_at_m.size());
+  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(sources.size());
   Eigen::MatrixXd effects(3, n_amplitudes + 6);
-  for (std::size_t k = 0; k < source_at_m.size(); ++k)
-    effects.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)) = effectOfSource(place, source_at_m[k]);
+  for (std::size_t k = 0; k < sources.size(); ++k)
+    effects.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)) = effectOfSource(place, sources[k]);
   effects.rightCols<6>() = effectOfMotion(place.at_m, about_m);
   return effects;
 }
 
 }  // namespace
 
+SourceBasis::SourceBasis(const Eigen::Vector3d& source_at_m) : at_m(source_at_m) {
+  const Eigen::Matrix3d excitation = excitationAt(at_m);
+  for (Eigen::Index e = 0; e < kPerSource; ++e) {
+    const Eigen::Matrix3d response = symmetricTensors()[static_cast<std::size_t>(e)] * excitation;
+    responses.col(e) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(response.data());
+  }
+}
+
 FieldSource sourceOf(const Eigen::Vector3d& at_m, const TensorAmplitudes& amplitudes) {
-  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();
-  for (Eigen::Index e = 0; e < kPerSource; ++e)
-    tensor += amplitudes[e] * symmetricTensors()[static_cast<std::size_t>(e)];
-  return {at_m, tensor * excitationAt(at_m)};
+  const Eigen::Matrix<double, 9, 1> response = SourceBasis(at_m).responses * amplitudes;
+  return {at_m, Eigen::Map<const Eigen::Matrix3d>(response.data())};
 }
 
 PlaceDerivative PlaceDerivative::of(const DisturbedField& field, const Eigen::Vector3d& p_tracked_m) {
@@ -59,15 +65,13 @@ PlaceDerivative PlaceDerivative::of(const DisturbedField& field, const Eigen::Ve
   return place;
 }
 
-Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place, const Eigen::Vector3d& source_at_m) {
-  const Eigen::Matrix3d from_source = dipoleField(place.at_m - source_at_m, 1.0);
-  const Eigen::Matrix3d excitation = excitationAt(source_at_m);
-  Eigen::Matrix<double, 3, kPerSource> effect;
-  for (Eigen::Index e = 0; e < kPerSource; ++e) {
-    const Eigen::Matrix3d field = from_source * symmetricTensors()[static_cast<std::size_t>(e)] * excitation;
-    effect.col(e) = place.by_field * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(field.data());
-  }
-  return effect;
+Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place, const SourceBasis& source) {
+  // The field is G(p - at) response: G first, for it is the same for all six responses.
+  const Eigen::Matrix3d from_source = dipoleField(place.at_m - source.at_m, 1.0);
+  Eigen::Matrix<double, 3, 9> by_response;
+  for (Eigen::Index column = 0; column < 3; ++column)
+    by_response.middleCols<3>(3 * column).noalias() = place.by_field.middleCols<3>(3 * column) * from_source;
+  return by_response * source.responses;
 }
 
 Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eigen::Vector3d& about_m) {
@@ -80,18 +84,18 @@ Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eig
 }
 
 double FieldPosterior::sd_m(const PlaceDerivative& place) const {
-  const Eigen::MatrixXd effects = allEffects(place, source_at_m, about_m);
+  const Eigen::MatrixXd effects = allEffects(place, sources, about_m);
   return (effects * root.triangularView<Eigen::Upper>()).norm();
 }
 
-FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<Eigen::Vector3d>& source_at_m,
+FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<SourceBasis>& sources,
                            const std::vector<double>& prior_variance, const Eigen::Vector3d& about_m,
                            double noise_factor) {
-  FT_CHECK(source_at_m.size() == prior_variance.size());
-  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(source_at_m.size());
+  FT_CHECK(sources.size() == prior_variance.size());
+  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(sources.size());
   Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(n_amplitudes + 6, n_amplitudes + 6);
   for (const PlaceRow& row : rows) {
-    const Eigen::MatrixXd effects = row.whitening * allEffects(row.derivative, source_at_m, about_m);
+    const Eigen::MatrixXd effects = row.whitening * allEffects(row.derivative, sources, about_m);
     precision.noalias() += effects.transpose() * effects / noise_factor;
   }
   for (std::size_t k = 0; k < prior_variance.size(); ++k)
@@ -102,7 +106,7 @@ FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<Eig
   Eigen::MatrixXd scaled = scale.asDiagonal() * precision * scale.asDiagonal();
   scaled.diagonal().array() += 1e-12;
   const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
-  FieldPosterior posterior{source_at_m, about_m, Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())};
+  FieldPosterior posterior{sources, about_m, Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())};
   llt.matrixU().solveInPlace(posterior.root);
   posterior.root = scale.asDiagonal() * posterior.root;
   return posterior;

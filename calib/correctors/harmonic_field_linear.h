@@ -26,15 +26,24 @@ struct PlaceDerivative {
   static PlaceDerivative of(const DisturbedField& field, const Eigen::Vector3d& p_tracked_m);
 };
 
+/// A place where a source may stand, with the responses of its six amplitudes (columns, each a 3x3 matrix
+/// column-major).
+struct SourceBasis {
+  Eigen::Vector3d at_m;
+  Eigen::Matrix<double, 9, kPerSource> responses;
+
+  explicit SourceBasis(const Eigen::Vector3d& source_at_m);
+};
+
 /// d corrected / d amplitudes of a source at one place.
-Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place, const Eigen::Vector3d& source_at_m);
+Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place, const SourceBasis& source);
 
 /// d corrected / d (shift, turn about a point) of a motion done to the truth instead.
 Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eigen::Vector3d& about_m);
 
 /// Joint posterior of the amplitudes of some sources and of the rigid motion, for the SD of corrected positions.
 struct FieldPosterior {
-  std::vector<Eigen::Vector3d> source_at_m;
+  std::vector<SourceBasis> sources;
   Eigen::Vector3d about_m = Eigen::Vector3d::Zero();  ///< Of the motion's turn.
   Eigen::MatrixXd root;                               ///< Upper triangular W, covariance = W W^T.
 
@@ -51,7 +60,7 @@ struct PlaceRow {
 
 /// @param prior_variance of each source's amplitudes
 /// @param noise_factor variance of the noise over what the rows' whitening says
-FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<Eigen::Vector3d>& source_at_m,
+FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<SourceBasis>& sources,
                            const std::vector<double>& prior_variance, const Eigen::Vector3d& about_m,
                            double noise_factor);
 
