@@ -38,6 +38,15 @@ struct Chosen {
   std::vector<double> variances;  ///< Prior variance of each tensor.
 };
 
+/// `calib` starts no thread; where OpenBLAS is built with threads it must be told, once.
+void useOneThread() {
+  static const bool kTold = [] {
+    openblas_set_num_threads(1);
+    return true;
+  }();
+  static_cast<void>(kTold);
+}
+
 class Fitter {
  public:
   Fitter(const FitData& data, const HarmonicOptions& options, const RunControl& control, const Pose& field_from_truth)
@@ -151,6 +160,7 @@ class Fitter {
   }
 
   static GroupedSystem normalEquations(const Linearisation& linear, const Eigen::MatrixXd& rigid_basis, double unit_m) {
+    useOneThread();
     GroupedSystem system;
     const Eigen::VectorXd y = linear.y - rigid_basis * (rigid_basis.transpose() * linear.y);
     const Eigen::MatrixXd by_rigid = linear.design.transpose() * rigid_basis;
