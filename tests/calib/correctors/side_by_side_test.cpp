@@ -1,4 +1,5 @@
 #include <QtTest>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "tests/calib/correctors/fit_fixtures.h"
