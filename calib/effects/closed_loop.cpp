@@ -43,7 +43,7 @@ class ClosedLoop final : public CouplingDistortion {
   Eigen::Vector3d current_m_;  ///< Induced by each transmitter coil, for C = 1 [1/m^2].
 };
 
-Result<std::unique_ptr<CouplingDistortion>> make(const nlohmann::json& parameters) {
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
   const Eigen::Vector3d center_m = vectorOf(parameters, "center_m");
   const Eigen::Vector3d normal = vectorOf(parameters, "normal");
   const double radius_m = scalarOf(parameters, "radius_m");

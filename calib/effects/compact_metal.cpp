@@ -46,7 +46,7 @@ Eigen::Matrix3d matrixOf(const nlohmann::json& list) {
   return matrix;
 }
 
-Result<std::unique_ptr<CouplingDistortion>> make(const nlohmann::json& parameters) {
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
   const Eigen::Vector3d center_m = vectorOf(parameters, "center_m");
   double radius_m = scalarOf(parameters, "radius_m");
   Eigen::Matrix3d polarizability_m3;

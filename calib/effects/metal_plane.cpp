@@ -28,7 +28,7 @@ class MetalPlane final : public CouplingDistortion {
   Eigen::Matrix3d image_;  ///< Moment of the image per moment of the transmitter.
 };
 
-Result<std::unique_ptr<CouplingDistortion>> make(const nlohmann::json& parameters) {
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
   const Eigen::Vector3d toward = vectorOf(parameters, "toward");
   if (toward.norm() < 1e-6) {
     return fail(ErrorCode::kBadInput, "metal_plane: toward is " + textOf(toward) +

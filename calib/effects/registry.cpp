@@ -138,12 +138,13 @@ Result<nlohmann::json> resolveEffectParameters(const Effect& effect, const nlohm
   return resolved;
 }
 
-Result<std::unique_ptr<CouplingDistortion>> makeDistortion(std::string_view id, const nlohmann::json& given) {
+Result<std::unique_ptr<PhysicalEffect>> makeEffect(std::string_view id, const nlohmann::json& given,
+                                                   const Excitation& excitation) {
   const Result<const Effect*> effect = findEffect(id);
   if (!effect) return tl::unexpected<Error>(effect.error());
   const Result<nlohmann::json> parameters = resolveEffectParameters(**effect, given);
   if (!parameters) return tl::unexpected<Error>(parameters.error());
-  return (*effect)->make(*parameters);
+  return (*effect)->make(*parameters, excitation);
 }
 
 nlohmann::json toJson(std::span<const Effect> rows) {

@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "calib/core/error.h"
+#include "calib/effects/effect_fit.h"
 #include "calib/field/coupling.h"
+#include "calib/field/effect.h"
 
 namespace fieldtrue {
 
@@ -16,7 +18,7 @@ namespace fieldtrue {
 struct EffectParameter {
   std::string name;  ///< With its unit: `center_m`.
   std::string unit;
-  std::string shape;             ///< "scalar", "vector3", "matrix3" (row-major, symmetric), "text".
+  std::string shape;             ///< "scalar", "vector3", "matrix3" (row-major, symmetric), "text", "list".
   nlohmann::json default_value;  ///< Null = not given; null is then also accepted in a file.
   double min = 0.0;              ///< Of each component; 0 and 0 = not bounded.
   double max = 0.0;
@@ -30,8 +32,12 @@ struct Effect {
   std::string label;
   std::string source;
   std::vector<EffectParameter> parameters;
-  /// Builds the distortion from resolved parameters. @error kBadInput for parameters that make no sense together
-  Result<std::unique_ptr<CouplingDistortion>> (*make)(const nlohmann::json& parameters) = nullptr;
+  /// Builds the effect from resolved parameters. @error kBadInput for parameters that make no sense together
+  Result<std::unique_ptr<PhysicalEffect>> (*make)(const nlohmann::json& parameters,
+                                                  const Excitation& excitation) = nullptr;
+  /// The ways to fit it to a table of this design, simplest first; null for what only samples show. A way whose
+  /// parameters the design cannot show at all (time without times, a lever arm with one orientation) is left out.
+  std::vector<std::unique_ptr<EffectFit>> (*fits)(const FitDesign& design) = nullptr;
 };
 
 std::span<const Effect> effects();
@@ -43,7 +49,8 @@ Result<const Effect*> findEffect(std::string_view id);
 Result<nlohmann::json> resolveEffectParameters(const Effect& effect, const nlohmann::json& given);
 /// Finds, resolves and builds.
 /// @error kBadInput as the steps it takes
-Result<std::unique_ptr<CouplingDistortion>> makeDistortion(std::string_view id, const nlohmann::json& given);
+Result<std::unique_ptr<PhysicalEffect>> makeEffect(std::string_view id, const nlohmann::json& given,
+                                                   const Excitation& excitation = {});
 nlohmann::json toJson(std::span<const Effect> effects);
 
 }  // namespace fieldtrue

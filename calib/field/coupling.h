@@ -13,19 +13,6 @@ namespace fieldtrue {
 /// @source Raab 1979; Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709
 Eigen::Matrix3d dipoleField(const Eigen::Vector3d& p_m, double dipole_constant_m3);
 
-/// What a room does to the field at the sensor. Undisturbed G is given so that gains can scale it.
-class CouplingDistortion {
- public:
-  virtual ~CouplingDistortion() = default;
-  /// Change of the 3x3 field matrix at the sensor, tracker frame (rows: field components, columns: transmitter coils).
-  virtual Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
-                                      double time_s) const = 0;
-  /// Whether a sensor there stands in the open. False inside metal or behind a plane: no signal arrives and
-  /// `fieldChange` does not hold.
-  /// @param p_sensor_m tracker frame [m]
-  virtual bool admits([[maybe_unused]] const Eigen::Vector3d& p_sensor_m) const { return true; }
-};
-
 /// The nine couplings S = R^T G: rows receiver coils, columns transmitter coils.
 /// @param field G and what was added to it, tracker frame
 Eigen::Matrix3d couplings(const Eigen::Matrix3d& field, const Eigen::Quaterniond& tracker_from_sensor);

@@ -34,7 +34,7 @@ Result<TrackerPhysics> TrackerPhysics::make(const Scene& scene, std::uint64_t se
   physics.scene_ = scene;
   physics.limits_ = {scene.tracker.nearest_range_m, scene.tracker.farthest_range_m};
   for (std::size_t i = 0; i < scene.effects.size(); ++i) {
-    auto distortion = makeDistortion(scene.effects[i].id, scene.effects[i].parameters);
+    auto distortion = makeEffect(scene.effects[i].id, scene.effects[i].parameters);
     if (!distortion) {
       return fail(distortion.error().code,
                   "Scene " + scene.name + ", effect " + std::to_string(i + 1) + ": " + distortion.error().message);
@@ -62,7 +62,7 @@ tl::expected<PoseSolution, SolveError> TrackerPhysics::solve(const Pose& tracker
   Eigen::Matrix3d field = dipoleField(p_m, C);
   for (const auto& distortion : distortions_) {
     if (!distortion->admits(p_m)) return tl::make_unexpected(SolveError::kTooWeak);
-    field += distortion->fieldChange(p_m, C, time_s);
+    field += C * distortion->at({.tracker_from_sensor = tracker_from_sensor, .time_s = time_s}).field_per_m3;
   }
   return solvePose(couplings(field, tracker_from_sensor.orientation) + noise, C, p_m, limits_);
 }

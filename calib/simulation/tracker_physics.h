@@ -9,6 +9,7 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/field/coupling.h"
+#include "calib/field/effect.h"
 #include "calib/field/coupling_noise.h"
 #include "calib/field/pose_solver.h"
 #include "calib/simulation/scene.h"
@@ -48,7 +49,7 @@ class TrackerPhysics {
   Scene scene_;
   Pose tracker_from_reference_;
   SolverLimits limits_;
-  std::vector<std::unique_ptr<CouplingDistortion>> distortions_;
+  std::vector<std::unique_ptr<PhysicalEffect>> distortions_;
 };
 
 /// What the random streams of one seed are for.

@@ -144,13 +144,13 @@ void ClosedLoopTest::leavesNoRoomInTheWire() {
 }
 
 void ClosedLoopTest::refusesWhatMakesNoSense() {
-  const auto flat = makeDistortion("closed_loop", {{"normal", {0.0, 0.0, 0.0}}});
+  const auto flat = makeEffect("closed_loop", {{"normal", {0.0, 0.0, 0.0}}});
   QVERIFY(!flat && flat.error().code == ErrorCode::kBadInput);
   FT_VERIFY_MATCH(holdsAll(flat.error().message, {"closed_loop", "normal"}));
-  const auto thick = makeDistortion("closed_loop", {{"radius_m", 0.1}, {"wire_radius_m", 0.05}});
+  const auto thick = makeEffect("closed_loop", {{"radius_m", 0.1}, {"wire_radius_m", 0.05}});
   QVERIFY(!thick && thick.error().code == ErrorCode::kBadInput);
   FT_VERIFY_MATCH(holdsAll(thick.error().message, {"wire_radius_m", "0.05", "0.1"}));
-  const auto around = makeDistortion("closed_loop", {{"center_m", {0.3, 0.0, 0.0}}, {"radius_m", 0.3}});
+  const auto around = makeEffect("closed_loop", {{"center_m", {0.3, 0.0, 0.0}}, {"radius_m", 0.3}});
   QVERIFY(!around && around.error().code == ErrorCode::kBadInput);
   FT_VERIFY_MATCH(holdsAll(around.error().message, {"transmitter", "wire"}));
 }

@@ -192,7 +192,7 @@ void CompactMetalTest::leavesNoRoomInside() {
 }
 
 void CompactMetalTest::refusesATransmitterInside() {
-  const auto metal = makeDistortion("compact_metal", {{"center_m", {0.1, 0.0, 0.0}}, {"radius_m", 0.2}});
+  const auto metal = makeEffect("compact_metal", {{"center_m", {0.1, 0.0, 0.0}}, {"radius_m", 0.2}});
   QVERIFY(!metal.has_value());
   FT_VERIFY_MATCH(testing::holdsAll(metal.error().message, {"compact_metal", "center_m", "(0.1, 0, 0)", "0.2 m"}));
 }

@@ -11,9 +11,9 @@ namespace fieldtrue::testing {
 
 /// The distortion of an effect, or the test's abort when it cannot be made.
 inline std::unique_ptr<CouplingDistortion> made(const std::string& id, const nlohmann::json& parameters) {
-  auto distortion = makeDistortion(id, parameters);
-  if (!distortion) throw std::runtime_error(distortion.error().message);
-  return std::move(*distortion);
+  auto effect = makeEffect(id, parameters);
+  if (!effect) throw std::runtime_error(effect.error().message);
+  return std::unique_ptr<CouplingDistortion>(&dynamic_cast<CouplingDistortion&>(*effect->release()));
 }
 
 /// What a tracker at the origin makes of a sensor with the identity orientation under one distortion, C = 1.

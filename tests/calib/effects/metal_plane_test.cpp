@@ -156,7 +156,7 @@ void MetalPlaneTest::admitsItsOwnSideOnly() {
 }
 
 void MetalPlaneTest::refusesNoDirection() {
-  const auto plane = makeDistortion("metal_plane", {{"toward", {0.0, 0.0, 0.0}}});
+  const auto plane = makeEffect("metal_plane", {{"toward", {0.0, 0.0, 0.0}}});
   QVERIFY(!plane.has_value());
   FT_VERIFY_MATCH(testing::holdsAll(plane.error().message, {"metal_plane", "toward", "(0, 0, 0)"}));
 }

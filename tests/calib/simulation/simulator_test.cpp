@@ -94,9 +94,10 @@ void SimulatorTest::addsItsEffects() {
   scene.effects = {{"metal_plane", floor}, {"compact_metal", body}};
   const Pose truth{{1.4, 0.2, 0.3}, RandomGeometry(3).rotation()};
   const Eigen::Vector3d& p_m = truth.position_m;
-  const Eigen::Matrix3d field = dipoleField(p_m, 1.0) +
-                                makeDistortion("metal_plane", floor).value()->fieldChange(p_m, 1.0, 0.0) +
-                                makeDistortion("compact_metal", body).value()->fieldChange(p_m, 1.0, 0.0);
+  const Eigen::Matrix3d field =
+      dipoleField(p_m, 1.0) +
+      dynamic_cast<const CouplingDistortion&>(*makeEffect("metal_plane", floor).value()).fieldChange(p_m, 1.0, 0.0) +
+      dynamic_cast<const CouplingDistortion&>(*makeEffect("compact_metal", body).value()).fieldChange(p_m, 1.0, 0.0);
   const Pose expected = solvePose(couplings(field, truth.orientation), 1.0, p_m)->tracker_from_sensor;
   const Pose seen = simulatorOf(scene).measureExactly(truth, 0.0).tracker_from_sensor;
   FT_VERIFY_MATCH(near(seen, expected, 1e-12, 1e-12));

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "calib/core/calibration_table.h"
+#include "calib/core/error.h"
+#include "calib/core/run_control.h"
+#include "calib/gap/gap_report.h"
+#include "calib/simulation/scene.h"
+
+namespace fieldtrue {
+
+struct DiagnosisOptions {
+  int most_effects = 4;
+  std::uint64_t seed = 1;  ///< Of the bootstrap.
+};
+
+/// Where a recording differs from what the scene's simulator would have recorded, which unmodelled effect causes it,
+/// and how far the gap shrinks once it is added.
+/// @param samples the raw readings of the table's rows; null = none
+/// @param scene what the simulator believes; null = an ideal tracker in free space
+/// @error kTooFewNodes below 12 usable places; kBadInput for a row that is not finite; kCancelled
+Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const Scene* scene,
+                           const DiagnosisOptions& options = {}, const RunControl& control = {});
+
+/// The scene with the selected effects of a report added; the transmitter's pose and signal effects are taken over too.
+Scene updatedScene(const Scene& scene, const GapReport& report);
+
+/// Which effects a planned grid can tell apart, before a day is spent on it.
+/// @param scene the tracker, its place in the rig's frame and the tolerances; null = the default tracker one pitch
+/// behind the middle of the grid's first face
+/// @error kTooFewNodes; kCancelled
+Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const Scene* scene, const RunControl& control = {});
+
+}  // namespace fieldtrue
