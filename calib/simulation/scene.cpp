@@ -109,7 +109,7 @@ Result<EffectInstance> effectFrom(const nlohmann::json& json, const std::string&
   if (!effect) return located(effect.error());
   Result<nlohmann::json> parameters = resolveEffectParameters(**effect, given);
   if (!parameters) return located(parameters.error());
-  if (const auto distortion = (*effect)->make(*parameters); !distortion) return located(distortion.error());
+  if (const auto distortion = (*effect)->make(*parameters, {}); !distortion) return located(distortion.error());
   instance.parameters = std::move(*parameters);
   return instance;
 }
