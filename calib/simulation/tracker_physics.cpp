@@ -59,10 +59,11 @@ tl::expected<PoseSolution, SolveError> TrackerPhysics::solve(const Pose& tracker
                                                              const Eigen::Matrix3d& noise) const {
   const Eigen::Vector3d& p_m = tracker_from_sensor.position_m;
   const double C = scene_.tracker.dipole_constant_m3;
+  const SensorSetting setting{tracker_from_sensor, tracker_from_reference_, std::nullopt, time_s};
   Eigen::Matrix3d field = dipoleField(p_m, C);
   for (const auto& distortion : distortions_) {
     if (!distortion->admits(p_m)) return tl::make_unexpected(SolveError::kTooWeak);
-    field += C * distortion->at({.tracker_from_sensor = tracker_from_sensor, .time_s = time_s}).field_per_m3;
+    field += C * distortion->at(setting).field_per_m3;
   }
   return solvePose(couplings(field, tracker_from_sensor.orientation) + noise, C, p_m, limits_);
 }
