@@ -176,6 +176,7 @@ struct GapReport {
   std::vector<Prediction> predictions;
 };
 
+nlohmann::json toJson(const Isolability& isolability);
 /// The document of the design contract. Reading it back gives the same report, its extra keys included.
 nlohmann::json toJson(const GapReport& report);
 
