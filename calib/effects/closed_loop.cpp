@@ -1,10 +1,12 @@
 #include "calib/effects/closed_loop.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "calib/core/file_io.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/room_search.h"
 
 namespace fieldtrue {
 
@@ -65,6 +67,100 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
   return std::make_unique<ClosedLoop>(center_m, axis, radius_m, wire_radius_m, scalarOf(parameters, "strength"));
 }
 
+constexpr double kWireRadius_m = 0.005;
+constexpr double kSmallestRing_m = 0.05;
+constexpr double kLargestRing_m = 1.5;
+constexpr double kNearestToWire_m = 0.06;
+
+class ClosedLoopFit final : public EffectFit {
+ public:
+  explicit ClosedLoopFit(const FitDesign& design) : search_(design), chart_(search_.trackerFromRig()) {}
+
+  std::string name() const override { return "loop"; }
+
+  std::vector<FitParameter> searched() const override {
+    std::vector<FitParameter> parameters = search_.centerParameters();
+    for (FitParameter& angle : DirectionChart::parameters()) parameters.push_back(std::move(angle));
+    parameters.push_back({"radius_m", "m", kSmallestRing_m, kLargestRing_m});
+    return parameters;
+  }
+
+  std::vector<FitParameter> linear() const override { return {{"strength", "", 0.0, 1.0}}; }
+
+  std::vector<Eigen::VectorXd> starts() const override {
+    constexpr double kDiagonal = 0.57735026918962576;
+    const Eigen::Vector3d normals[] = {{1, 0, 0},
+                                       {0, 1, 0},
+                                       {0, 0, 1},
+                                       {kDiagonal, kDiagonal, kDiagonal},
+                                       {kDiagonal, -kDiagonal, -kDiagonal},
+                                       {-kDiagonal, kDiagonal, -kDiagonal},
+                                       {-kDiagonal, -kDiagonal, kDiagonal}};
+    std::vector<Eigen::VectorXd> starts;
+    for (const Eigen::Vector3d& p_m : search_.around_m(0.95, {0.3, 0.75})) {
+      for (const Eigen::Vector3d& normal : normals) {
+        Eigen::VectorXd start(6);
+        start << p_m, chart_.angles_rad(search_.trackerFromRig() * normal), 0.25;
+        if (allows(start)) starts.push_back(start);
+      }
+    }
+    return starts;
+  }
+
+  bool allows(const Eigen::VectorXd& searched) const override {
+    const Eigen::Vector3d center_m = searched.head<3>();
+    const double radius_m = searched[5];
+    if (!(radius_m >= kSmallestRing_m && radius_m <= kLargestRing_m) || !search_.allowsCenter(center_m)) return false;
+    const Eigen::Vector3d axis = chart_.direction(searched[3], searched[4]);
+    const auto isOffWire = [&](const Eigen::Vector3d& p_m) {
+      return fromWire_m(p_m - center_m, axis, radius_m) >= kNearestToWire_m;
+    };
+    return isOffWire(Eigen::Vector3d::Zero()) &&
+           std::all_of(search_.places_m().begin(), search_.places_m().end(), isOffWire);
+  }
+
+  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<EffectResponse> responses) const override {
+    const ClosedLoop loop(searched.head<3>(), chart_.direction(searched[3], searched[4]), searched[5], kWireRadius_m,
+                          1.0);
+    for (std::size_t i = 0; i < at.size(); ++i) responses[i] = loop.at(at[i]);
+  }
+
+  FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {
+    const Eigen::Vector3d center_m = searched.head<3>();
+    const Eigen::Vector3d normal = chart_.direction(searched[3], searched[4]);
+    FittedEffect fitted;
+    fitted.parameters = {{"center_m", {center_m.x(), center_m.y(), center_m.z()}},
+                         {"normal", {normal.x(), normal.y(), normal.z()}},
+                         {"radius_m", searched[5]},
+                         {"wire_radius_m", kWireRadius_m},
+                         {"strength", linear[0]}};
+    fitted.values = {{"center_x_m", "m", center_m.x()}, {"center_y_m", "m", center_m.y()},
+                     {"center_z_m", "m", center_m.z()}, {"normal_x", "", normal.x()},
+                     {"normal_y", "", normal.y()},      {"normal_z", "", normal.z()},
+                     {"radius_m", "m", searched[5]},    {"strength", "", linear[0]}};
+    fitted.location_m = center_m;
+    // A thicker wire carries up to twice the current that one of 5 mm radius would.
+    fitted.is_plausible = linear[0] >= 0.0 && linear[0] <= 2.0;
+    if (!fitted.is_plausible) {
+      fitted.doubt = linear[0] < 0.0 ? "a current that aids the transmitter's field, which no closed loop carries"
+                                     : "a current " + formatNumber(std::round(10.0 * linear[0]) / 10.0) +
+                                           " times that of a loop without resistance";
+    }
+    return fitted;
+  }
+
+ private:
+  RoomSearch search_;
+  DirectionChart chart_;
+};
+
+std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
+  std::vector<std::unique_ptr<EffectFit>> ways;
+  ways.push_back(std::make_unique<ClosedLoopFit>(design));
+  return ways;
+}
+
 }  // namespace
 
 Eigen::Vector3d ringField_per_m(const Eigen::Vector3d& from_center_m, const Eigen::Vector3d& axis, double radius_m) {
@@ -103,12 +199,13 @@ Effect closedLoopEffect() {
        "",
        "scalar",
        1.0,
-       0.0,
-       1.0,
+       -100.0,
+       100.0,
        "Share of the current a loop without resistance would carry; below 1 for thin wire, bad joints or a low "
-       "carrier.",
+       "carrier. No real loop has more than 1 or less than 0.",
        {}}};
   effect.make = make;
+  effect.fits = fits;
   return effect;
 }
 

@@ -1,11 +1,8 @@
 #include "calib/effects/compact_metal.h"
 
-#include <Eigen/Eigenvalues>
-#include <cmath>
 #include <numbers>
 
-#include "calib/core/file_io.h"
-#include "calib/effects/parameters.h"
+#include "calib/effects/metal_body.h"
 
 namespace fieldtrue {
 
@@ -15,10 +12,10 @@ constexpr double kFourPi = 4.0 * std::numbers::pi;
 
 class CompactMetal final : public CouplingDistortion {
  public:
-  CompactMetal(const Eigen::Vector3d& center_m, const Eigen::Matrix3d& polarizability_m3, double radius_m)
-      : center_m_(center_m),
-        radius_m_(radius_m),
-        moment_m3_(polarizability_m3 * dipoleField(center_m, 1.0 / kFourPi)) {}
+  explicit CompactMetal(const MetalBody& body)
+      : center_m_(body.center_m),
+        radius_m_(body.radius_m),
+        moment_m3_(body.polarizability_m3 * dipoleField(body.center_m, 1.0 / kFourPi)) {}
 
   Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
                               double /*time_s*/) const override {
@@ -33,38 +30,54 @@ class CompactMetal final : public CouplingDistortion {
   Eigen::Matrix3d moment_m3_;  ///< A G(b) / (4 pi) for C = 1.
 };
 
-/// No body answers more strongly than the permeable sphere of A = 4 pi a^3: one of polarizability A is at least this
-/// big.
-double smallestRadius_m(const Eigen::Matrix3d& polarizability_m3) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(polarizability_m3, Eigen::EigenvaluesOnly);
-  return std::cbrt(eigen.eigenvalues().cwiseAbs().maxCoeff() / kFourPi);
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
+  const Result<MetalBody> body = bodyOf(parameters, excitation, "compact_metal");
+  if (!body) return tl::unexpected<Error>(body.error());
+  return std::make_unique<CompactMetal>(*body);
 }
 
-Eigen::Matrix3d matrixOf(const nlohmann::json& list) {
-  Eigen::Matrix3d matrix;
-  for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = list.at(static_cast<std::size_t>(i)).get<double>();
-  return matrix;
-}
+class CompactMetalFit final : public EffectFit {
+ public:
+  CompactMetalFit(const FitDesign& design, BodyShape shape) : search_(design), shape_(shape) {}
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
-  const Eigen::Vector3d center_m = vectorOf(parameters, "center_m");
-  double radius_m = scalarOf(parameters, "radius_m");
-  Eigen::Matrix3d polarizability_m3;
-  if (parameters.at("polarizability_m3").is_null()) {
-    polarizability_m3 =
-        Eigen::Matrix3d::Identity() *
-        spherePolarizability_m3(radius_m, isFerromagnetic(parameters), scalarOf(parameters, "relative_permeability"));
-  } else {
-    polarizability_m3 = matrixOf(parameters.at("polarizability_m3"));
-    radius_m = smallestRadius_m(polarizability_m3);
+  std::string name() const override { return shape_ == BodyShape::kSphere ? "sphere" : "tensor"; }
+  std::vector<FitParameter> searched() const override { return search_.centerParameters(); }
+  std::vector<FitParameter> linear() const override { return polarizabilityParameters(shape_); }
+
+  std::vector<Eigen::VectorXd> starts() const override {
+    std::vector<Eigen::VectorXd> starts;
+    for (const Eigen::Vector3d& p_m : search_.around_m(0.38, {0.25, 0.5, 0.9})) starts.emplace_back(p_m);
+    for (const Eigen::Vector3d& p_m : search_.aboutTransmitter_m()) starts.emplace_back(p_m);
+    return starts;
   }
-  if (center_m.norm() <= radius_m) {
-    return fail(ErrorCode::kBadInput, "compact_metal: center_m " + textOf(center_m) +
-                                          " puts the transmitter inside the body, which has a radius of " +
-                                          formatNumber(radius_m) +
-                                          " m; the centre must be farther from the transmitter.");
+
+  bool allows(const Eigen::VectorXd& searched) const override { return search_.allowsCenter(searched.head<3>()); }
+
+  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<EffectResponse> responses) const override {
+    const Eigen::Vector3d center_m = searched.head<3>();
+    const Eigen::Matrix3d field_of_transmitter = dipoleField(center_m, 1.0 / kFourPi);
+    const std::size_t count = shape_ == BodyShape::kSphere ? 1 : 6;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      respondAsBody(shape_, center_m, field_of_transmitter, at[i].tracker_from_sensor.position_m,
+                    responses.subspan(i * count, count));
+    }
   }
-  return makeCompactMetal(center_m, polarizability_m3, radius_m);
+
+  FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {
+    return describeBody(shape_, searched.head<3>(), linear, search_);
+  }
+
+ private:
+  RoomSearch search_;
+  BodyShape shape_;
+};
+
+std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
+  std::vector<std::unique_ptr<EffectFit>> ways;
+  ways.push_back(std::make_unique<CompactMetalFit>(design, BodyShape::kSphere));
+  ways.push_back(std::make_unique<CompactMetalFit>(design, BodyShape::kTensor));
+  return ways;
 }
 
 }  // namespace
@@ -77,7 +90,7 @@ double spherePolarizability_m3(double radius_m, bool is_ferromagnetic, double re
 
 std::unique_ptr<CouplingDistortion> makeCompactMetal(const Eigen::Vector3d& center_m,
                                                      const Eigen::Matrix3d& polarizability_m3, double radius_m) {
-  return std::make_unique<CompactMetal>(center_m, polarizability_m3, radius_m);
+  return std::make_unique<CompactMetal>(MetalBody{center_m, polarizability_m3, radius_m});
 }
 
 Effect compactMetalEffect() {
@@ -85,20 +98,9 @@ Effect compactMetalEffect() {
   effect.id = "compact_metal";
   effect.label = "Compact metal body";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; sphere: Wait 1951, Geophysics 16 666";
-  effect.parameters = {
-      {"center_m", "m", "vector3", {1.0, 0.0, -1.0}, -100.0, 100.0, "Middle of the body, tracker frame.", {}},
-      {"radius_m", "m", "scalar", 0.1, 0.001, 10.0, "Radius of a sphere that answers as the body does.", {}},
-      materialParameter(),
-      permeabilityParameter(),
-      {"polarizability_m3",
-       "m^3",
-       "matrix3",
-       nullptr,
-       -1e4,
-       1e4,
-       "Induced moment per field, tracker axes; when given, radius, material and permeability are not used.",
-       {}}};
+  effect.parameters = bodyParameters();
   effect.make = make;
+  effect.fits = fits;
   return effect;
 }
 

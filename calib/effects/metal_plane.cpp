@@ -1,6 +1,11 @@
 #include "calib/effects/metal_plane.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "calib/core/file_io.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/room_search.h"
 
 namespace fieldtrue {
 
@@ -40,6 +45,89 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
                                       ideal * scalarOf(parameters, "strength"));
 }
 
+/// So permeable that the image is ideal to 2e-12.
+constexpr double kIdealPermeability = 1e6;
+constexpr double kNearestBehindPlaces_m = 0.03;
+constexpr double kFarthest_m = 20.0;
+
+class MetalPlaneFit final : public EffectFit {
+ public:
+  explicit MetalPlaneFit(const FitDesign& design) : search_(design), chart_(search_.trackerFromRig()) {}
+
+  std::string name() const override { return "plane"; }
+
+  std::vector<FitParameter> searched() const override {
+    std::vector<FitParameter> parameters = DirectionChart::parameters();
+    parameters.push_back({"distance_m", "m", 0.05, kFarthest_m});
+    return parameters;
+  }
+
+  std::vector<FitParameter> linear() const override { return {{"strength", "", -1.1, 1.1}}; }
+
+  std::vector<Eigen::VectorXd> starts() const override {
+    std::vector<Eigen::VectorXd> starts;
+    for (int axis = 0; axis < 6; ++axis) {
+      const Eigen::Vector3d toward =
+          search_.trackerFromRig() * Eigen::Vector3d((axis % 2 == 0 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis / 2));
+      const double nearest_m = search_.farthestAlong_m(toward);
+      for (const double gap : {0.12, 0.22, 0.4, 0.7, 1.2, 2.0, 3.5}) {
+        const double gap_m = std::max(0.08, gap * search_.extent_m());
+        const Eigen::VectorXd distance_m = Eigen::VectorXd::Constant(1, nearest_m + gap_m);
+        starts.push_back(joined(chart_.angles_rad(toward), distance_m));
+      }
+    }
+    return starts;
+  }
+
+  bool allows(const Eigen::VectorXd& searched) const override {
+    const double behind_m = searched[2] - search_.farthestAlong_m(chart_.direction(searched[0], searched[1]));
+    return searched.allFinite() && behind_m >= kNearestBehindPlaces_m && searched[2] >= 0.05 &&
+           searched[2] <= kFarthest_m;
+  }
+
+  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<EffectResponse> responses) const override {
+    const MetalPlane plane(chart_.direction(searched[0], searched[1]), searched[2], 1.0);
+    for (std::size_t i = 0; i < at.size(); ++i) responses[i] = plane.at(at[i]);
+  }
+
+  FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {
+    const Eigen::Vector3d toward = chart_.direction(searched[0], searched[1]);
+    const double strength = linear[0];
+    const bool is_conductor = strength >= 0.0;
+    const double ideal = is_conductor ? 1.0 : (kIdealPermeability - 1.0) / (kIdealPermeability + 1.0);
+    FittedEffect fitted;
+    fitted.parameters = {{"toward", {toward.x(), toward.y(), toward.z()}},
+                         {"distance_m", searched[2]},
+                         {"material", is_conductor ? "conductive" : "ferromagnetic"},
+                         {"relative_permeability", kIdealPermeability},
+                         {"strength", std::abs(strength) / ideal}};
+    fitted.values = {{"toward_x", "", toward.x()},
+                     {"toward_y", "", toward.y()},
+                     {"toward_z", "", toward.z()},
+                     {"distance_m", "m", searched[2]},
+                     {"strength", "", strength}};
+    fitted.location_m = searched[2] * toward;
+    fitted.material = is_conductor ? "conductive" : "ferromagnetic";
+    fitted.is_plausible = std::abs(strength) <= 1.1;
+    if (!fitted.is_plausible) {
+      fitted.doubt = "an image " + formatNumber(std::round(100.0 * std::abs(strength)) / 100.0) +
+                     " times as strong as an ideal plane's";
+    }
+    return fitted;
+  }
+
+ private:
+  RoomSearch search_;
+  DirectionChart chart_;
+};
+
+std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
+  std::vector<std::unique_ptr<EffectFit>> ways;
+  ways.push_back(std::make_unique<MetalPlaneFit>(design));
+  return ways;
+}
+
 }  // namespace
 
 Effect metalPlaneEffect() {
@@ -63,10 +151,12 @@ Effect metalPlaneEffect() {
                         "scalar",
                         1.0,
                         0.0,
-                        1.0,
-                        "Share of an ideal plane's image; below 1 for mesh, reinforcement or panels with gaps.",
+                        100.0,
+                        "Share of such a plane's image; below 1 for mesh, reinforcement or panels with gaps. No real "
+                        "plane has more than 1.",
                         {}}};
   effect.make = make;
+  effect.fits = fits;
   return effect;
 }
 

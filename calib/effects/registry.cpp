@@ -17,6 +17,8 @@
 #include "calib/core/file_io.h"
 #include "calib/effects/closed_loop.h"
 #include "calib/effects/compact_metal.h"
+#include "calib/effects/finite_coil.h"
+#include "calib/effects/metal_moved.h"
 #include "calib/effects/metal_plane.h"
 #include "calib/effects/object_reader.h"
 
@@ -98,7 +100,8 @@ nlohmann::json toJson(const EffectParameter& parameter) {
 }  // namespace
 
 std::span<const Effect> effects() {
-  static const std::array kEffects{compactMetalEffect(), metalPlaneEffect(), closedLoopEffect()};
+  static const std::array kEffects{compactMetalEffect(), metalPlaneEffect(), closedLoopEffect(), finiteCoilEffect(),
+                                   metalMovedEffect()};
   return kEffects;
 }
 

@@ -1,0 +1,88 @@
+#include "calib/field/metal_response.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "calib/core/error.h"
+
+namespace fieldtrue {
+
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double kPi = std::numbers::pi;
+/// Stands for the limit of high frequency [1/s].
+constexpr double kVeryFast_per_s = 1e18;
+
+/// tanh without overflow; of an argument in the right half-plane.
+Complex tanhOf(const Complex& z) {
+  if (z.real() > 20.0) return 1.0;
+  const Complex e = std::exp(-2.0 * z);
+  return (1.0 - e) / (1.0 + e);
+}
+
+}  // namespace
+
+double stepResponse(const SpectralResponse& response, double time_s) {
+  FT_CHECK(time_s >= 0.0);
+  if (time_s == 0.0) return response(kVeryFast_per_s).real();
+  constexpr int kTerms = 24;
+  const double r = 2.0 * kTerms / (5.0 * time_s);
+  double sum = 0.5 * std::exp(r * time_s) * (response(r) / r).real();
+  for (int k = 1; k < kTerms; ++k) {
+    const double theta = k * kPi / kTerms;
+    const double cotangent = 1.0 / std::tan(theta);
+    const Complex s = r * theta * Complex(cotangent, 1.0);
+    const double sigma = theta + (theta * cotangent - 1.0) * cotangent;
+    sum += (std::exp(time_s * s) * response(s) / s * Complex(1.0, sigma)).real();
+  }
+  return r / kTerms * sum;
+}
+
+double seenResponse(const SpectralResponse& response, const Excitation& excitation) {
+  if (excitation.is_pulsed_dc) return stepResponse(response, excitation.sampling_delay_s);
+  return response(Complex(0.0, 2.0 * kPi * excitation.carrier_hz)).real();
+}
+
+double skinDepth_m(const Metal& metal, double frequency_hz) {
+  return 1.0 / std::sqrt(kPi * frequency_hz * kMu0_h_per_m * metal.relative_permeability * metal.conductivity_s_per_m);
+}
+
+std::complex<double> sphereSusceptibility(double radius_m, const Metal& metal, std::complex<double> s) {
+  const double mu_r = metal.relative_permeability;
+  const Complex a2 = s * kMu0_h_per_m * mu_r * metal.conductivity_s_per_m * radius_m * radius_m;
+  if (std::abs(a2) < 1e-4) {
+    // alpha - tanh(alpha) cancels; to first order in alpha^2: (a^2/3)(1 - 2 a^2/5) and (2 a^2/3)(1 - 3 a^2/10).
+    const Complex difference = (1.0 - 0.4 * a2) / 3.0;
+    const Complex other = 2.0 / 3.0 * (1.0 - 0.3 * a2);
+    return 1.5 * (2.0 * mu_r * difference - other) / (mu_r * difference + other);
+  }
+  const Complex a = std::sqrt(a2);
+  const Complex T = tanhOf(a);
+  const Complex difference = a - T;
+  const Complex other = a2 * T - a + T;
+  return 1.5 * (2.0 * mu_r * difference - other) / (mu_r * difference + other);
+}
+
+double sphereSusceptibility(double radius_m, const Metal& metal, const Excitation& excitation) {
+  return seenResponse([&](Complex s) { return sphereSusceptibility(radius_m, metal, s); }, excitation);
+}
+
+std::complex<double> slabReflection(double k_per_m, const Metal& metal, std::optional<double> thickness_m,
+                                    std::complex<double> s) {
+  const double mu_k = metal.relative_permeability * k_per_m;
+  const Complex u2 = k_per_m * k_per_m + s * kMu0_h_per_m * metal.relative_permeability * metal.conductivity_s_per_m;
+  const Complex u = std::sqrt(u2);
+  if (!thickness_m) return (u - mu_k) / (u + mu_k);
+  const Complex T = tanhOf(u * *thickness_m);
+  return (u2 - mu_k * mu_k) * T / (2.0 * mu_k * u + (u2 + mu_k * mu_k) * T);
+}
+
+double inductiveShare(double rate_per_s, const Excitation& excitation) {
+  if (excitation.is_pulsed_dc) return std::exp(-rate_per_s * excitation.sampling_delay_s);
+  const double w = 2.0 * kPi * excitation.carrier_hz;
+  return w * w / (w * w + rate_per_s * rate_per_s);
+}
+
+}  // namespace fieldtrue
