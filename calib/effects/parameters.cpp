@@ -34,6 +34,12 @@ Eigen::Vector3d vectorOf(const nlohmann::json& parameters, const std::string& na
   return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
 }
 
+std::vector<double> numbersOf(const nlohmann::json& parameters, const std::string& name) {
+  return parameters.at(name).get<std::vector<double>>();
+}
+
+nlohmann::json listOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
 bool isFerromagnetic(const nlohmann::json& parameters) { return parameters.at("material") == "ferromagnetic"; }
 
 std::string textOf(const Eigen::Vector3d& v) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "calib/effects/registry.h"
 
@@ -16,7 +17,11 @@ EffectParameter permeabilityParameter();
 /// Typed access to resolved parameters.
 double scalarOf(const nlohmann::json& parameters, const std::string& name);
 Eigen::Vector3d vectorOf(const nlohmann::json& parameters, const std::string& name);
+std::vector<double> numbersOf(const nlohmann::json& parameters, const std::string& name);
 bool isFerromagnetic(const nlohmann::json& parameters);
+
+/// A vector as a scene holds it.
+nlohmann::json listOf(const Eigen::Vector3d& v);
 
 /// "(1, 0, -0.5)"
 std::string textOf(const Eigen::Vector3d& v);

@@ -16,17 +16,34 @@
 
 #include "calib/core/file_io.h"
 #include "calib/effects/closed_loop.h"
+#include "calib/effects/coil_gain.h"
+#include "calib/effects/coil_nonorthogonality.h"
 #include "calib/effects/compact_metal.h"
+#include "calib/effects/correlated_samples.h"
 #include "calib/effects/finite_coil.h"
+#include "calib/effects/gain_drift.h"
+#include "calib/effects/global_gain.h"
+#include "calib/effects/grid_scale.h"
+#include "calib/effects/hemisphere_flip.h"
+#include "calib/effects/jig_layer_offset.h"
+#include "calib/effects/jig_tilt.h"
+#include "calib/effects/mains_interference.h"
 #include "calib/effects/metal_moved.h"
 #include "calib/effects/metal_plane.h"
 #include "calib/effects/object_reader.h"
+#include "calib/effects/quantization.h"
+#include "calib/effects/range_noise.h"
+#include "calib/effects/sensor_offset.h"
+#include "calib/effects/transmitter_misalignment.h"
 
 namespace fieldtrue {
 
 namespace {
 
 bool isBounded(const EffectParameter& parameter) { return parameter.min != 0.0 || parameter.max != 0.0; }
+
+/// Numbers of a list.
+constexpr std::size_t kLongestList = 64;
 
 bool isComponent(const EffectParameter& parameter, const nlohmann::json& value) {
   if (!value.is_number() || !std::isfinite(value.get<double>())) return false;
@@ -65,6 +82,9 @@ bool hasShape(const EffectParameter& parameter, const nlohmann::json& value) {
   if (parameter.shape == "scalar") return isComponent(parameter, value);
   if (parameter.shape == "vector3") return areComponents(parameter, value, 3);
   if (parameter.shape == "matrix3") return areComponents(parameter, value, 9) && isSymmetric(value);
+  if (parameter.shape == "list") {
+    return !value.empty() && value.size() <= kLongestList && areComponents(parameter, value, value.size());
+  }
   FT_CHECK(parameter.shape == "text");
   if (!value.is_string()) return false;
   const auto& choices = parameter.choices;
@@ -80,6 +100,7 @@ std::string needed(const EffectParameter& parameter) {
   text = "a number";
   if (parameter.shape == "vector3") text = "three numbers";
   if (parameter.shape == "matrix3") text = "nine numbers of a symmetric matrix, row by row,";
+  if (parameter.shape == "list") text = "a list of 1 to " + std::to_string(kLongestList) + " numbers";
   if (isBounded(parameter)) text += " from " + formatNumber(parameter.min) + " to " + formatNumber(parameter.max);
   if (!parameter.unit.empty()) text += " [" + parameter.unit + "]";
   return text;
@@ -100,8 +121,25 @@ nlohmann::json toJson(const EffectParameter& parameter) {
 }  // namespace
 
 std::span<const Effect> effects() {
-  static const std::array kEffects{compactMetalEffect(), metalPlaneEffect(), closedLoopEffect(), finiteCoilEffect(),
-                                   metalMovedEffect()};
+  static const std::array kEffects{compactMetalEffect(),
+                                   metalPlaneEffect(),
+                                   closedLoopEffect(),
+                                   finiteCoilEffect(),
+                                   metalMovedEffect(),
+                                   coilGainEffect(),
+                                   coilNonorthogonalityEffect(),
+                                   globalGainEffect(),
+                                   gridScaleEffect(),
+                                   jigLayerOffsetEffect(),
+                                   jigTiltEffect(),
+                                   sensorOffsetEffect(),
+                                   transmitterMisalignmentEffect(),
+                                   gainDriftEffect(),
+                                   mainsInterferenceEffect(),
+                                   rangeNoiseEffect(),
+                                   correlatedSamplesEffect(),
+                                   quantizationEffect(),
+                                   hemisphereFlipEffect()};
   return kEffects;
 }
 

@@ -24,6 +24,8 @@ struct EffectParameter {
   double max = 0.0;
   std::string help;
   std::vector<std::string> choices = {};  ///< Of a text; empty = any.
+  double plausible_min = 0.0;             ///< Of each component: what is met in practice; 0 and 0 = not told.
+  double plausible_max = 0.0;
 };
 
 /// One row of the effect registry.

@@ -1,0 +1,185 @@
+#include "calib/effects/gain_drift.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/effects/linear_fit.h"
+#include "calib/effects/parameters.h"
+
+namespace fieldtrue {
+
+namespace {
+
+constexpr double kPlausibleGain = 0.1;
+constexpr double kPlausibleDrift = 0.05;
+constexpr double kShortest = 0.02;  ///< Time constant over the length of the session.
+constexpr double kLongest = 2.0;
+constexpr int kStarts = 10;
+
+class GainDrift final : public PhysicalEffect {
+ public:
+  explicit GainDrift(const nlohmann::json& parameters)
+      : start_s_(scalarOf(parameters, "start_s")),
+        gain_(scalarOf(parameters, "gain")),
+        amplitude_(scalarOf(parameters, "amplitude")),
+        time_constant_s_(scalarOf(parameters, "time_constant_s")),
+        slope_per_s_(scalarOf(parameters, "slope_per_s")),
+        curvature_per_s2_(scalarOf(parameters, "curvature_per_s2")) {}
+
+  EffectResponse at(const SensorSetting& setting) const override {
+    const double u_s = setting.time_s - start_s_;
+    double gain = gain_ + (slope_per_s_ + curvature_per_s2_ * u_s) * u_s;
+    if (amplitude_ != 0.0) gain += amplitude_ * std::exp(-u_s / time_constant_s_);
+    EffectResponse response;
+    response.field_per_m3 = gain * dipoleField(setting.tracker_from_sensor.position_m, 1.0);
+    return response;
+  }
+
+ private:
+  double start_s_;
+  double gain_;
+  double amplitude_;
+  double time_constant_s_;
+  double slope_per_s_;
+  double curvature_per_s2_;
+};
+
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+  return std::make_unique<GainDrift>(parameters);
+}
+
+/// The session's length, over which a fitted drift is told.
+struct Session {
+  double start_s = 0.0;
+  double length_s = 1.0;
+  double share(double time_s) const { return (time_s - start_s) / length_s; }
+};
+
+const FitParameter kGain{"gain", "", -kPlausibleGain, kPlausibleGain};
+
+/// A polynomial of the share of the session that has passed; its coefficients are gains.
+std::unique_ptr<EffectFit> polynomialWay(const std::string& name, const Session& session, bool is_curved) {
+  std::vector<FitParameter> linear{kGain, {"drift_over_session", "", -kPlausibleDrift, kPlausibleDrift}};
+  if (is_curved) linear.push_back({"curvature_over_session", "", -2.0 * kPlausibleDrift, 2.0 * kPlausibleDrift});
+  const auto respond = [session](const SensorSetting& setting, std::span<EffectResponse> responses) {
+    double power = 1.0;
+    for (EffectResponse& response : responses) {
+      response.field_per_m3 = power * dipoleField(setting.tracker_from_sensor.position_m, 1.0);
+      power *= session.share(setting.time_s);
+    }
+  };
+  return linearFit({name, std::move(linear), respond, [session, is_curved](const Eigen::VectorXd& g) {
+                      nlohmann::json parameters{{"gain", g[0]},
+                                                {"amplitude", 0.0},
+                                                {"start_s", session.start_s},
+                                                {"slope_per_s", g[1] / session.length_s}};
+                      if (is_curved) parameters["curvature_per_s2"] = g[2] / (session.length_s * session.length_s);
+                      return parameters;
+                    }});
+}
+
+/// A constant and an exponential of searched time constant.
+class ExponentialFit final : public EffectFit {
+ public:
+  explicit ExponentialFit(const Session& session) : session_(session) {}
+
+  std::string name() const override { return "exponential"; }
+  std::vector<FitParameter> searched() const override {
+    return {{"time_constant_s", "s", kShortest * session_.length_s, kLongest * session_.length_s}};
+  }
+  std::vector<FitParameter> linear() const override {
+    return {kGain, {"amplitude", "", -kPlausibleDrift, kPlausibleDrift}};
+  }
+  std::vector<Eigen::VectorXd> starts() const override {
+    std::vector<Eigen::VectorXd> starts;
+    for (int i = 0; i < kStarts; ++i) {
+      const double share = (i + 0.5) / kStarts;
+      const double time_constant_s = kShortest * session_.length_s * std::pow(kLongest / kShortest, share);
+      starts.push_back(Eigen::VectorXd::Constant(1, time_constant_s));
+    }
+    return starts;
+  }
+  bool allows(const Eigen::VectorXd& searched) const override {
+    return searched[0] >= kShortest * session_.length_s && searched[0] <= kLongest * session_.length_s;
+  }
+  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<EffectResponse> responses) const override {
+    FT_CHECK(responses.size() == 2 * at.size());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const Eigen::Matrix3d G = dipoleField(at[i].tracker_from_sensor.position_m, 1.0);
+      responses[2 * i] = responses[2 * i + 1] = EffectResponse{};
+      responses[2 * i].field_per_m3 = G;
+      responses[2 * i + 1].field_per_m3 = std::exp(-(at[i].time_s - session_.start_s) / searched[0]) * G;
+    }
+  }
+  FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {
+    FittedEffect fitted = described(this->linear(), linear,
+                                    {{"gain", linear[0]},
+                                     {"amplitude", linear[1]},
+                                     {"start_s", session_.start_s},
+                                     {"time_constant_s", searched[0]}});
+    fitted.values.push_back({"time_constant_s", "s", searched[0]});
+    return fitted;
+  }
+
+ private:
+  Session session_;
+};
+
+std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
+  std::vector<std::unique_ptr<EffectFit>> ways;
+  if (!design.has_times || !(design.end_s > design.start_s)) return ways;
+  const Session session{design.start_s, design.end_s - design.start_s};
+  ways.push_back(polynomialWay("linear", session, false));
+  ways.push_back(std::make_unique<ExponentialFit>(session));
+  ways.push_back(polynomialWay("quadratic", session, true));
+  return ways;
+}
+
+}  // namespace
+
+Effect gainDriftEffect() {
+  Effect effect;
+  effect.id = "gain_drift";
+  effect.label = "Gain that drifts with time";
+  effect.source = "Newton's law of cooling: Carslaw and Jaeger 1959, Conduction of Heat in Solids, section 1.9";
+  effect.parameters = {
+      {"gain",
+       "",
+       "scalar",
+       0.0,
+       -1e3,
+       1e3,
+       "Relative error of every coupling that stays.",
+       {},
+       -kPlausibleGain,
+       kPlausibleGain},
+      {"amplitude",
+       "",
+       "scalar",
+       0.0,
+       -1e3,
+       1e3,
+       "Relative error at the start that fades exponentially.",
+       {},
+       -kPlausibleDrift,
+       kPlausibleDrift},
+      {"time_constant_s", "s", "scalar", 1200.0, 1e-6, 1e9, "Of the fading.", {}, 60.0, 7200.0},
+      {"slope_per_s", "1/s", "scalar", 0.0, -1e6, 1e6, "Change of the relative error with time.", {}, -1e-4, 1e-4},
+      {"curvature_per_s2",
+       "1/s^2",
+       "scalar",
+       0.0,
+       -1e6,
+       1e6,
+       "Of the relative error, times the squared time.",
+       {},
+       -1e-7,
+       1e-7},
+      {"start_s", "s", "scalar", 0.0, -1e12, 1e12, "When the fading starts, on the session's clock.", {}}};
+  effect.make = make;
+  effect.fits = fits;
+  return effect;
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,89 @@
+#include "calib/effects/sensor_offset.h"
+
+#include "calib/effects/linear_fit.h"
+#include "calib/effects/parameters.h"
+
+namespace fieldtrue {
+
+namespace {
+
+constexpr double kPlausible_m = 0.2;
+constexpr double kPlausible_rad = 0.2;
+
+void offsetResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+  const Eigen::Matrix3d R = setting.tracker_from_sensor.orientation.toRotationMatrix();
+  for (int axis = 0; axis < 3; ++axis) responses[static_cast<std::size_t>(axis)].shift_m = R.col(axis);
+}
+
+void turnResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+  const Eigen::Matrix3d R = setting.tracker_from_sensor.orientation.toRotationMatrix();
+  for (int axis = 0; axis < 3; ++axis) responses[static_cast<std::size_t>(axis)].turn_rad = R.col(axis);
+}
+
+void allResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+  offsetResponses(setting, responses.first(3));
+  turnResponses(setting, responses.subspan(3));
+}
+
+nlohmann::json sceneParameters(const Eigen::Vector3d& offset_m, const Eigen::Vector3d& turn_rad) {
+  return {{"offset_m", listOf(offset_m)}, {"turn_rad", listOf(turn_rad)}};
+}
+
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+  Eigen::VectorXd values(6);
+  values << vectorOf(parameters, "offset_m"), vectorOf(parameters, "turn_rad");
+  return linearEffect(allResponses, std::move(values));
+}
+
+std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
+  std::vector<std::unique_ptr<EffectFit>> ways;
+  if (!design.alignment_known) return ways;
+  const std::vector<FitParameter> offset = vectorParameters("offset", "m", kPlausible_m);
+  const std::vector<FitParameter> turn = vectorParameters("turn", "rad", kPlausible_rad);
+  ways.push_back(linearFit({"lever_arm", offset, offsetResponses, [](const Eigen::VectorXd& v) {
+                              return sceneParameters(v.head<3>(), Eigen::Vector3d::Zero());
+                            }}));
+  if (!design.has_orientation) return ways;
+  ways.push_back(linearFit({"mounting", turn, turnResponses, [](const Eigen::VectorXd& v) {
+                              return sceneParameters(Eigen::Vector3d::Zero(), v.head<3>());
+                            }}));
+  std::vector<FitParameter> both = offset;
+  both.insert(both.end(), turn.begin(), turn.end());
+  ways.push_back(linearFit({"full", both, allResponses,
+                            [](const Eigen::VectorXd& v) { return sceneParameters(v.head<3>(), v.tail<3>()); }}));
+  return ways;
+}
+
+}  // namespace
+
+Effect sensorOffsetEffect() {
+  Effect effect;
+  effect.id = "sensor_offset";
+  effect.label = "Sensor off its mark";
+  effect.source = "Tsai and Lenz 1989, IEEE Trans. RA-5 345";
+  effect.parameters = {{"offset_m",
+                        "m",
+                        "vector3",
+                        {0.0, 0.0, 0.0},
+                        -100.0,
+                        100.0,
+                        "From the point the rig states to the sensor's magnetic centre, sensor frame.",
+                        {},
+                        -kPlausible_m,
+                        kPlausible_m},
+                       {"turn_rad",
+                        "rad",
+                        "vector3",
+                        {0.0, 0.0, 0.0},
+                        -100.0,
+                        100.0,
+                        "Rotation vector from the stated mounting to the real one, sensor frame.",
+                        {},
+                        -kPlausible_rad,
+                        kPlausible_rad}};
+  effect.make = make;
+  effect.fits = fits;
+  return effect;
+}
+
+}  // namespace fieldtrue
