@@ -21,6 +21,7 @@
 #include "calib/effects/compact_metal.h"
 #include "calib/effects/correlated_samples.h"
 #include "calib/effects/finite_coil.h"
+#include "calib/effects/finite_plate.h"
 #include "calib/effects/gain_drift.h"
 #include "calib/effects/global_gain.h"
 #include "calib/effects/grid_scale.h"
@@ -121,25 +122,16 @@ nlohmann::json toJson(const EffectParameter& parameter) {
 }  // namespace
 
 std::span<const Effect> effects() {
-  static const std::array kEffects{compactMetalEffect(),
-                                   metalPlaneEffect(),
-                                   closedLoopEffect(),
-                                   finiteCoilEffect(),
-                                   metalMovedEffect(),
-                                   coilGainEffect(),
-                                   coilNonorthogonalityEffect(),
-                                   globalGainEffect(),
-                                   gridScaleEffect(),
-                                   jigLayerOffsetEffect(),
-                                   jigTiltEffect(),
-                                   sensorOffsetEffect(),
-                                   transmitterMisalignmentEffect(),
-                                   gainDriftEffect(),
-                                   mainsInterferenceEffect(),
-                                   rangeNoiseEffect(),
-                                   correlatedSamplesEffect(),
-                                   quantizationEffect(),
-                                   hemisphereFlipEffect()};
+  static const std::array kEffects{compactMetalEffect(),   metalPlaneEffect(),
+                                   closedLoopEffect(),     finiteCoilEffect(),
+                                   finitePlateEffect(),    metalMovedEffect(),
+                                   coilGainEffect(),       coilNonorthogonalityEffect(),
+                                   globalGainEffect(),     gridScaleEffect(),
+                                   jigLayerOffsetEffect(), jigTiltEffect(),
+                                   sensorOffsetEffect(),   transmitterMisalignmentEffect(),
+                                   gainDriftEffect(),      mainsInterferenceEffect(),
+                                   rangeNoiseEffect(),     correlatedSamplesEffect(),
+                                   quantizationEffect(),   hemisphereFlipEffect()};
   return kEffects;
 }
 

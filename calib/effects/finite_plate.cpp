@@ -1,0 +1,381 @@
+#include "calib/effects/finite_plate.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+#include "calib/core/file_io.h"
+#include "calib/effects/parameters.h"
+#include "calib/effects/room_search.h"
+#include "calib/field/metal_response.h"
+#include "calib/field/sheet_mesh.h"
+
+namespace fieldtrue {
+
+namespace {
+
+constexpr double kFourPi = 4.0 * std::numbers::pi;
+/// A plate looked for is a square this big at first, in metres.
+constexpr double kFirstSize_m = 0.6;
+constexpr double kSmallest_m = 0.1;
+constexpr double kLargest_m = 4.0;
+
+/// Where a plate stands: columns along its length, along its width, normal to it; tracker frame.
+struct PlateFrame {
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d tracker_from_plate = Eigen::Matrix3d::Identity();
+  Eigen::Vector2d half_m = Eigen::Vector2d::Zero();
+
+  Eigen::Vector3d inPlate(const Eigen::Vector3d& p_m) const {
+    return tracker_from_plate.transpose() * (p_m - center_m);
+  }
+  double distance_m(const Eigen::Vector3d& p_m) const {
+    const Eigen::Vector3d p = inPlate(p_m);
+    const Eigen::Vector2d beyond = (p.head<2>().cwiseAbs() - half_m).cwiseMax(0.0);
+    return std::hypot(beyond.norm(), p.z());
+  }
+};
+
+/// @param side any direction that is not along the normal
+PlateFrame frameOf(const Eigen::Vector3d& center_m, const Eigen::Vector3d& normal, const Eigen::Vector3d& side,
+                   double length_m, double width_m) {
+  PlateFrame frame;
+  frame.center_m = center_m;
+  frame.half_m = {0.5 * length_m, 0.5 * width_m};
+  const Eigen::Vector3d n = normal.normalized();
+  const Eigen::Vector3d x = (side - side.dot(n) * n).normalized();
+  frame.tracker_from_plate << x, n.cross(x), n;
+  return frame;
+}
+
+/// Moments per field and charges per potential of a meshed plate; empty where it carries none.
+struct PlateAnswer {
+  Eigen::MatrixXd moments;
+  Eigen::MatrixXd charges;
+};
+
+/// A plate in the transmitter's field.
+class FinitePlate final : public CouplingDistortion {
+ public:
+  FinitePlate(const PlateFrame& frame, std::span<const Eigen::Vector2d> ring_centers_m,
+              std::span<const Eigen::Vector2d> charge_centers_m, double scale, const PlateAnswer& answer,
+              double strength)
+      : frame_(frame) {
+    const Eigen::Matrix3d& R = frame.tracker_from_plate;
+    if (answer.moments.size() > 0) {
+      const Eigen::MatrixXd field = sources(ring_centers_m, scale, [&](const Eigen::Vector3d& c_m) {
+        return Eigen::RowVector3d(R.col(2).transpose() * dipoleField(c_m, 1.0));
+      });
+      moments_ = -strength / kFourPi * (answer.moments * field);
+      ring_centers_m_ = scaled(ring_centers_m, scale);
+    }
+    if (answer.charges.size() > 0) {
+      const Eigen::MatrixXd potential = sources(charge_centers_m, scale, [](const Eigen::Vector3d& c_m) {
+        return Eigen::RowVector3d(c_m.transpose() / std::pow(c_m.norm(), 3));
+      });
+      charges_ = -strength / kFourPi * (answer.charges * potential);
+      charge_centers_m_ = scaled(charge_centers_m, scale);
+    }
+  }
+
+  Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
+                              double /*time_s*/) const override {
+    const Eigen::Vector3d p_m = frame_.inPlate(p_sensor_m);
+    Eigen::Matrix3d field = Eigen::Matrix3d::Zero();
+    for (std::size_t j = 0; j < ring_centers_m_.size(); ++j) {
+      const Eigen::Vector3d d_m(p_m.x() - ring_centers_m_[j].x(), p_m.y() - ring_centers_m_[j].y(), p_m.z());
+      const double r2_m2 = d_m.squaredNorm();
+      const double per_r5 = 1.0 / (r2_m2 * r2_m2 * std::sqrt(r2_m2));
+      const Eigen::Vector3d of_unit = per_r5 * (3.0 * d_m.z() * d_m - Eigen::Vector3d(0.0, 0.0, r2_m2));
+      field.noalias() += of_unit * moments_.row(static_cast<Eigen::Index>(j));
+    }
+    for (std::size_t j = 0; j < charge_centers_m_.size(); ++j) {
+      const Eigen::Vector3d d_m(p_m.x() - charge_centers_m_[j].x(), p_m.y() - charge_centers_m_[j].y(), p_m.z());
+      const double r2_m2 = d_m.squaredNorm();
+      field.noalias() += (d_m / (r2_m2 * std::sqrt(r2_m2))) * charges_.row(static_cast<Eigen::Index>(j));
+    }
+    return dipole_constant_m3 * (frame_.tracker_from_plate * field);
+  }
+
+  bool admits(const Eigen::Vector3d& p_sensor_m) const override { return frame_.distance_m(p_sensor_m) > 0.005; }
+
+ private:
+  template <typename OfPlace>
+  Eigen::MatrixXd sources(std::span<const Eigen::Vector2d> centers_m, double scale, const OfPlace& of_place) const {
+    Eigen::MatrixXd rows(static_cast<Eigen::Index>(centers_m.size()), 3);
+    for (std::size_t j = 0; j < centers_m.size(); ++j) {
+      const Eigen::Vector3d in_plate_m(scale * centers_m[j].x(), scale * centers_m[j].y(), 0.0);
+      rows.row(static_cast<Eigen::Index>(j)) = of_place(frame_.center_m + frame_.tracker_from_plate * in_plate_m);
+    }
+    return rows;
+  }
+
+  static std::vector<Eigen::Vector2d> scaled(std::span<const Eigen::Vector2d> centers_m, double scale) {
+    std::vector<Eigen::Vector2d> result(centers_m.begin(), centers_m.end());
+    for (Eigen::Vector2d& center_m : result) center_m *= scale;
+    return result;
+  }
+
+  PlateFrame frame_;
+  std::vector<Eigen::Vector2d> ring_centers_m_;
+  std::vector<Eigen::Vector2d> charge_centers_m_;
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> moments_;  ///< Over 4 pi, for C = 1.
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> charges_;  ///< Over 4 pi, for C = 1.
+};
+
+/// Whether a mode of magnetisation is one at all: the even potential magnetises nothing.
+double idealChargeShare(double rate, double chi_t_m) {
+  if (std::isinf(chi_t_m)) return rate > 1e-6 ? 1.0 : 0.0;
+  return chi_t_m * rate / (1.0 + chi_t_m * rate);
+}
+
+/// What of a plate's currents and magnetisation a tracker sees.
+class PlateMetal {
+ public:
+  PlateMetal(const Metal& metal, double thickness_m, const Excitation& excitation)
+      : metal_(metal), thickness_m_(thickness_m), excitation_(excitation) {}
+
+  double currentShare(double rate) const {
+    return seenResponse(
+        [&](Complex s) {
+          const Complex sheet_ohm = 1.0 / (metal_.conductivity_s_per_m * thickness_m_ * flatness(s));
+          return s / (s + rate * sheet_ohm / kMu0_h_per_m);
+        },
+        excitation_);
+  }
+
+  double chargeShare(double rate) const {
+    return seenResponse(
+        [&](Complex s) {
+          const Complex magnetised = (metal_.relative_permeability * flatness(s) - 1.0) * thickness_m_ * rate;
+          return magnetised / (1.0 + magnetised);
+        },
+        excitation_);
+  }
+
+ private:
+  using Complex = std::complex<double>;
+  /// tanh(x)/x, x = gamma d/2: how evenly the field fills the plate's thickness.
+  Complex flatness(Complex s) const {
+    const Complex x =
+        0.5 * thickness_m_ * std::sqrt(s * kMu0_h_per_m * metal_.relative_permeability * metal_.conductivity_s_per_m);
+    if (std::abs(x) < 1e-4) return 1.0;
+    return (x.real() > 20.0 ? 1.0 : std::tanh(x)) / x;
+  }
+
+  Metal metal_;
+  double thickness_m_;
+  Excitation excitation_;
+};
+
+PlateAnswer answerOf(const SheetMesh& mesh, const nlohmann::json& parameters, const Excitation& excitation) {
+  const bool is_ferromagnetic = isFerromagnetic(parameters);
+  const double mu_r = is_ferromagnetic ? scalarOf(parameters, "relative_permeability") : 1.0;
+  const nlohmann::json& thickness = parameters.at("thickness_m");
+  PlateAnswer answer;
+  if (parameters.at("conductivity_s_per_m").is_null()) {
+    if (!is_ferromagnetic) {
+      answer.moments = mesh.currentModes().answer([](double) { return 1.0; });
+      return answer;
+    }
+    const double chi_t_m =
+        thickness.is_null() ? std::numeric_limits<double>::infinity() : (mu_r - 1.0) * thickness.get<double>();
+    answer.charges = mesh.chargeModes().answer([&](double rate) { return idealChargeShare(rate, chi_t_m); });
+    return answer;
+  }
+  const PlateMetal metal({scalarOf(parameters, "conductivity_s_per_m"), mu_r}, thickness.get<double>(), excitation);
+  answer.moments = mesh.currentModes().answer([&](double rate) { return metal.currentShare(rate); });
+  if (is_ferromagnetic) {
+    answer.charges = mesh.chargeModes().answer([&](double rate) { return metal.chargeShare(rate); });
+  }
+  return answer;
+}
+
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
+  const Eigen::Vector3d normal = vectorOf(parameters, "normal");
+  const Eigen::Vector3d side = vectorOf(parameters, "side");
+  if (normal.cross(side).norm() < 1e-6 * std::max(1.0, normal.norm() * side.norm())) {
+    return fail(ErrorCode::kBadInput, "finite_plate: normal is " + textOf(normal) + " and side is " + textOf(side) +
+                                          "; neither may be zero and they must not be parallel.");
+  }
+  if (!parameters.at("conductivity_s_per_m").is_null() && parameters.at("thickness_m").is_null()) {
+    return fail(ErrorCode::kBadInput,
+                "finite_plate: conductivity_s_per_m is given and thickness_m is not; a real plate needs both.");
+  }
+  const PlateFrame frame = frameOf(vectorOf(parameters, "center_m"), normal, side, scalarOf(parameters, "length_m"),
+                                   scalarOf(parameters, "width_m"));
+  if (frame.distance_m(Eigen::Vector3d::Zero()) < 0.01) {
+    return fail(ErrorCode::kBadInput, "finite_plate: center_m " + textOf(frame.center_m) +
+                                          " puts the transmitter in the plate; move the plate.");
+  }
+  const SheetMesh mesh(2.0 * frame.half_m.x(), 2.0 * frame.half_m.y());
+  return std::make_unique<FinitePlate>(frame, mesh.ringCenters_m(), mesh.chargeCenters_m(), 1.0,
+                                       answerOf(mesh, parameters, excitation), scalarOf(parameters, "strength"));
+}
+
+/// Answers of a square plate of side 1 m, from which those of any square follow by size.
+struct UnitSquare {
+  SheetMesh mesh{1.0, 1.0};
+  Eigen::MatrixXd moments = mesh.currentModes().answer([](double) { return 1.0; });
+  Eigen::MatrixXd charges = mesh.chargeModes().answer(
+      [](double rate) { return idealChargeShare(rate, std::numeric_limits<double>::infinity()); });
+};
+
+const UnitSquare& unitSquare() {
+  static const UnitSquare kSquare;
+  return kSquare;
+}
+
+class FinitePlateFit final : public EffectFit {
+ public:
+  FinitePlateFit(const FitDesign& design, bool is_ferromagnetic)
+      : search_(design), chart_(search_.trackerFromRig()), is_ferromagnetic_(is_ferromagnetic) {}
+
+  std::string name() const override { return is_ferromagnetic_ ? "ferromagnetic" : "conductive"; }
+
+  std::vector<FitParameter> searched() const override {
+    std::vector<FitParameter> parameters = search_.centerParameters();
+    for (FitParameter& angle : DirectionChart::parameters()) parameters.push_back(std::move(angle));
+    parameters.push_back({"size_m", "m", kSmallest_m, kLargest_m});
+    return parameters;
+  }
+
+  std::vector<FitParameter> linear() const override { return {{"strength", "", 0.0, 1.1}}; }
+
+  std::vector<Eigen::VectorXd> starts() const override {
+    std::vector<Eigen::VectorXd> starts;
+    for (const Eigen::Vector3d& p_m : search_.around_m(0.95, {0.3, 0.75})) {
+      for (int axis = 0; axis < 3; ++axis) {
+        Eigen::VectorXd start(6);
+        start << p_m, chart_.angles_rad(search_.trackerFromRig() * Eigen::Vector3d::Unit(axis)), kFirstSize_m;
+        if (allows(start)) starts.push_back(start);
+      }
+    }
+    return starts;
+  }
+
+  bool allows(const Eigen::VectorXd& searched) const override {
+    if (!(searched[5] >= kSmallest_m && searched[5] <= kLargest_m)) return false;
+    if (!search_.allowsCenter(searched.head<3>())) return false;
+    const PlateFrame frame = frameAt(searched);
+    const double least_m = 0.8 * search_.keepAway_m();
+    return frame.distance_m(Eigen::Vector3d::Zero()) >= least_m &&
+           std::all_of(search_.places_m().begin(), search_.places_m().end(),
+                       [&](const Eigen::Vector3d& p_m) { return frame.distance_m(p_m) >= least_m; });
+  }
+
+  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<EffectResponse> responses) const override {
+    const double size_m = searched[5];
+    PlateAnswer answer;
+    // A ring's moment per field grows as size^3 with its area and inductance, a charge per potential as size.
+    if (is_ferromagnetic_) {
+      answer.charges = size_m * unitSquare().charges;
+    } else {
+      answer.moments = size_m * size_m * size_m * unitSquare().moments;
+    }
+    const SheetMesh& mesh = unitSquare().mesh;
+    const FinitePlate plate(frameAt(searched), mesh.ringCenters_m(), mesh.chargeCenters_m(), size_m, answer, 1.0);
+    for (std::size_t i = 0; i < at.size(); ++i) responses[i] = plate.at(at[i]);
+  }
+
+  FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {
+    const PlateFrame frame = frameAt(searched);
+    const Eigen::Vector3d normal = frame.tracker_from_plate.col(2);
+    const Eigen::Vector3d side = frame.tracker_from_plate.col(0);
+    const Eigen::Vector3d& center_m = frame.center_m;
+    FittedEffect fitted;
+    fitted.material = name();
+    fitted.location_m = center_m;
+    fitted.parameters = {{"center_m", {center_m.x(), center_m.y(), center_m.z()}},
+                         {"normal", {normal.x(), normal.y(), normal.z()}},
+                         {"side", {side.x(), side.y(), side.z()}},
+                         {"length_m", searched[5]},
+                         {"width_m", searched[5]},
+                         {"material", name()},
+                         {"strength", linear[0]}};
+    fitted.values = {{"center_x_m", "m", center_m.x()}, {"center_y_m", "m", center_m.y()},
+                     {"center_z_m", "m", center_m.z()}, {"normal_x", "", normal.x()},
+                     {"normal_y", "", normal.y()},      {"normal_z", "", normal.z()},
+                     {"size_m", "m", searched[5]},      {"strength", "", linear[0]}};
+    fitted.is_plausible = linear[0] >= 0.0 && linear[0] <= 1.1;
+    if (linear[0] < 0.0) {
+      fitted.doubt = "a " + name() + " plate that answers with the wrong sign";
+    } else if (!fitted.is_plausible) {
+      fitted.doubt =
+          "a plate " + formatNumber(std::round(10.0 * linear[0]) / 10.0) + " times as strong as an ideal one";
+    }
+    return fitted;
+  }
+
+ private:
+  PlateFrame frameAt(const Eigen::VectorXd& searched) const {
+    const Eigen::Vector3d normal = chart_.direction(searched[3], searched[4]);
+    const Eigen::Vector3d x = search_.trackerFromRig() * Eigen::Vector3d::UnitX();
+    const Eigen::Vector3d y = search_.trackerFromRig() * Eigen::Vector3d::UnitY();
+    return frameOf(searched.head<3>(), normal, std::abs(normal.dot(x)) < 0.75 ? x : y, searched[5], searched[5]);
+  }
+
+  RoomSearch search_;
+  DirectionChart chart_;
+  bool is_ferromagnetic_;
+};
+
+std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
+  std::vector<std::unique_ptr<EffectFit>> ways;
+  ways.push_back(std::make_unique<FinitePlateFit>(design, false));
+  ways.push_back(std::make_unique<FinitePlateFit>(design, true));
+  return ways;
+}
+
+}  // namespace
+
+Effect finitePlateEffect() {
+  Effect effect;
+  effect.id = "finite_plate";
+  effect.label = "Metal plate";
+  effect.source =
+      "Meshed sheet: Weidelt 1975, J. Geophys. 41 85; edges: Hough 1973, J. Aircraft 10 314; sheet impedance: "
+      "Wait 1962, Electromagnetic Waves in Stratified Media";
+  effect.parameters = {
+      {"center_m", "m", "vector3", {1.0, 0.0, -1.0}, -100.0, 100.0, "Middle of the plate, tracker frame.", {}},
+      {"normal",
+       "",
+       "vector3",
+       {0.0, 0.0, 1.0},
+       0.0,
+       0.0,
+       "At right angles to the plate, tracker frame; any length.",
+       {}},
+      {"side", "", "vector3", {1.0, 0.0, 0.0}, 0.0, 0.0, "Along the plate's length, tracker frame; any length.", {}},
+      {"length_m", "m", "scalar", 0.6, 0.01, 20.0, "Along `side`.", {}},
+      {"width_m", "m", "scalar", 0.6, 0.01, 20.0, "Across it.", {}},
+      materialParameter(),
+      permeabilityParameter(),
+      {"conductivity_s_per_m",
+       "S/m",
+       "scalar",
+       nullptr,
+       1.0,
+       1e8,
+       "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6; needs thickness_m. When given, the tracker's "
+       "carrier "
+       "or sampling delay decides how much is left of the ideal answer; null is an ideal metal.",
+       {}},
+      {"thickness_m", "m", "scalar", nullptr, 1e-6, 0.1, "Of the plate; null is thick enough not to matter.", {}},
+      {"strength",
+       "",
+       "scalar",
+       1.0,
+       -100.0,
+       100.0,
+       "Share of such a plate's answer; below 1 for holes and gaps. No real plate has more than 1 or less than 0.",
+       {}}};
+  effect.make = make;
+  effect.fits = fits;
+  return effect;
+}
+
+}  // namespace fieldtrue
