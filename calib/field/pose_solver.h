@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <tl/expected.hpp>
 
@@ -26,6 +27,18 @@ struct SolverLimits {
   double farthest_m = std::numeric_limits<double>::infinity();
 };
 
+/// How a tracker comes from nine couplings to a pose.
+enum class PoseSolver {
+  kClosedForm,    ///< Direct; the minimum of the sum of squares, whatever the couplings.
+  kLeastSquares,  ///< Iterated from Raab's direct solution; ends at the same pose, or in a side minimum far from any.
+  kDamped,        ///< Iterated and held back towards the last position: strong distortion moves it less.
+};
+
+/// `closed_form`, `least_squares` or `damped`, as scenes name them.
+std::string_view nameOf(PoseSolver solver);
+/// None for any other name.
+std::optional<PoseSolver> poseSolverNamed(std::string_view name);
+
 struct PoseSolution {
   Pose tracker_from_sensor;
   double residual_rms = 0.0;  ///< Over the nine couplings, in their units: how far they are from any undistorted pose.
@@ -48,5 +61,22 @@ struct PoseSolution {
 /// @source Raab 1981, IEEE Trans. AES-17 (direct solution, position first); the bound: Miranda and Thompson 1993
 tl::expected<PoseSolution, SolveError> solvePose(const Eigen::Matrix3d& couplings, double dipole_constant_m3,
                                                  const Eigen::Vector3d& hemisphere, const SolverLimits& limits = {});
+
+/// The pose that a tracker with this solver reports.
+///
+/// The iterated ones minimise |S - R^T G(p)|^2 / k^2 + w |p - p_last|^2 / |p_last|^2, k = |S|/sqrt(6), by Levenberg and
+/// Marquardt's method from range and direction by Raab's direct solution (k from the trace of S^T S, u its first
+/// eigenvector) with w = 0 for `least_squares` and kDamping for `damped`.
+/// @param last_position_m of a damped solver in metres; the others take its direction only, as the hemisphere
+/// @error SolveError
+/// @source Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709 (iterated); Raab 1981, IEEE Trans. AES-17 (direct);
+/// Marquardt 1963, J. SIAM 11 431
+tl::expected<PoseSolution, SolveError> solvePose(PoseSolver solver, const Eigen::Matrix3d& couplings,
+                                                 double dipole_constant_m3, const Eigen::Vector3d& last_position_m,
+                                                 const SolverLimits& limits = {});
+
+/// Weight w of a damped solver's last position. Transverse errors, 1.8 of information against 54 of radial ones, are
+/// reported 1.8/(1.8 + w) of their size.
+inline constexpr double kDamping = 0.2;
 
 }  // namespace fieldtrue
