@@ -7,6 +7,7 @@
 #include "calib/core/file_io.h"
 #include "calib/effects/parameters.h"
 #include "calib/effects/room_search.h"
+#include "calib/field/metal_response.h"
 
 namespace fieldtrue {
 
@@ -45,7 +46,13 @@ class ClosedLoop final : public CouplingDistortion {
   Eigen::Vector3d current_m_;  ///< Induced by each transmitter coil, for C = 1 [1/m^2].
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+/// R/L of a ring of round wire: R = 2 pi radius/(sigma pi a^2), L = mu_0 radius (ln(8 radius/a) - 2).
+double decayRate_per_s(double radius_m, double wire_radius_m, double conductivity_s_per_m) {
+  const double resistance_ohm = 2.0 * radius_m / (conductivity_s_per_m * wire_radius_m * wire_radius_m);
+  return resistance_ohm / (kMu0_h_per_m * radius_m * (std::log(8.0 * radius_m / wire_radius_m) - 2.0));
+}
+
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
   const Eigen::Vector3d center_m = vectorOf(parameters, "center_m");
   const Eigen::Vector3d normal = vectorOf(parameters, "normal");
   const double radius_m = scalarOf(parameters, "radius_m");
@@ -64,7 +71,12 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
     return fail(ErrorCode::kBadInput, "closed_loop: center_m " + textOf(center_m) +
                                           " puts the transmitter inside the wire of the loop; move the loop.");
   }
-  return std::make_unique<ClosedLoop>(center_m, axis, radius_m, wire_radius_m, scalarOf(parameters, "strength"));
+  double strength = scalarOf(parameters, "strength");
+  const nlohmann::json& conductivity = parameters.at("conductivity_s_per_m");
+  if (!conductivity.is_null()) {
+    strength *= inductiveShare(decayRate_per_s(radius_m, wire_radius_m, conductivity.get<double>()), excitation);
+  }
+  return std::make_unique<ClosedLoop>(center_m, axis, radius_m, wire_radius_m, strength);
 }
 
 constexpr double kWireRadius_m = 0.005;
@@ -195,6 +207,15 @@ Effect closedLoopEffect() {
       {"normal", "", "vector3", {0.0, 0.0, 1.0}, 0.0, 0.0, "Axis of the loop, tracker frame; any length.", {}},
       {"radius_m", "m", "scalar", 0.3, 0.01, 10.0, "Of the loop.", {}},
       {"wire_radius_m", "m", "scalar", 0.005, 1e-4, 0.5, "Of the wire or tube it is made of.", {}},
+      {"conductivity_s_per_m",
+       "S/m",
+       "scalar",
+       nullptr,
+       1.0,
+       1e8,
+       "Of the wire: copper 5.8e7, aluminium 3.5e7, steel 6e6. When given, its resistance and the tracker's carrier or "
+       "sampling delay decide how much of the current is left; null is a loop without resistance.",
+       {}},
       {"strength",
        "",
        "scalar",

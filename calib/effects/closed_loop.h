@@ -14,7 +14,9 @@ namespace fieldtrue {
 /// limits the current, as it does in copper at an AC tracker's carrier, the ring keeps the flux out: L I = -flux, so
 ///   dG = -strength 4 pi C h(p) h(t)^T / (R (ln(8 R/a) - 2)),
 /// R and a the radii of ring and wire. Below the carrier at which the ring's resistance equals its reactance only a
-/// part of that current flows, which `strength` says; what is left is in quadrature and not seen by the tracker.
+/// part of that current flows, which `strength` says; what is left is in quadrature and not seen by the tracker. With
+/// the wire's conductivity given, that part is (w L)^2/(R^2 + (w L)^2) at a carrier and exp(-t R/L) at a sampling
+/// delay, R at direct current.
 /// @source Jackson 1999, Classical Electrodynamics, section 5.5 (field of a current ring); L: Maxwell 1873, art. 704
 Effect closedLoopEffect();
 

@@ -6,6 +6,7 @@
 #include "calib/core/file_io.h"
 #include "calib/effects/parameters.h"
 #include "calib/effects/room_search.h"
+#include "calib/field/plane_images.h"
 
 namespace fieldtrue {
 
@@ -14,15 +15,22 @@ namespace {
 class MetalPlane final : public CouplingDistortion {
  public:
   /// @param toward unit, from the transmitter straight to the plane
-  /// @param reflection 1 for a perfect conductor, -(mu_r - 1)/(mu_r + 1) for a permeable half-space
-  MetalPlane(const Eigen::Vector3d& toward, double distance_m, double reflection)
+  /// @param images of the transmitter; 1 is that of a perfect conductor, -(mu_r - 1)/(mu_r + 1) of a permeable
+  /// half-space
+  MetalPlane(const Eigen::Vector3d& toward, double distance_m, std::vector<PlaneImage> images)
       : toward_(toward),
         distance_m_(distance_m),
-        image_(reflection * (Eigen::Matrix3d::Identity() - 2.0 * toward * toward.transpose())) {}
+        images_(std::move(images)),
+        mirror_(Eigen::Matrix3d::Identity() - 2.0 * toward * toward.transpose()) {}
 
   Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
                               double /*time_s*/) const override {
-    return dipoleField(p_sensor_m - 2.0 * distance_m_ * toward_, dipole_constant_m3) * image_;
+    Eigen::Matrix3d field = Eigen::Matrix3d::Zero();
+    for (const PlaneImage& image : images_) {
+      const Eigen::Vector3d from_image_m = p_sensor_m - (2.0 * distance_m_ + image.deeper_m) * toward_;
+      field += dipoleField(from_image_m, image.strength * dipole_constant_m3);
+    }
+    return field * mirror_;
   }
 
   bool admits(const Eigen::Vector3d& p_sensor_m) const override { return toward_.dot(p_sensor_m) < distance_m_; }
@@ -30,19 +38,34 @@ class MetalPlane final : public CouplingDistortion {
  private:
   Eigen::Vector3d toward_;
   double distance_m_;
-  Eigen::Matrix3d image_;  ///< Moment of the image per moment of the transmitter.
+  std::vector<PlaneImage> images_;
+  Eigen::Matrix3d mirror_;  ///< Moment of a perfect conductor's image per moment of the transmitter.
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+/// The images of a plane of full strength.
+std::vector<PlaneImage> imagesOf(const nlohmann::json& parameters, const Excitation& excitation) {
+  const bool is_ferromagnetic = isFerromagnetic(parameters);
+  const double mu_r = is_ferromagnetic ? scalarOf(parameters, "relative_permeability") : 1.0;
+  const nlohmann::json& conductivity = parameters.at("conductivity_s_per_m");
+  if (conductivity.is_null()) return {{0.0, is_ferromagnetic ? -(mu_r - 1.0) / (mu_r + 1.0) : 1.0}};
+  const nlohmann::json& thickness = parameters.at("thickness_m");
+  const std::optional<double> thickness_m = thickness.is_null() ? std::nullopt : std::optional(thickness.get<double>());
+  return planeImages({conductivity.get<double>(), mu_r}, thickness_m, excitation);
+}
+
+Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
   const Eigen::Vector3d toward = vectorOf(parameters, "toward");
   if (toward.norm() < 1e-6) {
     return fail(ErrorCode::kBadInput, "metal_plane: toward is " + textOf(toward) +
                                           "; it must point from the transmitter straight to the plane.");
   }
-  const double mu_r = scalarOf(parameters, "relative_permeability");
-  const double ideal = isFerromagnetic(parameters) ? -(mu_r - 1.0) / (mu_r + 1.0) : 1.0;
-  return std::make_unique<MetalPlane>(toward.normalized(), scalarOf(parameters, "distance_m"),
-                                      ideal * scalarOf(parameters, "strength"));
+  if (parameters.at("conductivity_s_per_m").is_null() && !parameters.at("thickness_m").is_null()) {
+    return fail(ErrorCode::kBadInput,
+                "metal_plane: thickness_m is given and conductivity_s_per_m is not; a plane of real metal needs both.");
+  }
+  std::vector<PlaneImage> images = imagesOf(parameters, excitation);
+  for (PlaneImage& image : images) image.strength *= scalarOf(parameters, "strength");
+  return std::make_unique<MetalPlane>(toward.normalized(), scalarOf(parameters, "distance_m"), std::move(images));
 }
 
 /// So permeable that the image is ideal to 2e-12.
@@ -87,7 +110,7 @@ class MetalPlaneFit final : public EffectFit {
 
   void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
                std::span<EffectResponse> responses) const override {
-    const MetalPlane plane(chart_.direction(searched[0], searched[1]), searched[2], 1.0);
+    const MetalPlane plane(chart_.direction(searched[0], searched[1]), searched[2], {PlaneImage{}});
     for (std::size_t i = 0; i < at.size(); ++i) responses[i] = plane.at(at[i]);
   }
 
@@ -146,6 +169,23 @@ Effect metalPlaneEffect() {
                        {"distance_m", "m", "scalar", 1.5, 0.05, 100.0, "From the transmitter to the plane.", {}},
                        materialParameter(),
                        permeabilityParameter(),
+                       {"conductivity_s_per_m",
+                        "S/m",
+                        "scalar",
+                        nullptr,
+                        1.0,
+                        1e8,
+                        "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's carrier "
+                        "or sampling delay decides how the plane reflects; null is an ideal metal.",
+                        {}},
+                       {"thickness_m",
+                        "m",
+                        "scalar",
+                        nullptr,
+                        1e-6,
+                        10.0,
+                        "Of a sheet of that conductivity; null is a solid metal without end.",
+                        {}},
                        {"strength",
                         "",
                         "scalar",

@@ -12,9 +12,11 @@ namespace fieldtrue {
 /// it (normal field zero on it): I = 1 - 2nn^T. A permeable half-space: I = -(mu_r - 1)/(mu_r + 1) (1 - 2nn^T), in the
 /// limit with the tangential field zero on it. With the image at b
 ///   dG = strength G(p - b; C) I.
-/// Edges are not modelled and planes do not mirror each other.
+/// A plane of given conductivity, and thickness unless it is solid, has several images further behind it, which
+/// together reflect as the tracker's carrier or sampling delay makes it (calib/field/plane_images.h). Edges are not
+/// modelled and planes do not mirror each other.
 /// @source Jackson 1999, Classical Electrodynamics, problem 5.17 (images in a permeable half-space); perfect conductor:
-/// the same with mu_r -> 0
+/// the same with mu_r -> 0; sheet: Saslow 1992, Am. J. Phys. 60 693
 Effect metalPlaneEffect();
 
 }  // namespace fieldtrue
