@@ -111,10 +111,15 @@ nlohmann::json toJson(const EffectParameter& parameter) {
   nlohmann::json json{{"name", parameter.name},   {"unit", parameter.unit},
                       {"shape", parameter.shape}, {"default", parameter.default_value},
                       {"min", nullptr},           {"max", nullptr},
+                      {"plausible_min", nullptr}, {"plausible_max", nullptr},
                       {"help", parameter.help},   {"choices", parameter.choices}};
   if (isBounded(parameter)) {
     json["min"] = parameter.min;
     json["max"] = parameter.max;
+  }
+  if (parameter.plausible_min != 0.0 || parameter.plausible_max != 0.0) {
+    json["plausible_min"] = parameter.plausible_min;
+    json["plausible_max"] = parameter.plausible_max;
   }
   return json;
 }

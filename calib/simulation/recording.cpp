@@ -20,6 +20,7 @@ constexpr int kSensor = 0;
 struct Stop {
   const PlannedPlace* place = nullptr;
   Pose reference_from_sensor;  ///< Where the sensor really stands.
+  Visit visit;
   std::vector<double> times_s;
   std::vector<Eigen::Matrix3d> noise;
 };
@@ -57,6 +58,7 @@ std::vector<Stop> drawStops(const TrackerPhysics& physics, std::span<const Plann
   const Scene& scene = physics.scene();
   GaussianStream placing(options.seed, static_cast<std::uint32_t>(RandomPurpose::kPlacing));
   CouplingNoise noise = physics.noiseOf(kSensor, options.seed);
+  VisitStream visits(physics.signal(), options.seed, kSensor);
   std::vector<Stop> stops;
   double now_s = 0.0;
   for (const PlannedPlace& place : plan) {
@@ -65,6 +67,7 @@ std::vector<Stop> drawStops(const TrackerPhysics& physics, std::span<const Plann
     stop.place = &place;
     stop.reference_from_sensor =
         disturbed(place.reference_from_sensor, scene.rig.tolerance_m, scene.rig.tolerance_rad, placing);
+    stop.visit = visits.next();
     now_s += options.travel_s;
     for (int i = 0; i < options.samples_per_node; ++i) {
       stop.times_s.push_back(now_s);
@@ -76,10 +79,15 @@ std::vector<Stop> drawStops(const TrackerPhysics& physics, std::span<const Plann
   return stops;
 }
 
+StandingSensor standingAt(const TrackerPhysics& physics, const Stop& stop) {
+  return physics.standing(stop.reference_from_sensor, stop.place->index, stop.times_s.front(), stop.times_s.back());
+}
+
 Reading readStop(const TrackerPhysics& physics, const Stop& stop) {
+  const StandingSensor sensor = standingAt(physics, stop);
   std::vector<Sample> samples;
   for (std::size_t i = 0; i < stop.times_s.size(); ++i) {
-    samples.push_back(physics.read(stop.reference_from_sensor, stop.times_s[i], kSensor, stop.noise[i]));
+    samples.push_back(physics.read(sensor, stop.visit, stop.times_s[i], kSensor, stop.noise[i]));
   }
   AveragingOptions averaging;
   averaging.quantum_m = physics.scene().tracker.quantum_m;
@@ -94,15 +102,15 @@ std::string metres(double value_m) {
 }
 
 Error noPoseError(const TrackerPhysics& physics, const Stop& stop) {
-  const Pose tracker_from_sensor = physics.trackerFromSensor(stop.reference_from_sensor);
+  const StandingSensor sensor = standingAt(physics, stop);
   const TrackerModel& tracker = physics.scene().tracker;
   std::string text = "No pose can be solved at node " + std::to_string(stop.place->node) + " (visit " +
-                     std::to_string(stop.place->visit) + "), " + metres(tracker_from_sensor.position_m.norm()) +
+                     std::to_string(stop.place->visit) + "), " + metres(sensor.actual.position_m.norm()) +
                      " from the transmitter: ";
-  if (const auto metal = physics.metalAround(tracker_from_sensor.position_m)) {
+  if (const auto metal = physics.metalAround(sensor.actual.position_m)) {
     return {ErrorCode::kUnsupported, text + "it lies inside the metal of " + *metal + " of the scene."};
   }
-  const auto solution = physics.solve(tracker_from_sensor, stop.times_s.front(), stop.noise.front());
+  const auto solution = physics.solve(sensor, stop.visit, stop.times_s.front(), stop.noise.front());
   text += describe(solution ? SolveError::kTooWeak : solution.error());
   text += "; this tracker works from " + metres(tracker.nearest_range_m) + " to " + metres(tracker.farthest_range_m) +
           ". Move the node or leave it out of the plan.";

@@ -7,6 +7,7 @@
 #include "calib/core/file_io.h"
 #include "calib/effects/object_reader.h"
 #include "calib/effects/registry.h"
+#include "calib/field/pose_solver.h"
 
 namespace fieldtrue {
 
@@ -45,6 +46,14 @@ Result<void> checkSchema(const nlohmann::json& json, const std::string& file) {
   return fail(ErrorCode::kBadInput, file + ": schema is " + seenValue(*found) + "; a scene has \"" + known + "\".");
 }
 
+std::vector<std::string> solverNames() {
+  std::vector<std::string> names;
+  for (const PoseSolver solver : {PoseSolver::kClosedForm, PoseSolver::kLeastSquares, PoseSolver::kDamped}) {
+    names.emplace_back(nameOf(solver));
+  }
+  return names;
+}
+
 Result<TrackerModel> trackerFrom(const nlohmann::json& json, const std::string& file) {
   ObjectReader reader(json, file, "tracker");
   TrackerModel tracker;
@@ -52,6 +61,7 @@ Result<TrackerModel> trackerFrom(const nlohmann::json& json, const std::string& 
   reader.choice("excitation", tracker.excitation, {"ac", "pulsed_dc"});
   reader.number("carrier_hz", tracker.carrier_hz, {1.0, 1e6}, "Hz");
   reader.number("sampling_delay_s", tracker.sampling_delay_s, {0.0, 1.0}, "s");
+  reader.choice("solver", tracker.solver, solverNames());
   reader.number("dipole_constant_m3", tracker.dipole_constant_m3, {1e-9, 1e9}, "m^3");
   reader.number("rate_hz", tracker.rate_hz, {0.1, 1e4}, "Hz");
   reader.number("quantum_m", tracker.quantum_m, {0.0, 0.1}, "m");
@@ -109,7 +119,7 @@ Result<EffectInstance> effectFrom(const nlohmann::json& json, const std::string&
   if (!effect) return located(effect.error());
   Result<nlohmann::json> parameters = resolveEffectParameters(**effect, given);
   if (!parameters) return located(parameters.error());
-  if (const auto distortion = (*effect)->make(*parameters, {}); !distortion) return located(distortion.error());
+  if (const auto made = (*effect)->make(*parameters, {}); !made) return located(made.error());
   instance.parameters = std::move(*parameters);
   return instance;
 }
@@ -190,6 +200,7 @@ nlohmann::json toJson(const Scene& scene) {
             {"excitation", t.excitation},
             {"carrier_hz", t.carrier_hz},
             {"sampling_delay_s", t.sampling_delay_s},
+            {"solver", t.solver},
             {"dipole_constant_m3", t.dipole_constant_m3},
             {"rate_hz", t.rate_hz},
             {"quantum_m", t.quantum_m},

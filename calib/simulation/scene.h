@@ -14,16 +14,17 @@ namespace fieldtrue {
 /// kind.
 struct TrackerModel {
   std::string name = "simulated tracker";
-  std::string excitation = "ac";    ///< `ac` or `pulsed_dc`.
-  double carrier_hz = 10016.0;      ///< AC only.
-  double sampling_delay_s = 0.0;    ///< Pulsed DC: from the pulse's edge to the reading.
-  double dipole_constant_m3 = 1.0;  ///< C of G(p) = C (3uu^T - I)/r^3; couplings are in these units.
-  double rate_hz = 120.0;           ///< Readings per second.
-  double quantum_m = 0.0;           ///< Lattice of reported positions; 0 = none.
-  double coupling_noise = 2.0e-4;   ///< SD of each coupling in each reading (units of dipole_constant_m3 / m^3).
-  double correlation = 0.0;         ///< Of the noise of successive readings, left by the tracker's filter, [0, 1).
-  double nearest_range_m = 0.1;     ///< Nearer, the receiver saturates.
-  double farthest_range_m = 9.144;  ///< Farther, the signal is too weak. 30 ft, the long-range transmitter's reach.
+  std::string excitation = "ac";       ///< `ac` or `pulsed_dc`.
+  double carrier_hz = 10016.0;         ///< AC only.
+  double sampling_delay_s = 0.0;       ///< Pulsed DC: from the pulse's edge to the reading.
+  std::string solver = "closed_form";  ///< `closed_form`, `least_squares` or `damped`: from couplings to a pose.
+  double dipole_constant_m3 = 1.0;     ///< C of G(p) = C (3uu^T - I)/r^3; couplings are in these units.
+  double rate_hz = 120.0;              ///< Readings per second.
+  double quantum_m = 0.0;              ///< Lattice of reported positions; 0 = none.
+  double coupling_noise = 2.0e-4;      ///< SD of each coupling in each reading (units of dipole_constant_m3 / m^3).
+  double correlation = 0.0;            ///< Of the noise of successive readings, left by the tracker's filter, [0, 1).
+  double nearest_range_m = 0.1;        ///< Nearer, the receiver saturates.
+  double farthest_range_m = 9.144;     ///< Farther, the signal is too weak. 30 ft, the long-range transmitter's reach.
 };
 
 /// How truth is known: the jig and its tolerances.

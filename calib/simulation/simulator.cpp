@@ -1,19 +1,45 @@
 #include "calib/simulation/simulator.h"
 
 #include <map>
+#include <optional>
 
 #include "calib/simulation/tracker_physics.h"
 
 namespace fieldtrue {
 
+namespace {
+
+/// A sensor that went farther than this is on another visit.
+constexpr double kSamePlace_m = 0.05;
+
+/// What the simulator remembers of one sensor.
+struct SensorMemory {
+  CouplingNoise noise;
+  VisitStream visits;
+  Visit visit = {};
+  std::optional<Eigen::Vector3d> place_m = std::nullopt;  ///< Where the visit began, rig's frame.
+
+  const Visit& visitAt(const Eigen::Vector3d& p_m) {
+    if (!place_m || (p_m - *place_m).norm() > kSamePlace_m) {
+      place_m = p_m;
+      visit = visits.next();
+    }
+    return visit;
+  }
+};
+
+}  // namespace
+
 struct TrackerSimulator::State {
   TrackerPhysics physics;
   std::uint64_t seed = 1;
-  std::map<int, CouplingNoise> noise;  ///< By sensor.
+  std::map<int, SensorMemory> memories;  ///< By sensor.
 
-  CouplingNoise& noiseOf(int sensor) {
-    const auto found = noise.find(sensor);
-    return found != noise.end() ? found->second : noise.emplace(sensor, physics.noiseOf(sensor, seed)).first->second;
+  SensorMemory& memoryOf(int sensor) {
+    const auto found = memories.find(sensor);
+    if (found != memories.end()) return found->second;
+    SensorMemory fresh{physics.noiseOf(sensor, seed), VisitStream(physics.signal(), seed, sensor)};
+    return memories.emplace(sensor, std::move(fresh)).first->second;
   }
 };
 
@@ -29,16 +55,23 @@ Result<TrackerSimulator> TrackerSimulator::make(const Scene& scene, std::uint64_
 }
 
 Sample TrackerSimulator::measure(const Pose& reference_from_sensor, double time_s, int sensor) {
-  const Eigen::Matrix3d noise = state_->noiseOf(sensor).at(time_s);
-  return state_->physics.read(reference_from_sensor, time_s, sensor, noise);
+  SensorMemory& memory = state_->memoryOf(sensor);
+  const StandingSensor standing = state_->physics.standing(reference_from_sensor, std::nullopt, time_s, time_s);
+  const Visit& visit = memory.visitAt(reference_from_sensor.position_m);
+  return state_->physics.read(standing, visit, time_s, sensor, memory.noise.at(time_s));
 }
 
 Sample TrackerSimulator::measureExactly(const Pose& reference_from_sensor, double time_s) const {
   constexpr bool kOnLattice = false;
-  return state_->physics.read(reference_from_sensor, time_s, 0, Eigen::Matrix3d::Zero(), kOnLattice);
+  const StandingSensor standing = state_->physics.standing(reference_from_sensor, std::nullopt, time_s, time_s);
+  return state_->physics.read(standing, Visit{}, time_s, 0, Eigen::Matrix3d::Zero(), kOnLattice);
 }
 
-void TrackerSimulator::resetFilter(int sensor) { state_->noiseOf(sensor).forget(); }
+void TrackerSimulator::resetFilter(int sensor) {
+  SensorMemory& memory = state_->memoryOf(sensor);
+  memory.noise.forget();
+  memory.place_m.reset();
+}
 
 const Scene& TrackerSimulator::scene() const { return state_->physics.scene(); }
 

@@ -13,7 +13,8 @@ namespace fieldtrue {
 
 /// A tracker in a scene: distorts the couplings by the scene's physics, adds noise, and solves for the pose under the
 /// undistorted model, as a tracker does. One object is one tracker's life (its filter and noise have memory); seeded.
-/// The filter acts on the noise and does not lag behind motion; the hemisphere follows the sensor.
+/// The filter acts on the noise and does not lag behind motion; the hemisphere follows the sensor. What an effect draws
+/// anew on every visit (a lost hemisphere, the phase of the mains) is drawn when the sensor has moved by 5 cm.
 class TrackerSimulator {
  public:
   /// @error kBadInput for an unknown effect or bad parameters
@@ -26,10 +27,10 @@ class TrackerSimulator {
   /// @param reference_from_sensor true pose in the rig's frame
   Sample measure(const Pose& reference_from_sensor, double time_s, int sensor = 0);
 
-  /// The reading without noise, filter and quantum.
+  /// The reading without noise, filter, quantum and what differs from visit to visit.
   Sample measureExactly(const Pose& reference_from_sensor, double time_s) const;
 
-  /// Forgets the filter's memory: the sensor was somewhere else in between.
+  /// Forgets the filter's memory and the visit: the sensor was somewhere else in between.
   void resetFilter(int sensor);
 
   const Scene& scene() const;

@@ -4,13 +4,11 @@
 #include <set>
 
 #include "calib/effects/registry.h"
-#include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
 
 using namespace fieldtrue;
 using fieldtrue::testing::holdsAll;
-using fieldtrue::testing::made;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
@@ -22,13 +20,17 @@ nlohmann::json defaultsOf(const Effect& effect) {
   return resolveEffectParameters(effect, nlohmann::json::object()).value();
 }
 
+std::unique_ptr<PhysicalEffect> madeByDefault(const Effect& effect) {
+  return std::move(makeEffect(effect.id, nlohmann::json::object()).value());
+}
+
 /// Places in the open, away from the effect's metal at its defaults.
-std::vector<Eigen::Vector3d> openPlaces_m(const CouplingDistortion& distortion) {
+std::vector<Eigen::Vector3d> openPlaces_m(const PhysicalEffect& effect) {
   RandomGeometry random(1);
   std::vector<Eigen::Vector3d> places_m;
   while (places_m.size() < 50) {
     const Eigen::Vector3d p_m = random.pointInCube_m(1.4);
-    if (p_m.norm() > 0.4 && (p_m - Eigen::Vector3d(1.0, 0.0, -1.0)).norm() > 0.4 && distortion.admits(p_m)) {
+    if (p_m.norm() > 0.4 && (p_m - Eigen::Vector3d(1.0, 0.0, -1.0)).norm() > 0.4 && effect.admits(p_m)) {
       places_m.push_back(p_m);
     }
   }
@@ -54,7 +56,7 @@ class EffectRegistryTest : public QObject {
   void resolvesToTheSameTwice();
   void isFiniteLinearAndRepeatable_data() { rows(); }
   void isFiniteLinearAndRepeatable();
-  void makesAFieldWithoutSourcesInTheRoom_data() { rows(); }
+  void makesAFieldWithoutSourcesInTheRoom_data();
   void makesAFieldWithoutSourcesInTheRoom();
   void refusesEveryParameterOfAnotherShape_data() { rows(); }
   void refusesEveryParameterOfAnotherShape();
@@ -75,7 +77,7 @@ void EffectRegistryTest::rows() {
 void EffectRegistryTest::describesEveryParameter() {
   QFETCH(const Effect*, effect);
   QVERIFY(!effect->label.empty() && !effect->source.empty() && effect->make != nullptr);
-  const std::set<std::string> shapes{"scalar", "vector3", "matrix3", "text"};
+  const std::set<std::string> shapes{"scalar", "vector3", "matrix3", "text", "list"};
   const nlohmann::json json = toJson(std::span<const Effect>(effect, 1)).at(0);
   QCOMPARE(json.at("parameters").size(), effect->parameters.size());
   for (std::size_t i = 0; i < effect->parameters.size(); ++i) {
@@ -84,7 +86,14 @@ void EffectRegistryTest::describesEveryParameter() {
     QVERIFY2(parameter.help.ends_with("."), parameter.name.c_str());
     QVERIFY2(parameter.unit != "m" || parameter.name.ends_with("_m"), parameter.name.c_str());
     QVERIFY2(parameter.unit != "m^3" || parameter.name.ends_with("_m3"), parameter.name.c_str());
-    for (const char* key : {"name", "unit", "shape", "default", "min", "max", "help", "choices"}) {
+    QVERIFY2(parameter.unit != "rad" || parameter.name.ends_with("_rad"), parameter.name.c_str());
+    QVERIFY2(parameter.unit != "s" || parameter.name.ends_with("_s"), parameter.name.c_str());
+    if (parameter.plausible_min != 0.0 || parameter.plausible_max != 0.0) {
+      QVERIFY2(parameter.plausible_min >= parameter.min && parameter.plausible_max <= parameter.max,
+               parameter.name.c_str());
+    }
+    for (const char* key :
+         {"name", "unit", "shape", "default", "min", "max", "plausible_min", "plausible_max", "help", "choices"}) {
       QVERIFY2(json.at("parameters")[i].contains(key), key);
     }
   }
@@ -101,14 +110,29 @@ void EffectRegistryTest::resolvesToTheSameTwice() {
 
 void EffectRegistryTest::isFiniteLinearAndRepeatable() {
   QFETCH(const Effect*, effect);
-  const auto distortion = made(effect->id, nlohmann::json::object());
-  const auto again = made(effect->id, nlohmann::json::object());
-  for (const Eigen::Vector3d& p_m : openPlaces_m(*distortion)) {
-    const Eigen::Matrix3d change = distortion->fieldChange(p_m, 1.0, 0.0);
-    QVERIFY(change.allFinite() && change.norm() > 0.0);
-    QVERIFY(change == again->fieldChange(p_m, 1.0, 0.0));
-    const Eigen::Matrix3d stronger = distortion->fieldChange(p_m, 2.5, 0.0);
-    FT_VERIFY_MATCH(near((stronger - 2.5 * change).norm() / change.norm(), 0.0, 1e-12));
+  const auto first = madeByDefault(*effect);
+  const auto again = madeByDefault(*effect);
+  const auto* distortion = dynamic_cast<const CouplingDistortion*>(first.get());
+  for (const Eigen::Vector3d& p_m : openPlaces_m(*first)) {
+    const SensorSetting setting{{p_m, rotationFromVector(p_m)}, {}, std::nullopt, 100.0};
+    const EffectResponse response = first->at(setting);
+    const EffectResponse repeated = again->at(setting);
+    QVERIFY(response.field_per_m3.allFinite() && response.shift_m.allFinite() && response.turn_rad.allFinite());
+    QVERIFY(response.field_per_m3 == repeated.field_per_m3 && response.shift_m == repeated.shift_m);
+    QVERIFY(first->interference_per_m3(0.3).allFinite());
+    if (distortion == nullptr) continue;
+    const Eigen::Matrix3d change = distortion->fieldChange(p_m, 1.0, 100.0);
+    QVERIFY(change == response.field_per_m3);
+    const Eigen::Matrix3d stronger = distortion->fieldChange(p_m, 2.5, 100.0);
+    FT_VERIFY_MATCH(near((stronger - 2.5 * change).norm(), 0.0, 1e-12 * change.norm()));
+  }
+}
+
+void EffectRegistryTest::makesAFieldWithoutSourcesInTheRoom_data() {
+  QTest::addColumn<const Effect*>("effect");
+  for (const Effect& effect : effects()) {
+    const bool is_of_the_room = dynamic_cast<const CouplingDistortion*>(madeByDefault(effect).get()) != nullptr;
+    if (is_of_the_room) QTest::newRow(effect.id.c_str()) << &effect;
   }
 }
 
@@ -116,10 +140,13 @@ void EffectRegistryTest::isFiniteLinearAndRepeatable() {
 // there.
 void EffectRegistryTest::makesAFieldWithoutSourcesInTheRoom() {
   QFETCH(const Effect*, effect);
-  const auto distortion = made(effect->id, nlohmann::json::object());
+  const auto made = madeByDefault(*effect);
+  const auto* distortion = dynamic_cast<const CouplingDistortion*>(made.get());
+  QVERIFY(distortion != nullptr);
   for (const Eigen::Vector3d& p_m : openPlaces_m(*distortion)) {
     const Eigen::Matrix3d d[3] = {slope(*distortion, p_m, 0), slope(*distortion, p_m, 1), slope(*distortion, p_m, 2)};
     const double size = d[0].norm() + d[1].norm() + d[2].norm();
+    QVERIFY(size > 0.0);
     const Eigen::RowVector3d divergence = d[0].row(0) + d[1].row(1) + d[2].row(2);
     FT_VERIFY_MATCH(near(divergence.norm() / size, 0.0, 1e-5));
     for (int a = 0; a < 3; ++a) {
@@ -134,6 +161,7 @@ void EffectRegistryTest::refusesEveryParameterOfAnotherShape() {
   for (const EffectParameter& parameter : effect->parameters) {
     const nlohmann::json wrong = parameter.shape == "text" ? nlohmann::json(3) : nlohmann::json("long");
     for (const nlohmann::json& value : {wrong, nlohmann::json::array({1.0, 2.0}), nlohmann::json(true)}) {
+      if (parameter.shape == "list" && value.is_array()) continue;
       const auto resolved = resolveEffectParameters(*effect, {{parameter.name, value}});
       QVERIFY2(!resolved.has_value(), parameter.name.c_str());
       QCOMPARE(resolved.error().code, ErrorCode::kBadInput);
@@ -149,6 +177,8 @@ void EffectRegistryTest::refusesEveryParameterOutOfRange() {
     if (parameter.shape == "text") wrong.emplace_back("wood");
     if (parameter.shape == "scalar") wrong = {parameter.min - 1.0, parameter.max * 2.0 + 1.0};
     if (parameter.shape == "vector3") wrong.push_back({0.0, 0.0, std::numeric_limits<double>::infinity()});
+    if (parameter.shape == "list")
+      wrong = {nlohmann::json::array(), nlohmann::json::array({2.0 * parameter.max + 1.0})};
     if (parameter.shape == "matrix3") wrong.push_back({1, 0.5, 0, 0, 1, 0, 0, 0, 1});
     for (const nlohmann::json& value : wrong) {
       const auto resolved = resolveEffectParameters(*effect, {{parameter.name, value}});
