@@ -52,10 +52,12 @@ double skinDepth_m(const Metal& metal, double frequency_hz) {
 std::complex<double> sphereSusceptibility(double radius_m, const Metal& metal, std::complex<double> s) {
   const double mu_r = metal.relative_permeability;
   const Complex a2 = s * kMu0_h_per_m * mu_r * metal.conductivity_s_per_m * radius_m * radius_m;
-  if (std::abs(a2) < 1e-4) {
-    // alpha - tanh(alpha) cancels; to first order in alpha^2: (a^2/3)(1 - 2 a^2/5) and (2 a^2/3)(1 - 3 a^2/10).
-    const Complex difference = (1.0 - 0.4 * a2) / 3.0;
-    const Complex other = 2.0 / 3.0 * (1.0 - 0.3 * a2);
+  if (std::abs(a2) < 1e-2) {
+    // alpha - tanh(alpha) cancels; the series of both over alpha^3.
+    const Complex difference =
+        1.0 / 3.0 + a2 * (-2.0 / 15.0 + a2 * (17.0 / 315.0 + a2 * (-62.0 / 2835.0 + a2 * 1382.0 / 155925.0)));
+    const Complex other =
+        1.0 + a2 * (-1.0 / 3.0 + a2 * (2.0 / 15.0 + a2 * (-17.0 / 315.0 + a2 * 62.0 / 2835.0))) - difference;
     return 1.5 * (2.0 * mu_r * difference - other) / (mu_r * difference + other);
   }
   const Complex a = std::sqrt(a2);
