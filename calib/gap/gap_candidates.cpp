@@ -1,0 +1,206 @@
+#include "calib/gap/gap_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fieldtrue {
+namespace {
+
+/// BIC differences are over-confident where the catalogue is not the world; found on sessions made by other physics.
+constexpr double kTemperature = 2.5;
+/// Effects whose fitted signals correlate beyond this and whose evidence is closer than that are not told apart.
+constexpr double kSameSignal = 0.9;
+constexpr double kSameEvidence = 10.0;
+/// Intervals of fitted parameters are widened for the physics that a catalogue leaves out.
+constexpr double kNinety = 1.645;
+
+/// Parameters of one term within the covariance of a refined model.
+struct TermPlace {
+  Eigen::Index begin = 0;
+  Eigen::Index linear = 0;
+  Eigen::Index searched = 0;
+};
+
+TermPlace placeOf(const RefinedModel& refined, std::size_t term) {
+  TermPlace place;
+  place.begin = refined.n_alignment;
+  for (std::size_t t = 0; t <= term; ++t) {
+    place.linear = refined.model.terms[t].linear.size();
+    place.searched = refined.model.terms[t].searched.size();
+    if (t < term) place.begin += place.linear + place.searched;
+  }
+  return place;
+}
+
+/// Reported values and location as functions of the fitted parameters, linearised.
+struct Sensitivity {
+  Eigen::MatrixXd values;    ///< Reported value by parameter.
+  Eigen::MatrixXd location;  ///< 3 by parameter.
+};
+
+Sensitivity sensitivityOf(const GapTerm& term, const FittedEffect& fitted) {
+  const Eigen::Index linear = term.linear.size();
+  const Eigen::Index count = linear + term.searched.size();
+  Sensitivity sensitivity;
+  sensitivity.values = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(fitted.values.size()), count);
+  sensitivity.location = Eigen::MatrixXd::Zero(3, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    Eigen::VectorXd x = term.linear;
+    Eigen::VectorXd searched = term.searched;
+    double& moved = j < linear ? x[j] : searched[j - linear];
+    const double h = 1e-4 * std::max(1e-3, std::abs(moved));
+    moved += h;
+    const FittedEffect shifted = term.fit->describe(searched, x);
+    if (shifted.values.size() != fitted.values.size()) continue;
+    for (std::size_t v = 0; v < fitted.values.size(); ++v)
+      sensitivity.values(static_cast<Eigen::Index>(v), j) = (shifted.values[v].value - fitted.values[v].value) / h;
+    if (fitted.location_m && shifted.location_m)
+      sensitivity.location.col(j) = (*shifted.location_m - *fitted.location_m) / h;
+  }
+  return sensitivity;
+}
+
+/// What a fitted term says, with intervals where its model was refined.
+void describeTerm(const GapSearch& search, const RefinedModel& refined, std::size_t term, GapCandidate& candidate) {
+  const GapTerm& fitted_term = refined.model.terms[term];
+  const FittedEffect fitted = fitted_term.fit->describe(fitted_term.searched, fitted_term.linear);
+  candidate.effect = fitted_term.effect->id;
+  candidate.location_m = fitted.location_m;
+  candidate.material = fitted.material;
+  candidate.is_plausible = fitted.is_plausible;
+  candidate.doubt = fitted.doubt;
+  candidate.scene_parameters = fitted.parameters;
+  for (const FittedParameter& p : fitted.values) candidate.parameters.push_back({p.name, p.unit, p.value, {}, {}});
+  if (refined.covariance.size() == 0) return;
+  const TermPlace place = placeOf(refined, term);
+  const Eigen::Index count = place.linear + place.searched;
+  const Eigen::MatrixXd covariance = refined.covariance.block(place.begin, place.begin, count, count);
+  const Sensitivity sensitivity = sensitivityOf(fitted_term, fitted);
+  for (std::size_t v = 0; v < candidate.parameters.size(); ++v) {
+    const Eigen::RowVectorXd row = sensitivity.values.row(static_cast<Eigen::Index>(v));
+    const double variance = (row * covariance * row.transpose()).value();
+    if (!(variance >= 0.0) || !std::isfinite(variance)) continue;
+    const double half = kNinety * std::sqrt(variance);
+    candidate.parameters[v].low90 = candidate.parameters[v].value - half;
+    candidate.parameters[v].high90 = candidate.parameters[v].value + half;
+  }
+  if (fitted.location_m)
+    candidate.location_covariance_m2 = sensitivity.location * covariance * sensitivity.location.transpose();
+  (void)search;
+}
+
+/// What an effect does to the whitened residuals of the model without it.
+Eigen::VectorXd signalOf(const GapSearch& search, const std::vector<Vector6d>& without, const GapModel& with) {
+  const std::vector<Vector6d> left = whitenedResiduals(search.physics(), with, search.whitening());
+  Eigen::VectorXd signal(static_cast<Eigen::Index>(6 * left.size()));
+  for (std::size_t i = 0; i < left.size(); ++i)
+    signal.segment<6>(static_cast<Eigen::Index>(6 * i)) = without[i] - left[i];
+  return signal;
+}
+
+double correlation2(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const double norms = a.squaredNorm() * b.squaredNorm();
+  return norms > 0.0 ? a.dot(b) * a.dot(b) / norms : 0.0;
+}
+
+void findEquivalents(const GapSearch& search, const Selection& selection, std::vector<GapCandidate>& candidates) {
+  const std::vector<TriedEffect>& tried = selection.alternatives;
+  GapModel rest = selection.model.model;
+  if (!rest.terms.empty()) rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+  const std::vector<Vector6d> without =
+      whitenedResiduals(search.physics(), search.refined(rest).model, search.whitening());
+  std::vector<Eigen::VectorXd> signals;
+  for (const TriedEffect& one : tried) {
+    const bool is_refined = !one.refined.model.terms.empty();
+    signals.push_back(is_refined ? signalOf(search, without, one.model) : Eigen::VectorXd());
+  }
+  for (std::size_t a = 0; a < tried.size(); ++a) {
+    candidates[a].equivalents = {candidates[a].effect};
+    for (std::size_t b = 0; b < tried.size(); ++b) {
+      if (a == b || signals[a].size() == 0 || signals[b].size() == 0) continue;
+      if (std::abs(tried[a].bic_gain - tried[b].bic_gain) > kSameEvidence) continue;
+      if (correlation2(signals[a], signals[b]) > kSameSignal) candidates[a].equivalents.push_back(candidates[b].effect);
+    }
+  }
+}
+
+void setProbabilities(std::vector<GapCandidate>& candidates) {
+  double most = 0.0;
+  for (const GapCandidate& c : candidates) most = std::max(most, c.bic_gain);
+  double sum = 0.0;
+  for (GapCandidate& c : candidates) {
+    c.probability = std::exp(0.5 * (c.bic_gain - most) / kTemperature);
+    sum += c.probability;
+  }
+  for (GapCandidate& c : candidates) c.probability /= sum;
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const GapCandidate& a, const GapCandidate& b) { return a.probability > b.probability; });
+}
+
+/// From mean squares before and after, whitened.
+Shrinkage shrinkageOf(double before, double after, double low_after, double high_after, double mm_per_unit) {
+  Shrinkage shrinkage;
+  shrinkage.before_mm = mm_per_unit * std::sqrt(std::max(0.0, before));
+  shrinkage.after_mm = mm_per_unit * std::sqrt(std::max(0.0, after));
+  const auto fraction = [&](double left) { return before > 0.0 ? 1.0 - std::sqrt(std::max(0.0, left) / before) : 0.0; };
+  shrinkage.fraction = fraction(after);
+  shrinkage.low90 = fraction(high_after);
+  shrinkage.high90 = fraction(low_after);
+  return shrinkage;
+}
+
+}  // namespace
+
+std::vector<GapCandidate> describeCandidates(const GapSearch& search, const Selection& selection,
+                                             const HeldOutGap& held_out, double mm_per_unit) {
+  const GapRows& rows = search.physics().rows();
+  const double count = static_cast<double>(rows.rows.size()) * rows.channels();
+  std::vector<GapCandidate> candidates;
+  for (const TriedEffect& tried : selection.alternatives) {
+    GapCandidate candidate;
+    const bool is_refined = !tried.refined.model.terms.empty();
+    RefinedModel model = is_refined ? tried.refined : RefinedModel{tried.model, {}, 0, 0.0};
+    describeTerm(search, model, model.model.terms.size() - 1, candidate);
+    candidate.bic_gain = tried.bic_gain;
+    const double after = std::max(0.0, held_out.before - tried.held_out_gain / count);
+    candidate.shrinkage = shrinkageOf(held_out.before, after, after, after, mm_per_unit);
+    candidate.shrinkage.low90.reset();
+    candidate.shrinkage.high90.reset();
+    candidates.push_back(std::move(candidate));
+  }
+  findEquivalents(search, selection, candidates);
+  GapCandidate none;
+  none.effect = "none";
+  none.equivalents = {"none"};
+  none.shrinkage = shrinkageOf(held_out.before, held_out.before, held_out.before, held_out.before, mm_per_unit);
+  candidates.push_back(std::move(none));
+  setProbabilities(candidates);
+  return candidates;
+}
+
+std::vector<SelectedEffect> describeSelected(const GapSearch& search, const Selection& selection,
+                                             const HeldOutGap& held_out, const std::vector<GapCandidate>& candidates,
+                                             double mm_per_unit) {
+  const std::vector<double> credit = creditShares(search, selection);
+  std::vector<SelectedEffect> selected;
+  for (std::size_t t = 0; t < selection.ways.size(); ++t) {
+    SelectedEffect effect;
+    describeTerm(search, selection.model, t, effect);
+    effect.credit_fraction = credit[t];
+    effect.equivalents = {effect.effect};
+    effect.probability = 1.0;
+    for (const GapCandidate& c : candidates) {
+      if (c.effect != effect.effect) continue;
+      effect.equivalents = c.equivalents;
+      effect.probability = c.probability;
+      effect.bic_gain = c.bic_gain;
+    }
+    const double before = t == 0 ? held_out.before : held_out.after[t - 1];
+    effect.shrinkage =
+        shrinkageOf(before, held_out.after[t], held_out.after_low90[t], held_out.after_high90[t], mm_per_unit);
+    selected.push_back(std::move(effect));
+  }
+  return selected;
+}
+
+}  // namespace fieldtrue

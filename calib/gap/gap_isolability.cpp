@@ -1,0 +1,184 @@
+#include "calib/gap/gap_isolability.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "calib/core/file_io.h"
+#include "calib/core/statistics.h"
+
+namespace fieldtrue {
+namespace {
+
+/// Takes the alignment out of columns.
+class AlignmentProjector {
+ public:
+  explicit AlignmentProjector(const Linearized& at) {
+    Eigen::MatrixXd nuisance = at.nuisance().leftCols(at.nAlignment());
+    for (Eigen::Index j = 0; j < nuisance.cols(); ++j) nuisance.col(j).normalize();
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(nuisance);
+    qr.setThreshold(1e-7);
+    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(nuisance.rows(), qr.rank());
+  }
+  Eigen::MatrixXd operator()(const Eigen::MatrixXd& m) const { return m - basis_ * (basis_.transpose() * m); }
+
+ private:
+  Eigen::MatrixXd basis_;
+};
+
+/// What one effect does on this design: the columns at some of its starts, alignment taken out.
+struct Signature {
+  std::string effect;
+  std::vector<Eigen::MatrixXd> imitations;
+  Eigen::MatrixXd typical;  ///< Unit columns.
+};
+
+std::vector<Eigen::VectorXd> someStarts(const EffectFit& fit, std::size_t count) {
+  std::vector<Eigen::VectorXd> all = fit.starts();
+  std::erase_if(all, [&](const Eigen::VectorXd& start) { return !fit.allows(start); });
+  if (all.size() <= count) return all;
+  std::vector<Eigen::VectorXd> some;
+  for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
+  return some;
+}
+
+/// Unit columns that stand for an effect: each of its linear parameters at a few of its starts.
+Eigen::MatrixXd typicalOf(const std::vector<Eigen::MatrixXd>& columns) {
+  constexpr std::size_t kMost = 8;
+  const std::size_t used = std::min(kMost, columns.size());
+  std::vector<Eigen::VectorXd> list;
+  for (std::size_t i = 0; i < used; ++i) {
+    const Eigen::MatrixXd& m = columns[i * columns.size() / used];
+    Eigen::VectorXd mixed = Eigen::VectorXd::Zero(m.rows());
+    for (Eigen::Index j = 0; j < m.cols(); ++j) {
+      const double norm = m.col(j).norm();
+      if (!(norm > 0.0)) continue;
+      if (used == 1) list.emplace_back(m.col(j) / norm);
+      mixed += m.col(j) / norm * (j % 2 == 0 ? 1.0 : -0.6);
+    }
+    if (used > 1 && mixed.norm() > 0.0) list.emplace_back(mixed.normalized());
+  }
+  Eigen::MatrixXd typical(columns.front().rows(), static_cast<Eigen::Index>(list.size()));
+  for (std::size_t i = 0; i < list.size(); ++i) typical.col(static_cast<Eigen::Index>(i)) = list[i];
+  return typical;
+}
+
+/// Share of each unit column that the columns of `by` make.
+Eigen::VectorXd imitated(const Eigen::MatrixXd& typical, const Eigen::MatrixXd& by) {
+  Eigen::MatrixXd unit = by;
+  for (Eigen::Index j = 0; j < unit.cols(); ++j) {
+    const double norm = unit.col(j).norm();
+    if (norm > 0.0) unit.col(j) /= norm;
+  }
+  Eigen::MatrixXd normal = unit.transpose() * unit;
+  normal.diagonal().array() += 1e-8;
+  const Eigen::MatrixXd right = unit.transpose() * typical;
+  const Eigen::MatrixXd x = normal.llt().solve(right);
+  return right.cwiseProduct(x).colwise().sum();
+}
+
+double imitation(const Signature& a, const Signature& b) {
+  Eigen::VectorXd best = Eigen::VectorXd::Zero(a.typical.cols());
+  for (const Eigen::MatrixXd& by : b.imitations) best = best.cwiseMax(imitated(a.typical, by));
+  return median({best.data(), best.data() + best.size()});
+}
+
+std::vector<std::string> adviceFor(const Isolability& isolability, const GapRows& rows) {
+  std::vector<std::string> advice;
+  std::string same;
+  for (const IsolabilityPair& pair : isolability.pairs)
+    if (pair.r2 > 0.9) same += (same.empty() ? "" : ", ") + pair.a + " from " + pair.b;
+  if (!same.empty()) advice.push_back("This grid cannot tell " + same + ".");
+  if (!rows.several_orientations) {
+    advice.push_back(
+        "One orientation only: repeat some places with the sensor turned by 90 degrees, so that errors of the "
+        "transmitter's coils can be told from those of the sensor's, and a lever arm from a displaced transmitter.");
+  }
+  if (!rows.has_times) {
+    advice.push_back("No times are stated: drift and moved metal cannot be found.");
+    return advice;
+  }
+  bool in_order = true;
+  double last_s = -1e300;
+  std::size_t climbs = 0;
+  double last_z = -1e300;
+  for (const GapRow& row : rows.rows) {
+    in_order = in_order && row.time_s >= last_s;
+    last_s = row.time_s;
+    climbs += row.reference_from_sensor.position_m.z() >= last_z - 1e-6 ? 1 : 0;
+    last_z = row.reference_from_sensor.position_m.z();
+  }
+  if (in_order && climbs + rows.rows.size() / 10 >= rows.rows.size())
+    advice.push_back("The places are visited layer by layer: in random order drift can be told from a leaning rig.");
+  std::map<std::size_t, int> visits;
+  for (const GapRow& row : rows.rows) ++visits[row.place];
+  const auto revisited = std::count_if(visits.begin(), visits.end(), [](const auto& v) { return v.second > 1; });
+  if (revisited < 10)
+    advice.push_back("Set the jig anew at ten places or more: only that measures how well it is placed.");
+  return advice;
+}
+
+}  // namespace
+
+Isolability isolabilityOf(const GapSearch& search, std::size_t starts_each, const RunControl& control) {
+  const std::vector<int> one_block(search.physics().size(), 0);
+  const Linearized at(search.physics(), search.none().model, search.whitening(), one_block);
+  const AlignmentProjector projected(at);
+  std::vector<Signature> signatures;
+  for (const EffectWay& way : search.ways()) {
+    const std::vector<Eigen::VectorXd> starts = someStarts(*way.fit, starts_each);
+    std::vector<Eigen::MatrixXd> columns(starts.size());
+    control.parallel_for(starts.size(), [&](std::size_t i) {
+      if (!control.stop.stop_requested()) columns[i] = projected(at.columns(*way.fit, starts[i]));
+    });
+    if (control.stop.stop_requested() || columns.empty()) continue;
+    const auto found = std::find_if(signatures.begin(), signatures.end(),
+                                    [&](const Signature& s) { return s.effect == way.effect->id; });
+    if (found == signatures.end()) {
+      signatures.push_back({way.effect->id, columns, typicalOf(columns)});
+    } else {
+      found->imitations.insert(found->imitations.end(), columns.begin(), columns.end());
+    }
+  }
+  Isolability isolability;
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t a = 0; a < signatures.size(); ++a)
+    for (std::size_t b = a + 1; b < signatures.size(); ++b) pairs.emplace_back(a, b);
+  isolability.pairs.resize(pairs.size());
+  control.parallel_for(pairs.size(), [&](std::size_t i) {
+    const Signature& a = signatures[pairs[i].first];
+    const Signature& b = signatures[pairs[i].second];
+    const double r2 = std::min(imitation(a, b), imitation(b, a));
+    isolability.pairs[i] = {a.effect, b.effect, std::clamp(r2, 0.0, 1.0)};
+  });
+  std::stable_sort(isolability.pairs.begin(), isolability.pairs.end(),
+                   [](const IsolabilityPair& a, const IsolabilityPair& b) { return a.r2 > b.r2; });
+  isolability.warnings = adviceFor(isolability, search.physics().rows());
+  return isolability;
+}
+
+std::vector<SmallestDetectable> smallestDetectable(const GapSearch& search, double least_gain) {
+  const std::vector<int> one_block(search.physics().size(), 0);
+  const Linearized at(search.physics(), search.none().model, search.whitening(), one_block);
+  const AlignmentProjector projected(at);
+  const double count = static_cast<double>(at.order().size()) * at.channels();
+  std::vector<SmallestDetectable> list;
+  for (const EffectWay& way : search.ways()) {
+    if (!list.empty() && list.back().effect == way.effect->id) continue;
+    std::vector<double> sizes;
+    const std::vector<FitParameter> linear = way.fit->linear();
+    for (const Eigen::VectorXd& start : someStarts(*way.fit, 12)) {
+      const Eigen::MatrixXd columns = projected(at.columns(*way.fit, start));
+      const double norm = columns.col(0).norm();
+      const double parameters = static_cast<double>(linear.size()) + static_cast<double>(start.size());
+      if (norm > 0.0) sizes.push_back(std::sqrt(parameters * std::log(count) + least_gain) / norm);
+    }
+    if (sizes.empty()) continue;
+    list.push_back({way.effect->id, linear.front().name, median(std::move(sizes)), linear.front().unit});
+  }
+  return list;
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "calib/core/run_control.h"
+#include "calib/gap/gap_linear.h"
+
+namespace fieldtrue {
+
+/// The best places of one fit's coarse grid.
+struct ScanResult {
+  struct Start {
+    Eigen::VectorXd searched;
+    double gain = 0.0;  ///< Fall of the sum of squares, all rows.
+  };
+  std::vector<Start> best;            ///< Of all rows, best first, at most `kept`.
+  std::vector<Start> without_block;   ///< Best by the rows outside each hold-out block.
+  std::vector<double> held_out_gain;  ///< Fall of the held-out sum of squares of each block, at that start.
+};
+
+/// Tries every start of a fit, its linear parameters and those of `at` refitted, on all rows and with each block held
+/// out: the cross products of each block are summed once, so a hold-out costs no pass over the rows.
+ScanResult scan(const Linearized& at, const EffectFit& fit, std::size_t kept, const RunControl& control);
+
+}  // namespace fieldtrue
