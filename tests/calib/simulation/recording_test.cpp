@@ -5,6 +5,7 @@
 
 #include "calib/core/statistics.h"
 #include "calib/core/table_io.h"
+#include "calib/effects/registry.h"
 #include "calib/simulation/simulator.h"
 #include "tests/support/matchers.h"
 
@@ -70,6 +71,10 @@ class RecordingTest : public QObject {
   void namesAPlaceWithoutAPose_data();
   void namesAPlaceWithoutAPose();
   void refusesBadPlans();
+  void givesEffectsTheTimeOfEachReading();
+  void movesTheLayersOfTheRig();
+  void meetsTheMainsAtAnotherPhaseOnEveryVisit();
+  void repeatsWithEveryEffectAtOnce();
   void stopsWhenAsked();
 };
 
@@ -277,6 +282,69 @@ void RecordingTest::refusesBadPlans() {
   Scene bad;
   bad.effects = {{"metal_roof", {}}};
   QCOMPARE(simulate(bad, good, {}).error().code, ErrorCode::kBadInput);
+}
+
+// Each reading, not each place, is (1 + 1e-3 t)^(-1/3) as far away as the sensor.
+void RecordingTest::givesEffectsTheTimeOfEachReading() {
+  Scene scene;
+  scene.tracker.coupling_noise = 0.0;
+  scene.effects = {{"gain_drift", {{"slope_per_s", 1e-3}}}};
+  const Simulation simulation = simulate(scene, lineOfPlaces(5, 1, 0.6, 0.3), {}).value();
+  for (std::size_t i = 0; i < simulation.samples.rows.size(); ++i) {
+    const Sample& sample = simulation.samples.rows[i].sample;
+    const Eigen::Vector3d& truth_m = simulation.table.nodes[i / 60].reference_from_sensor.position_m;
+    const Eigen::Vector3d expected_m = truth_m / std::cbrt(1.0 + 1e-3 * sample.time_s);
+    FT_VERIFY_MATCH(near(sample.tracker_from_sensor.position_m, expected_m, 1e-9));
+  }
+}
+
+// The table keeps what the rig says; the readings come from where the layer is.
+void RecordingTest::movesTheLayersOfTheRig() {
+  Scene scene;
+  scene.tracker.coupling_noise = 0.0;
+  scene.effects = {
+      {"jig_layer_offset", {{"axis", "x"}, {"heights_m", {0.6, 0.9, 1.2}}, {"offsets_m", {0.0, 0.01, -0.02}}}}};
+  const Simulation simulation = simulate(scene, lineOfPlaces(3, 1, 0.6, 0.3), {}).value();
+  const double expected_m[3] = {0.6, 0.91, 1.18};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Node& node = simulation.table.nodes[i];
+    FT_VERIFY_MATCH(near(node.tracker_from_sensor.position_m, Eigen::Vector3d(expected_m[i], 0.2, -0.1), 1e-9));
+    FT_VERIFY_MATCH(near(node.reference_from_sensor.position_m.x(), 0.6 + 0.3 * static_cast<double>(i), 1e-12));
+  }
+}
+
+// 60 Hz read 60 times a second is a constant during a visit; from visit to visit it takes any phase, so the means of
+// a coupling scatter with the SD A/sqrt(2) d. A coupling S_yx off by s turns the sensor and moves the reading; here
+// only the scatter is asked for: of 400 visits none like another, their mean near the truth.
+void RecordingTest::meetsTheMainsAtAnotherPhaseOnEveryVisit() {
+  Scene scene;
+  scene.tracker.coupling_noise = 0.0;
+  scene.tracker.rate_hz = 60.0;
+  scene.effects = {{"mains_interference", {{"line_hz", {60.0}}, {"amplitude_per_m3", {1e-3}}}}};
+  const Simulation simulation = simulate(scene, lineOfPlaces(1, 400, 1.0, 0.3), {}).value();
+  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
+  double squares_m2 = 0.0;
+  for (std::size_t i = 0; i < simulation.table.nodes.size(); ++i) {
+    const Node& node = simulation.table.nodes[i];
+    const Eigen::Vector3d error_m = node.tracker_from_sensor.position_m - node.reference_from_sensor.position_m;
+    const Pose& first = simulation.samples.rows[60 * i].sample.tracker_from_sensor;
+    FT_VERIFY_MATCH(near(simulation.samples.rows[60 * i + 59].sample.tracker_from_sensor, first, 1e-9, 1e-9));
+    mean_m += error_m / 400.0;
+    squares_m2 += error_m.squaredNorm() / 400.0;
+  }
+  QVERIFY(squares_m2 > 1e-8);
+  QVERIFY(mean_m.norm() < 0.15 * std::sqrt(squares_m2));
+}
+
+void RecordingTest::repeatsWithEveryEffectAtOnce() {
+  Scene scene;
+  for (const Effect& effect : effects()) {
+    scene.effects.push_back({effect.id, resolveEffectParameters(effect, nullptr).value()});
+  }
+  const std::vector<PlannedPlace> plan = lineOfPlaces(5, 1, 0.6, 0.1);
+  const Simulation once = simulate(scene, plan, {}).value();
+  FT_VERIFY_MATCH(sameSimulation(once, simulate(scene, plan, {}).value()));
+  for (const Node& node : once.table.nodes) QVERIFY(node.tracker_from_sensor.position_m.allFinite());
 }
 
 void RecordingTest::stopsWhenAsked() {

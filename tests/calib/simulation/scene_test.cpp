@@ -71,7 +71,11 @@ void SceneTest::readsBackWhatItWrote() {
   scene.reference_from_tracker = {{0.1, 0.2, 1.0 / 3.0}, Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5)};
   scene.rig = {"pegboard", 0.002, 0.01, true, 0.003, 0.02};
   const Effect& metal = *findEffect("compact_metal").value();
+  scene.tracker.solver = "damped";
   scene.effects.push_back({"compact_metal", resolveEffectParameters(metal, {{"radius_m", 0.3}}).value()});
+  for (const Effect& effect : effects()) {
+    scene.effects.push_back({effect.id, resolveEffectParameters(effect, nullptr).value()});
+  }
   const nlohmann::json written = toJson(scene);
   const Result<Scene> read = sceneFromJson(nlohmann::json::parse(written.dump()), "written");
   FT_VERIFY_OK(read);
@@ -121,6 +125,11 @@ void SceneTest::refusesWithOneSentence_data() {
   row("out of range", R"({"tracker": {"correlation": 1}})", bad, {"tracker.correlation is 1", "0.999"});
   row("null", R"({"name": null})", bad, {"name is null", "a text"});
   row("bad choice", R"({"tracker": {"excitation": "dc"}})", bad, {"\"dc\"", "\"ac\" or \"pulsed_dc\""});
+  row("bad solver", R"({"tracker": {"solver": "newton"}})", bad, {"tracker.solver", "\"closed_form\"", "\"damped\""});
+  row("text for list", R"({"effects": [{"id": "jig_layer_offset", "parameters": {"heights_m": 0.3}}]})", bad,
+      {"heights_m is 0.3", "a list of 1 to 64 numbers"});
+  row("lists of two lengths", R"({"effects": [{"id": "jig_layer_offset", "parameters": {"offsets_m": [0.01]}}]})", bad,
+      {"effects[0]", "heights_m has 4 numbers and offsets_m 1"});
   row("two numbers", R"({"transmitter": {"position_m": [1, 2]}})", bad, {"transmitter.position_m is [1,2]", "three"});
   row("zero quaternion", R"({"transmitter": {"orientation_wxyz": [0, 0, 0, 0]}})", bad, {"orientation_wxyz", "unit"});
   row("object for list", R"({"effects": {}})", bad, {"effects is an object", "a list"});

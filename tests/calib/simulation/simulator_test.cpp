@@ -62,6 +62,14 @@ class SimulatorTest : public QObject {
   void standsWithinTheAlignmentTolerance();
   void marksReadingsWithoutAPose_data();
   void marksReadingsWithoutAPose();
+  void displacesTheSensorBeforeTheFieldIsTaken();
+  void keepsTheClock();
+  void hearsItsExcitation();
+  void solvesAsItsTrackerDoes_data();
+  void solvesAsItsTrackerDoes();
+  void scattersBeyondTheLawOfRange();
+  void roundsRotations();
+  void losesItsHemisphereByVisits();
   void refusesBadScenes();
 };
 
@@ -212,7 +220,135 @@ void SimulatorTest::marksReadingsWithoutAPose() {
   QCOMPARE(QString::fromStdString(tracker.measureExactly(at(x_m, 0.0, z_m), 0.0).status), status);
 }
 
+// A sensor off its mark in front of a floor is read like one that is there.
+void SimulatorTest::displacesTheSensorBeforeTheFieldIsTaken() {
+  const EffectInstance floor{"metal_plane", {{"distance_m", 1.2}}};
+  const Pose mount{{0.05, -0.02, 0.03}, rotationFromVector({0.2, 0.1, -0.3})};
+  Scene off;
+  off.effects = {floor, {"sensor_offset", {{"offset_m", {0.05, -0.02, 0.03}}, {"turn_rad", {0.2, 0.1, -0.3}}}}};
+  Scene there;
+  there.effects = {floor};
+  RandomGeometry random(5);
+  for (int i = 0; i < 20; ++i) {
+    const Pose stated{{1.0 + 0.02 * i, 0.3, -0.2}, random.rotation()};
+    const Pose seen = simulatorOf(off).measureExactly(stated, 0.0).tracker_from_sensor;
+    FT_VERIFY_MATCH(
+        near(seen, simulatorOf(there).measureExactly(stated * mount, 0.0).tracker_from_sensor, 1e-10, 1e-10));
+  }
+}
+
+// 3e-6 a second: after 10,000 s 3 % more signal, p (1.03)^(-1/3).
+void SimulatorTest::keepsTheClock() {
+  Scene scene;
+  scene.effects = {{"gain_drift", {{"slope_per_s", 3e-6}}}};
+  const TrackerSimulator tracker = simulatorOf(scene);
+  const Pose truth = at(1.2, -0.4, 0.3);
+  FT_VERIFY_MATCH(near(tracker.measureExactly(truth, 0.0).tracker_from_sensor, truth, 1e-9, 1e-9));
+  const Eigen::Vector3d expected_m = truth.position_m / std::cbrt(1.03);
+  FT_VERIFY_MATCH(near(tracker.measureExactly(truth, 1e4).tracker_from_sensor.position_m, expected_m, 1e-9));
+}
+
+// Steel keeps a 10 kHz field out and draws a steady one in: the errors point to opposite sides.
+void SimulatorTest::hearsItsExcitation() {
+  Scene ac;
+  ac.effects = {{"compact_metal",
+                 {{"center_m", {1.5, 0.0, -0.5}},
+                  {"material", "ferromagnetic"},
+                  {"relative_permeability", 100.0},
+                  {"conductivity_s_per_m", 6e6}}}};
+  Scene steady = ac;
+  steady.tracker.excitation = "pulsed_dc";
+  steady.tracker.sampling_delay_s = 0.5;
+  const Pose truth = at(1.5, 0.0, 0.0);
+  const auto error_m = [&](const Scene& scene) {
+    return Eigen::Vector3d(simulatorOf(scene).measureExactly(truth, 0.0).tracker_from_sensor.position_m -
+                           truth.position_m);
+  };
+  QVERIFY(error_m(steady).norm() > 1e-3 && error_m(ac).norm() > 1e-3);
+  QVERIFY(error_m(steady).normalized().dot(error_m(ac).normalized()) < -0.9);
+}
+
+void SimulatorTest::solvesAsItsTrackerDoes_data() {
+  QTest::addColumn<QString>("solver");
+  for (const char* solver : {"closed_form", "least_squares", "damped"}) QTest::newRow(solver) << QString(solver);
+}
+
+// In the open every solver reports the truth; beside metal the iterated one ends where the direct one does and the
+// damped one nearer to the place the sensor came from.
+void SimulatorTest::solvesAsItsTrackerDoes() {
+  QFETCH(QString, solver);
+  Scene scene;
+  scene.tracker.solver = solver.toStdString();
+  RandomGeometry random(6);
+  for (int i = 0; i < 50; ++i) {
+    const Pose truth = random.poseInShell(0.3, 3.0);
+    FT_VERIFY_MATCH(near(simulatorOf(scene).measureExactly(truth, 0.0).tracker_from_sensor, truth, 1e-6, 1e-6));
+  }
+  scene.effects = {{"metal_plane", {{"distance_m", 1.0}, {"strength", 0.5}}}};
+  Scene direct = scene;
+  direct.tracker.solver = "closed_form";
+  const Pose truth = at(1.4, 0.2, 0.1);
+  const Pose seen = simulatorOf(scene).measureExactly(truth, 0.0).tracker_from_sensor;
+  const Pose expected = simulatorOf(direct).measureExactly(truth, 0.0).tracker_from_sensor;
+  if (solver == "damped") {
+    QVERIFY((seen.position_m - truth.position_m).norm() < 0.99 * (expected.position_m - truth.position_m).norm());
+  } else {
+    FT_VERIFY_MATCH(near(seen, expected, 1e-6, 1e-6));
+  }
+}
+
+// The SD of the couplings 3 times as large at 1 m and growing as r: positions scatter as 3 r^5.
+void SimulatorTest::scattersBeyondTheLawOfRange() {
+  Scene scene;
+  scene.tracker.coupling_noise = 1e-5;
+  scene.effects = {{"range_noise", {{"factor", 3.0}, {"power", 1.0}}}};
+  for (const double range_m : {0.5, 1.0, 2.0}) {
+    TrackerSimulator tracker = simulatorOf(scene);
+    const double expected_m = 3.0 * std::sqrt(5.0) / 3.0 * 1e-5 * std::pow(range_m, 5);
+    FT_VERIFY_MATCH(near(rms(sidewaysErrors_m(tracker, range_m, 20000)) / expected_m, 1.0, 0.02));
+  }
+}
+
+void SimulatorTest::roundsRotations() {
+  Scene scene;
+  scene.effects = {{"quantization", {{"quantum_m", 2e-3}, {"quantum_rad", 0.01}}}};
+  TrackerSimulator tracker = simulatorOf(scene);
+  const Pose truth{{1.2, 0.1, -0.3}, rotationFromVector({0.312, -0.127, 0.455})};
+  for (int i = 0; i < 50; ++i) {
+    const Pose seen = tracker.measure(truth, i / 120.0).tracker_from_sensor;
+    const Eigen::Array3d turns = rotationVector_rad(seen.orientation).array() / 0.01;
+    const Eigen::Array3d steps = seen.position_m.array() / 2e-3;
+    FT_VERIFY_MATCH(near((turns - turns.round()).matrix().norm(), 0.0, 1e-9));
+    FT_VERIFY_MATCH(near((steps - steps.round()).matrix().norm(), 0.0, 1e-9));
+    FT_VERIFY_MATCH(near(seen.position_m, truth.position_m, 4e-3));
+  }
+}
+
+// Away and back again 2,000 times: three visits in ten are reported at -p with the right orientation, all readings of a
+// visit alike. The SD of that share is 1 %.
+void SimulatorTest::losesItsHemisphereByVisits() {
+  Scene scene;
+  scene.tracker.coupling_noise = 0.0;
+  scene.effects = {{"hemisphere_flip", {{"probability", 0.3}}}};
+  TrackerSimulator tracker = simulatorOf(scene);
+  int flips = 0;
+  for (int visit = 0; visit < 2000; ++visit) {
+    const Pose truth = at(1.0 + 0.2 * (visit % 2), 0.3, -0.1);
+    const Pose first = tracker.measure(truth, visit).tracker_from_sensor;
+    const Pose second = tracker.measure(truth, visit + 0.01).tracker_from_sensor;
+    const bool is_flipped = first.position_m.x() < 0.0;
+    const Pose expected{is_flipped ? Eigen::Vector3d(-truth.position_m) : truth.position_m, truth.orientation};
+    FT_VERIFY_MATCH(near(first, expected, 1e-9, 1e-9));
+    FT_VERIFY_MATCH(near(second, expected, 1e-9, 1e-9));
+    flips += is_flipped ? 1 : 0;
+  }
+  FT_VERIFY_MATCH(near(flips / 2000.0, 0.3, 0.035));
+}
+
 void SimulatorTest::refusesBadScenes() {
+  Scene unsolved;
+  unsolved.tracker.solver = "newton";
+  FT_VERIFY_MATCH(holdsAll(TrackerSimulator::make(unsolved, 1).error().message, {"newton", "closed_form"}));
   Scene scene;
   scene.name = "attic";
   scene.effects = {{"metal_plane", {}}, {"metal_roof", {}}};
