@@ -5,7 +5,7 @@
 #include "app/cli_values.h"
 #include "calib/core/file_io.h"
 #include "calib/correctors/registry.h"
-#include "calib/effects/registry.h"
+#include "calib/effects/effect_listing.h"
 #include "calib/exporters/registry.h"
 #include "calib/importers/registry.h"
 
@@ -72,15 +72,8 @@ Outcome listMethods(const ListOptions&, const CommonOptions&) {
 
 Outcome listEffects(const ListOptions&, const CommonOptions&) {
   Answer answer;
-  answer.json["effects"] = toJson(effects());
-  for (const Effect& effect : effects()) {
-    answer.text += effect.id + "  " + effect.label + (effect.source.empty() ? "" : "  [" + effect.source + "]") + "\n";
-    for (const EffectParameter& parameter : effect.parameters) {
-      answer.text += "    " + parameter.name + " (" + parameter.shape +
-                     (parameter.unit.empty() ? "" : ", " + parameter.unit) + ", default " +
-                     parameter.default_value.dump() + ")  " + parameter.help + "\n";
-    }
-  }
+  answer.json["effects"] = effectListing();
+  answer.text = effectListingText();
   return answer;
 }
 

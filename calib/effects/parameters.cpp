@@ -24,7 +24,9 @@ EffectParameter permeabilityParameter() {
           1.0,
           1e6,
           "Permeability over that of air; used only where `material` is `ferromagnetic`.",
-          {}};
+          {},
+          20.0,
+          5000.0};
 }
 
 double scalarOf(const nlohmann::json& parameters, const std::string& name) { return parameters.at(name).get<double>(); }

@@ -1,12 +1,18 @@
 // To add an effect:
-// 1. Write calib/effects/<id>.h and <id>.cpp: a CouplingDistortion, and a function that returns its Effect row. The
-//    header states the formula, its convention and its source.
-// 2. Give every parameter a name that ends in its unit, a shape, a range, a default and one sentence of help. `make`
-//    receives them resolved; it only refuses what makes no sense together.
+// 1. Write calib/effects/<id>.h and <id>.cpp: a PhysicalEffect (a CouplingDistortion where it is metal in the room),
+// and
+//    a function that returns its Effect row. The header states the formula, its convention and its source.
+// 2. Give every parameter a name that ends in its unit, a shape, a range, a default, one sentence of help and, where
+// one
+//    is known, the range met in practice. `make` receives them resolved; it only refuses what makes no sense together.
 // 3. Say in `admits` where a sensor cannot be.
-// 4. Add the row to the table below. Scenes, command line, reports and the contract test
-//    (tests/calib/effects/effect_registry_test.cpp) loop over it.
-// 5. Test the physics in tests/calib/effects/<id>_test.cpp against a boundary condition, a limit or a published figure.
+// 4. Write `fits` (effect_fit.h): the ways it is looked for in a recording. Where nothing is searched, linear_fit.h
+// makes
+//    both the effect and its ways from one function. Null where only the raw samples show it.
+// 5. Add the row to the table below and its defaults to resources/scenes/example.scene.json. Scenes, command line,
+//    diagnosis, reports and the contract tests (tests/calib/effects/effect_registry_test.cpp,
+//    effect_fit_contract_test.cpp) loop over it.
+// 6. Test the physics in tests/calib/effects/<id>_test.cpp against a boundary condition, a limit or a published figure.
 
 #include "calib/effects/registry.h"
 

@@ -1,8 +1,10 @@
 #include <QTest>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
 
+#include "calib/effects/effect_listing.h"
 #include "calib/effects/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
@@ -62,6 +64,8 @@ class EffectRegistryTest : public QObject {
   void refusesEveryParameterOfAnotherShape();
   void refusesEveryParameterOutOfRange_data() { rows(); }
   void refusesEveryParameterOutOfRange();
+  void listsHowEachIsFound_data() { rows(); }
+  void listsHowEachIsFound();
   void namesWhatIsKnown();
   void acceptsAMatrixEitherWay();
 
@@ -186,6 +190,28 @@ void EffectRegistryTest::refusesEveryParameterOutOfRange() {
       FT_VERIFY_MATCH(holdsAll(resolved.error().message, {effect->id.c_str(), parameter.name.c_str(), "must be"}));
     }
   }
+}
+
+void EffectRegistryTest::listsHowEachIsFound() {
+  QFETCH(const Effect*, effect);
+  const nlohmann::json listing = effectListing();
+  const auto row = std::find_if(listing.begin(), listing.end(),
+                                [&](const nlohmann::json& seen) { return seen.at("id") == effect->id; });
+  QVERIFY(row != listing.end());
+  QCOMPARE(row->at("parameters").size(), effect->parameters.size());
+  const std::string found_in = row->at("found_in").get<std::string>();
+  QCOMPARE(found_in == "places", !row->at("fits").empty());
+  for (const nlohmann::json& way : row->at("fits")) {
+    QVERIFY(!way.at("name").get<std::string>().empty() && !way.at("linear").empty());
+    for (const char* kind : {"searched", "linear"}) {
+      for (const nlohmann::json& parameter : way.at(kind)) {
+        QVERIFY(parameter.at("low").get<double>() < parameter.at("high").get<double>());
+      }
+    }
+  }
+  const std::string text = effectListingText();
+  QVERIFY(text.find(effect->id + "  " + effect->label) != std::string::npos);
+  for (const EffectParameter& parameter : effect->parameters) QVERIFY(text.find(parameter.help) != std::string::npos);
 }
 
 void EffectRegistryTest::namesWhatIsKnown() {
