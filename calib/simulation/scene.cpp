@@ -107,7 +107,8 @@ Result<RigModel> rigFrom(const nlohmann::json& json, const std::string& file) {
   return rig;
 }
 
-Result<EffectInstance> effectFrom(const nlohmann::json& json, const std::string& file, std::size_t index) {
+Result<EffectInstance> effectFrom(const nlohmann::json& json, const std::string& file, std::size_t index,
+                                  const Excitation& excitation) {
   const std::string path = "effects[" + std::to_string(index) + "]";
   ObjectReader reader(json, file, path);
   EffectInstance instance;
@@ -119,7 +120,7 @@ Result<EffectInstance> effectFrom(const nlohmann::json& json, const std::string&
   if (!effect) return located(effect.error());
   Result<nlohmann::json> parameters = resolveEffectParameters(**effect, given);
   if (!parameters) return located(parameters.error());
-  if (const auto made = (*effect)->make(*parameters, {}); !made) return located(made.error());
+  if (const auto made = (*effect)->make(*parameters, excitation); !made) return located(made.error());
   instance.parameters = std::move(*parameters);
   return instance;
 }
@@ -145,6 +146,10 @@ Result<nlohmann::json> parsed(const std::string& text, const std::string& file) 
 
 }  // namespace
 
+Excitation excitationOf(const TrackerModel& tracker) {
+  return {tracker.excitation == "pulsed_dc", tracker.carrier_hz, tracker.sampling_delay_s};
+}
+
 Result<Scene> sceneFromJson(const nlohmann::json& json, const std::string& name) {
   if (const Result<void> schema = checkSchema(json, name); !schema) return tl::unexpected<Error>(schema.error());
   ObjectReader reader(json, name, "");
@@ -167,7 +172,7 @@ Result<Scene> sceneFromJson(const nlohmann::json& json, const std::string& name)
   scene.reference_from_tracker = *transmitter;
   scene.rig = *rig;
   for (std::size_t i = 0; effects_json != nullptr && i < effects_json->size(); ++i) {
-    Result<EffectInstance> effect = effectFrom((*effects_json)[i], name, i);
+    Result<EffectInstance> effect = effectFrom((*effects_json)[i], name, i, excitationOf(scene.tracker));
     if (!effect) return tl::unexpected<Error>(effect.error());
     scene.effects.push_back(std::move(*effect));
   }

@@ -7,6 +7,7 @@
 
 #include "calib/core/error.h"
 #include "calib/core/pose.h"
+#include "calib/field/effect.h"
 
 namespace fieldtrue {
 
@@ -26,6 +27,9 @@ struct TrackerModel {
   double nearest_range_m = 0.1;        ///< Nearer, the receiver saturates.
   double farthest_range_m = 9.144;     ///< Farther, the signal is too weak. 30 ft, the long-range transmitter's reach.
 };
+
+/// How it drives its transmitter, as effects ask for it.
+Excitation excitationOf(const TrackerModel& tracker);
 
 /// How truth is known: the jig and its tolerances.
 struct RigModel {

@@ -30,10 +30,6 @@ Eigen::Quaterniond onLattice(const Eigen::Quaterniond& rotation, double quantum_
   return rotationFromVector(onLattice(rotationVector_rad(rotation), quantum_rad));
 }
 
-Excitation excitationOf(const TrackerModel& tracker) {
-  return {tracker.excitation == "pulsed_dc", tracker.carrier_hz, tracker.sampling_delay_s};
-}
-
 /// The pose with every effect's shift and turn, which add.
 Pose displaced(const Pose& stated, const std::vector<EffectResponse>& responses) {
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
