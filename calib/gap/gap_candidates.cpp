@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/gap/gap_profile.h"
+
 namespace fieldtrue {
 namespace {
 
@@ -61,7 +63,7 @@ Sensitivity sensitivityOf(const GapTerm& term, const FittedEffect& fitted) {
 }
 
 /// What a fitted term says, with intervals where its model was refined.
-void describeTerm(const GapSearch& search, const RefinedModel& refined, std::size_t term, GapCandidate& candidate) {
+void describeTerm(const RefinedModel& refined, std::size_t term, GapCandidate& candidate) {
   const GapTerm& fitted_term = refined.model.terms[term];
   const FittedEffect fitted = fitted_term.fit->describe(fitted_term.searched, fitted_term.linear);
   candidate.effect = fitted_term.effect->id;
@@ -86,7 +88,21 @@ void describeTerm(const GapSearch& search, const RefinedModel& refined, std::siz
   }
   if (fitted.location_m)
     candidate.location_covariance_m2 = sensitivity.location * covariance * sensitivity.location.transpose();
-  (void)search;
+}
+
+/// Replaces the interval of each searched parameter by where the profile likelihood falls by 2.706 / 2.
+void profileSearched(const GapSearch& search, const RefinedModel& refined, std::size_t term, GapCandidate& candidate) {
+  const TermPlace place = placeOf(refined, term);
+  const std::vector<FitParameter> names = refined.model.terms[term].fit->searched();
+  for (Eigen::Index d = 0; d < place.searched; ++d) {
+    const std::string& name = names[static_cast<std::size_t>(d)].name;
+    const auto is_it = [&](const Estimate& e) { return e.name == name; };
+    const auto found = std::find_if(candidate.parameters.begin(), candidate.parameters.end(), is_it);
+    if (found == candidate.parameters.end()) continue;
+    const ProfileInterval interval = profileInterval(search, refined, term, d);
+    if (interval.low) found->low90 = *interval.low;
+    if (interval.high) found->high90 = *interval.high;
+  }
 }
 
 /// What an effect does to the whitened residuals of the model without it.
@@ -124,12 +140,18 @@ void findEquivalents(const GapSearch& search, const Selection& selection, std::v
   }
 }
 
+/// What does not help on places it was not fitted to counts for less.
+double evidenceOf(const GapCandidate& c) {
+  constexpr double kCostOfFailing = 10.0;
+  return c.bic_gain - (c.effect != "none" && c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
+}
+
 void setProbabilities(std::vector<GapCandidate>& candidates) {
   double most = 0.0;
-  for (const GapCandidate& c : candidates) most = std::max(most, c.bic_gain);
+  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c));
   double sum = 0.0;
   for (GapCandidate& c : candidates) {
-    c.probability = std::exp(0.5 * (c.bic_gain - most) / kTemperature);
+    c.probability = std::exp(0.5 * (evidenceOf(c) - most) / kTemperature);
     sum += c.probability;
   }
   for (GapCandidate& c : candidates) c.probability /= sum;
@@ -160,9 +182,9 @@ std::vector<GapCandidate> describeCandidates(const GapSearch& search, const Sele
     GapCandidate candidate;
     const bool is_refined = !tried.refined.model.terms.empty();
     RefinedModel model = is_refined ? tried.refined : RefinedModel{tried.model, {}, 0, 0.0};
-    describeTerm(search, model, model.model.terms.size() - 1, candidate);
+    describeTerm(model, model.model.terms.size() - 1, candidate);
     candidate.bic_gain = tried.bic_gain;
-    const double after = std::max(0.0, held_out.before - tried.held_out_gain / count);
+    const double after = held_out.before - tried.held_out_gain / count;
     candidate.shrinkage = shrinkageOf(held_out.before, after, after, after, mm_per_unit);
     candidate.shrinkage.low90.reset();
     candidate.shrinkage.high90.reset();
@@ -185,7 +207,8 @@ std::vector<SelectedEffect> describeSelected(const GapSearch& search, const Sele
   std::vector<SelectedEffect> selected;
   for (std::size_t t = 0; t < selection.ways.size(); ++t) {
     SelectedEffect effect;
-    describeTerm(search, selection.model, t, effect);
+    describeTerm(selection.model, t, effect);
+    profileSearched(search, selection.model, t, effect);
     effect.credit_fraction = credit[t];
     effect.equivalents = {effect.effect};
     effect.probability = 1.0;

@@ -189,7 +189,8 @@ class JointFit {
     double damping = 1e-3;
     for (int step = 0; step < options_.most_steps; ++step) {
       const Linearized at(physics_, model, whitening_, block_);
-      const Eigen::MatrixXd& J = at.nuisance();
+      Eigen::MatrixXd J = at.nuisance();
+      if (options_.frozen) J.col(*options_.frozen).setZero();
       const Eigen::VectorXd w = weights(at);
       Eigen::MatrixXd normal = J.transpose() * w.asDiagonal() * J;
       const Eigen::VectorXd right = J.transpose() * (w.asDiagonal() * at.residual());

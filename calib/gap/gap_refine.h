@@ -49,6 +49,7 @@ struct RefineOptions {
   ResidualLaw law;
   std::span<const char> used = {};  ///< Per row; empty = all.
   int most_steps = 20;
+  std::optional<Eigen::Index> frozen = std::nullopt;  ///< A parameter that stays as it is, counted as in `covariance`.
 };
 
 struct RefinedModel {

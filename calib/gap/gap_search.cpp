@@ -102,6 +102,14 @@ RefinedModel GapSearch::refined(const GapModel& start, std::span<const char> use
   return refineJointly(physics_, start, whitening_, options);
 }
 
+RefinedModel GapSearch::refinedWithout(const GapModel& start, Eigen::Index frozen) const {
+  RefineOptions options;
+  options.law = law_;
+  options.frozen = frozen;
+  options.most_steps = 8;
+  return refineJointly(physics_, start, whitening_, options);
+}
+
 std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
                                              const RefinedModel& base, const RunControl& control) const {
   constexpr std::size_t kStarts = 3;

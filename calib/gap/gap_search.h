@@ -58,6 +58,8 @@ class GapSearch {
 
   double bicOf(const GapModel& model) const;
   RefinedModel refined(const GapModel& start, std::span<const char> used = {}) const;
+  /// All but one parameter refitted, counted as in RefinedModel::covariance.
+  RefinedModel refinedWithout(const GapModel& start, Eigen::Index frozen) const;
   /// Every effect added to a model, best first; only the best way of each effect.
   /// @param slow_only_near how far below the best a linearised gain may be for the full refinement
   std::vector<TriedEffect> rank(const RefinedModel& base, const RunControl& control) const;
