@@ -22,10 +22,15 @@ Q_DECLARE_METATYPE(const fieldtrue::Effect*)
 
 namespace {
 
-/// The three designs every way of fitting must stand.
+/// The designs every way of fitting must stand.
 OwnedDesign designOf(const QString& name) {
   if (name == "grid") return gridDesign({Eigen::Quaterniond::Identity()}, false, false);
   if (name == "grid, four turns, times") return gridDesign(fourTurns(), true, true);
+  if (name == "scattered, positions only") {
+    OwnedDesign positions = scatteredDesign(true, false);
+    positions.design.has_orientation = false;
+    return positions;
+  }
   OwnedDesign scattered = scatteredDesign(true, true);
   scattered.design.excitation = {true, 0.0, 0.002};
   return scattered;
@@ -102,7 +107,7 @@ void EffectFitContractTest::rows() {
   QTest::addColumn<QString>("design_name");
   for (const Effect& effect : effects()) {
     if (effect.fits == nullptr) continue;
-    for (const char* design : {"grid", "grid, four turns, times", "scattered"}) {
+    for (const char* design : {"grid", "grid, four turns, times", "scattered", "scattered, positions only"}) {
       QTest::addRow("%s, %s", effect.id.c_str(), design) << &effect << QString(design);
     }
   }

@@ -54,6 +54,7 @@ class SimulatorTest : public QObject {
   void seesTheSceneFromTheTransmitter();
   void addsItsEffects();
   void scattersWithTheFourthPowerOfRange();
+  void scattersFlatAcrossTheLineOfSight();
   void keepsTheCorrelationOfItsFilter();
   void forgetsWhenReset();
   void roundsToItsQuantum();
@@ -120,6 +121,38 @@ void SimulatorTest::scattersWithTheFourthPowerOfRange() {
     TrackerSimulator tracker = simulatorOf(scene);
     const double expected_m = std::sqrt(5.0) / 3.0 * 1e-5 * std::pow(range_m, 4);
     FT_VERIFY_MATCH(near(rms(sidewaysErrors_m(tracker, range_m, 20000)) / expected_m, 1.0, 0.02));
+  }
+}
+
+// Least squares of nine couplings of equal SD sigma, worked by hand from the singular values: radial SD
+// sigma r^4/(3 sqrt(6) C), transverse sqrt(5)/3 sigma r^4/C, so the ratio is sqrt(30); each axis of the rotation
+// sqrt(3/2) sigma r^3/C in root mean square. Anywhere, in any orientation; 10,000 readings give each to 1 %.
+void SimulatorTest::scattersFlatAcrossTheLineOfSight() {
+  Scene scene;
+  scene.tracker.coupling_noise = 1e-5;
+  RandomGeometry random(8);
+  for (int place = 0; place < 5; ++place) {
+    const Pose truth = random.poseInShell(0.5, 2.5);
+    const double range_m = truth.position_m.norm();
+    const Eigen::Vector3d outward = truth.position_m / range_m;
+    TrackerSimulator tracker = simulatorOf(scene);
+    double radial_m2 = 0.0;
+    double transverse_m2 = 0.0;
+    double turn_rad2 = 0.0;
+    constexpr int kReadings = 10000;
+    for (int i = 0; i < kReadings; ++i) {
+      const Pose seen = tracker.measure(truth, i / 120.0).tracker_from_sensor;
+      const Eigen::Vector3d error_m = seen.position_m - truth.position_m;
+      const double along_m = outward.dot(error_m);
+      radial_m2 += along_m * along_m / kReadings;
+      transverse_m2 += (error_m.squaredNorm() - along_m * along_m) / (2.0 * kReadings);
+      turn_rad2 += std::pow(angleBetween_rad(seen.orientation, truth.orientation), 2) / (3.0 * kReadings);
+    }
+    const double sigma_m = 1e-5 * std::pow(range_m, 4);
+    FT_VERIFY_MATCH(near(std::sqrt(radial_m2) / (sigma_m / (3.0 * std::sqrt(6.0))), 1.0, 0.04));
+    FT_VERIFY_MATCH(near(std::sqrt(transverse_m2) / (std::sqrt(5.0) / 3.0 * sigma_m), 1.0, 0.03));
+    FT_VERIFY_MATCH(near(std::sqrt(transverse_m2 / radial_m2) / std::sqrt(30.0), 1.0, 0.05));
+    FT_VERIFY_MATCH(near(std::sqrt(turn_rad2) / (std::sqrt(1.5) * sigma_m / range_m), 1.0, 0.03));
   }
 }
 
