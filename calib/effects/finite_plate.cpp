@@ -2,8 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <limits>
+#include <mutex>
 #include <numbers>
 
 #include "calib/core/file_io.h"
@@ -21,6 +24,9 @@ constexpr double kFourPi = 4.0 * std::numbers::pi;
 constexpr double kFirstSize_m = 0.6;
 constexpr double kSmallest_m = 0.1;
 constexpr double kLargest_m = 4.0;
+/// Along the side of a square.
+constexpr int kFewestCells = 6;
+constexpr int kMostCells = 12;
 
 /// Where a plate stands: columns along its length, along its width, normal to it; tracker frame.
 struct PlateFrame {
@@ -170,6 +176,14 @@ class PlateMetal {
   Excitation excitation_;
 };
 
+/// Cells along the side of a square of this plate's area: about two thirds of the transmitter's distance each, but six
+/// at least and twelve at most.
+int cellsAlongSide(const PlateFrame& frame) {
+  const double side_m = 2.0 * std::sqrt(frame.half_m.prod());
+  const double wanted = 1.5 * side_m / frame.distance_m(Eigen::Vector3d::Zero());
+  return static_cast<int>(std::ceil(std::clamp(wanted, double{kFewestCells}, double{kMostCells})));
+}
+
 PlateAnswer answerOf(const SheetMesh& mesh, const nlohmann::json& parameters, const Excitation& excitation) {
   const bool is_ferromagnetic = isFerromagnetic(parameters);
   const double mu_r = is_ferromagnetic ? scalarOf(parameters, "relative_permeability") : 1.0;
@@ -210,22 +224,28 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
     return fail(ErrorCode::kBadInput, "finite_plate: center_m " + textOf(frame.center_m) +
                                           " puts the transmitter in the plate; move the plate.");
   }
-  const SheetMesh mesh(2.0 * frame.half_m.x(), 2.0 * frame.half_m.y());
+  const int along = cellsAlongSide(frame);
+  const SheetMesh mesh(2.0 * frame.half_m.x(), 2.0 * frame.half_m.y(), along * along);
   return std::make_unique<FinitePlate>(frame, mesh.ringCenters_m(), mesh.chargeCenters_m(), 1.0,
                                        answerOf(mesh, parameters, excitation), scalarOf(parameters, "strength"));
 }
 
 /// Answers of a square plate of side 1 m, from which those of any square follow by size.
 struct UnitSquare {
-  SheetMesh mesh{1.0, 1.0};
+  explicit UnitSquare(int along) : mesh(1.0, 1.0, along * along) {}
+  SheetMesh mesh;
   Eigen::MatrixXd moments = mesh.currentModes().answer([](double) { return 1.0; });
   Eigen::MatrixXd charges = mesh.chargeModes().answer(
       [](double rate) { return idealChargeShare(rate, std::numeric_limits<double>::infinity()); });
 };
 
-const UnitSquare& unitSquare() {
-  static const UnitSquare kSquare;
-  return kSquare;
+/// Meshed once in a program's life.
+const UnitSquare& unitSquare(int along) {
+  static std::array<std::once_flag, kMostCells + 1> flags;
+  static std::array<std::unique_ptr<const UnitSquare>, kMostCells + 1> squares;
+  const auto i = static_cast<std::size_t>(along);
+  std::call_once(flags[i], [&] { squares[i] = std::make_unique<const UnitSquare>(along); });
+  return *squares[i];
 }
 
 class FinitePlateFit final : public EffectFit {
@@ -269,15 +289,17 @@ class FinitePlateFit final : public EffectFit {
   void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
                std::span<EffectResponse> responses) const override {
     const double size_m = searched[5];
+    const PlateFrame frame = frameAt(searched);
+    const UnitSquare& square = unitSquare(cellsAlongSide(frame));
     PlateAnswer answer;
     // A ring's moment per field grows as size^3 with its area and inductance, a charge per potential as size.
     if (is_ferromagnetic_) {
-      answer.charges = size_m * unitSquare().charges;
+      answer.charges = size_m * square.charges;
     } else {
-      answer.moments = size_m * size_m * size_m * unitSquare().moments;
+      answer.moments = size_m * size_m * size_m * square.moments;
     }
-    const SheetMesh& mesh = unitSquare().mesh;
-    const FinitePlate plate(frameAt(searched), mesh.ringCenters_m(), mesh.chargeCenters_m(), size_m, answer, 1.0);
+    const SheetMesh& mesh = square.mesh;
+    const FinitePlate plate(frame, mesh.ringCenters_m(), mesh.chargeCenters_m(), size_m, answer, 1.0);
     for (std::size_t i = 0; i < at.size(); ++i) responses[i] = plate.at(at[i]);
   }
 
