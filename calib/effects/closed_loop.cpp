@@ -203,10 +203,19 @@ Effect closedLoopEffect() {
   effect.label = "Closed conducting loop";
   effect.source = "Jackson 1999, Classical Electrodynamics, section 5.5; inductance: Maxwell 1873, art. 704";
   effect.parameters = {
-      {"center_m", "m", "vector3", {1.0, 0.0, -1.0}, -100.0, 100.0, "Middle of the loop, tracker frame.", {}},
+      {"center_m",
+       "m",
+       "vector3",
+       {1.0, 0.0, -1.0},
+       -100.0,
+       100.0,
+       "Middle of the loop, tracker frame.",
+       {},
+       -10.0,
+       10.0},
       {"normal", "", "vector3", {0.0, 0.0, 1.0}, 0.0, 0.0, "Axis of the loop, tracker frame; any length.", {}},
-      {"radius_m", "m", "scalar", 0.3, 0.01, 10.0, "Of the loop.", {}},
-      {"wire_radius_m", "m", "scalar", 0.005, 1e-4, 0.5, "Of the wire or tube it is made of.", {}},
+      {"radius_m", "m", "scalar", 0.3, 0.01, 10.0, "Of the loop.", {}, 0.05, 2.0},
+      {"wire_radius_m", "m", "scalar", 0.005, 1e-4, 0.5, "Of the wire or tube it is made of.", {}, 5e-4, 0.02},
       {"conductivity_s_per_m",
        "S/m",
        "scalar",
@@ -215,7 +224,9 @@ Effect closedLoopEffect() {
        1e8,
        "Of the wire: copper 5.8e7, aluminium 3.5e7, steel 6e6. When given, its resistance and the tracker's carrier or "
        "sampling delay decide how much of the current is left; null is a loop without resistance.",
-       {}},
+       {},
+       5e6,
+       6e7},
       {"strength",
        "",
        "scalar",
@@ -224,7 +235,9 @@ Effect closedLoopEffect() {
        100.0,
        "Share of the current a loop without resistance would carry; below 1 for thin wire, bad joints or a low "
        "carrier. No real loop has more than 1 or less than 0.",
-       {}}};
+       {},
+       0.0,
+       1.0}};
   effect.make = make;
   effect.fits = fits;
   return effect;

@@ -165,7 +165,9 @@ Effect finiteCoilEffect() {
        1e-4,
        1.0,
        "Of the coil about x, y and z: radius of a ring, or half the side of a square.",
-       {}},
+       {},
+       0.003,
+       0.15},
       {"shape",
        "",
        "text",
@@ -182,7 +184,9 @@ Effect finiteCoilEffect() {
        1.0,
        "Mean square radius of three coils alike, to leading order in radius over range; when given, radius and shape "
        "are not used. Below 0 stands for coils wound to cancel more than their own size.",
-       {}}};
+       {},
+       0.0,
+       0.0225}};
   effect.make = make;
   effect.fits = fits;
   return effect;

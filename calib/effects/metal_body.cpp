@@ -78,28 +78,42 @@ Eigen::Matrix3d MetalBody::fieldChange_per_m3(const Eigen::Vector3d& p_sensor_m)
 }
 
 std::vector<EffectParameter> bodyParameters() {
-  return {{"center_m", "m", "vector3", {1.0, 0.0, -1.0}, -100.0, 100.0, "Middle of the body, tracker frame.", {}},
-          {"radius_m", "m", "scalar", 0.1, 0.001, 10.0, "Radius of a sphere that answers as the body does.", {}},
-          materialParameter(),
-          permeabilityParameter(),
-          {"conductivity_s_per_m",
-           "S/m",
-           "scalar",
-           nullptr,
-           1.0,
-           1e8,
-           "Of a solid sphere: aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's "
-           "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal.",
-           {}},
-          {"polarizability_m3",
-           "m^3",
-           "matrix3",
-           nullptr,
-           -1e4,
-           1e4,
-           "Induced moment per field, tracker axes; when given, radius, material, permeability and conductivity are "
-           "not used.",
-           {}}};
+  return {
+      {"center_m",
+       "m",
+       "vector3",
+       {1.0, 0.0, -1.0},
+       -100.0,
+       100.0,
+       "Middle of the body, tracker frame.",
+       {},
+       -10.0,
+       10.0},
+      {"radius_m", "m", "scalar", 0.1, 0.001, 10.0, "Radius of a sphere that answers as the body does.", {}, 0.02, 0.5},
+      materialParameter(),
+      permeabilityParameter(),
+      {"conductivity_s_per_m",
+       "S/m",
+       "scalar",
+       nullptr,
+       1.0,
+       1e8,
+       "Of a solid sphere: aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's "
+       "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal.",
+       {},
+       1e6,
+       6e7},
+      {"polarizability_m3",
+       "m^3",
+       "matrix3",
+       nullptr,
+       -1e4,
+       1e4,
+       "Induced moment per field, tracker axes; when given, radius, material, permeability and conductivity are "
+       "not used.",
+       {},
+       -0.8,
+       1.6}};
 }
 
 Result<MetalBody> bodyOf(const nlohmann::json& parameters, const Excitation& excitation, const std::string& effect_id) {
