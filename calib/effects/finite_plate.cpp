@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <mutex>
 #include <numbers>
@@ -137,45 +136,6 @@ double idealChargeShare(double rate, double chi_t_m) {
   return chi_t_m * rate / (1.0 + chi_t_m * rate);
 }
 
-/// What of a plate's currents and magnetisation a tracker sees.
-class PlateMetal {
- public:
-  PlateMetal(const Metal& metal, double thickness_m, const Excitation& excitation)
-      : metal_(metal), thickness_m_(thickness_m), excitation_(excitation) {}
-
-  double currentShare(double rate) const {
-    return seenResponse(
-        [&](Complex s) {
-          const Complex sheet_ohm = 1.0 / (metal_.conductivity_s_per_m * thickness_m_ * flatness(s));
-          return s / (s + rate * sheet_ohm / kMu0_h_per_m);
-        },
-        excitation_);
-  }
-
-  double chargeShare(double rate) const {
-    return seenResponse(
-        [&](Complex s) {
-          const Complex magnetised = (metal_.relative_permeability * flatness(s) - 1.0) * thickness_m_ * rate;
-          return magnetised / (1.0 + magnetised);
-        },
-        excitation_);
-  }
-
- private:
-  using Complex = std::complex<double>;
-  /// tanh(x)/x, x = gamma d/2: how evenly the field fills the plate's thickness.
-  Complex flatness(Complex s) const {
-    const Complex x =
-        0.5 * thickness_m_ * std::sqrt(s * kMu0_h_per_m * metal_.relative_permeability * metal_.conductivity_s_per_m);
-    if (std::abs(x) < 1e-4) return 1.0;
-    return (x.real() > 20.0 ? 1.0 : std::tanh(x)) / x;
-  }
-
-  Metal metal_;
-  double thickness_m_;
-  Excitation excitation_;
-};
-
 /// Cells along the side of a square of this plate's area: about two thirds of the transmitter's distance each, but six
 /// at least and twelve at most.
 int cellsAlongSide(const PlateFrame& frame) {
@@ -199,10 +159,10 @@ PlateAnswer answerOf(const SheetMesh& mesh, const nlohmann::json& parameters, co
     answer.charges = mesh.chargeModes().answer([&](double rate) { return idealChargeShare(rate, chi_t_m); });
     return answer;
   }
-  const PlateMetal metal({scalarOf(parameters, "conductivity_s_per_m"), mu_r}, thickness.get<double>(), excitation);
-  answer.moments = mesh.currentModes().answer([&](double rate) { return metal.currentShare(rate); });
+  const MetalSheet sheet{{scalarOf(parameters, "conductivity_s_per_m"), mu_r}, thickness.get<double>()};
+  answer.moments = mesh.currentModes().answer([&](double rate) { return sheetCurrentShare(sheet, rate, excitation); });
   if (is_ferromagnetic) {
-    answer.charges = mesh.chargeModes().answer([&](double rate) { return metal.chargeShare(rate); });
+    answer.charges = mesh.chargeModes().answer([&](double rate) { return sheetChargeShare(sheet, rate, excitation); });
   }
   return answer;
 }

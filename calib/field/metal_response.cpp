@@ -22,6 +22,14 @@ Complex tanhOf(const Complex& z) {
   return (1.0 - e) / (1.0 + e);
 }
 
+/// tanh(x)/x, x = gamma d/2: how evenly a field alike on both sides fills a sheet.
+Complex evennessThrough(const MetalSheet& sheet, Complex s) {
+  const Metal& metal = sheet.metal;
+  const Complex x =
+      0.5 * sheet.thickness_m * std::sqrt(s * kMu0_h_per_m * metal.relative_permeability * metal.conductivity_s_per_m);
+  return std::abs(x) < 1e-4 ? Complex(1.0) : tanhOf(x) / x;
+}
+
 }  // namespace
 
 double stepResponse(const SpectralResponse& response, double time_s) {
@@ -79,6 +87,23 @@ std::complex<double> slabReflection(double k_per_m, const Metal& metal, std::opt
   if (!thickness_m) return (u - mu_k) / (u + mu_k);
   const Complex T = tanhOf(u * *thickness_m);
   return (u2 - mu_k * mu_k) * T / (2.0 * mu_k * u + (u2 + mu_k * mu_k) * T);
+}
+
+double sheetCurrentShare(const MetalSheet& sheet, double rate_per_m, const Excitation& excitation) {
+  const auto response = [&](Complex s) {
+    const Complex sheet_ohm = 1.0 / (sheet.metal.conductivity_s_per_m * sheet.thickness_m * evennessThrough(sheet, s));
+    return s / (s + rate_per_m * sheet_ohm / kMu0_h_per_m);
+  };
+  return seenResponse(response, excitation);
+}
+
+double sheetChargeShare(const MetalSheet& sheet, double rate_per_m, const Excitation& excitation) {
+  const auto response = [&](Complex s) {
+    const Complex magnetised =
+        (sheet.metal.relative_permeability * evennessThrough(sheet, s) - 1.0) * sheet.thickness_m * rate_per_m;
+    return magnetised / (1.0 + magnetised);
+  };
+  return seenResponse(response, excitation);
 }
 
 double inductiveShare(double rate_per_s, const Excitation& excitation) {

@@ -47,6 +47,21 @@ double sphereSusceptibility(double radius_m, const Metal& metal, const Excitatio
 std::complex<double> slabReflection(double k_per_m, const Metal& metal, std::optional<double> thickness_m,
                                     std::complex<double> s);
 
+/// A flat sheet.
+struct MetalSheet {
+  Metal metal;
+  double thickness_m = 1e-3;
+};
+
+/// What a tracker sees of a mode of a sheet's currents, 1 without resistance: s/(s + rate Z/mu_0) with the sheet
+/// impedance Z = (gamma/2 sigma) coth(gamma d/2), gamma^2 = s mu sigma, 1/(sigma d) where it is thin.
+/// @param rate_per_m of calib/field/sheet_mesh.h
+/// @source Wait 1962, Electromagnetic Waves in Stratified Media, chapter 2
+double sheetCurrentShare(const MetalSheet& sheet, double rate_per_m, const Excitation& excitation);
+/// What it sees of a mode of a sheet's magnetisation: chi_t rate/(1 + chi_t rate), chi_t = (mu_r tanh(x)/x - 1) d, x =
+/// gamma d/2.
+double sheetChargeShare(const MetalSheet& sheet, double rate_per_m, const Excitation& excitation);
+
 /// Share of the current that a loop without resistance would carry which a tracker sees: (w L)^2 / (R^2 + (w L)^2) in
 /// phase, exp(-t R / L) after a step.
 /// @param rate_per_s R / L

@@ -49,6 +49,7 @@ class ClosedLoopTest : public QObject {
   void isReciprocal();
   void keepsTheFluxOut();
   void answersByItsStrength();
+  void copperCableIsAsStrongAsTabulated();
   void leavesNoRoomInTheWire();
   void refusesWhatMakesNoSense();
 };
@@ -133,6 +134,24 @@ void ClosedLoopTest::answersByItsStrength() {
   FT_VERIFY_MATCH(
       near((half->fieldChange(p_m, 1.0, 0.0) - 0.5 * whole->fieldChange(p_m, 1.0, 0.0)).norm(), 0.0, 1e-15));
   QCOMPARE(none->fieldChange(p_m, 1.0, 0.0).norm(), 0.0);
+}
+
+// An independent study: a copper ring of 0.5 m radius and 1 mm wire answers at 10 kHz as 0.196 m^3 along its axis, a
+// metal sphere of 31 cm, of which 0.995 is in phase, and on pulsed direct current is gone after about a millisecond.
+void ClosedLoopTest::copperCableIsAsStrongAsTabulated() {
+  const Eigen::Vector3d center_m(0.0, 0.0, 20.0);
+  const auto along_m3 = [&](const Excitation& excitation) {
+    const auto loop = makeEffect(
+        "closed_loop",
+        {{"center_m", {0.0, 0.0, 20.0}}, {"radius_m", 0.5}, {"wire_radius_m", 0.001}, {"conductivity_s_per_m", 5.8e7}},
+        excitation);
+    SensorSetting setting;
+    setting.tracker_from_sensor.position_m = {0.0, 0.0, 40.0};
+    const double unit = dipoleField(center_m, 1.0)(2, 2) * dipoleField(center_m, 0.25 / std::numbers::pi)(2, 2);
+    return loop.value()->at(setting).field_per_m3(2, 2) / unit;
+  };
+  FT_VERIFY_MATCH(near(along_m3(Excitation{false, 1e4, 0.0}), -0.195, 0.001));
+  FT_VERIFY_MATCH(near(along_m3(Excitation{true, 0.0, 1e-3}) / -0.196, 0.013, 0.002));
 }
 
 void ClosedLoopTest::leavesNoRoomInTheWire() {

@@ -1,5 +1,6 @@
 #include "calib/effects/compact_metal.h"
 
+#include <Eigen/QR>
 #include <QTest>
 #include <algorithm>
 #include <cmath>
@@ -39,6 +40,8 @@ class CompactMetalTest : public QObject {
   void isReciprocal();
   void adds();
   void errsByTheDistanceRule();
+  void growsAndFallsWithTheDistances();
+  void answersTheCarrierAndTheDelay();
   void scalesWithVolume();
   void leavesNoRoomInside();
   void refusesATransmitterInside();
@@ -167,6 +170,57 @@ void CompactMetalTest::errsByTheDistanceRule() {
   FT_VERIFY_MATCH(near(factors[2000], 1.98, 0.1));
   FT_VERIFY_MATCH(near(factors[200], 0.64, 0.12));
   FT_VERIFY_MATCH(near(factors[3800], 2.53, 0.12));
+}
+
+// Regression of the logarithms over 4,000 such geometries: for the position the law's 4, -3, -3 (the same study found
+// 4.29, -3.05, -2.81), for the orientation, one power of the range less, 3.30, -2.82, -3.14 by the same study. How it
+// drew its geometries is not told, and the exponents move by some tenths with that.
+void CompactMetalTest::growsAndFallsWithTheDistances() {
+  RandomGeometry random(6);
+  constexpr int kDraws = 4000;
+  Eigen::MatrixXd logs(kDraws, 4);
+  Eigen::MatrixXd errors(kDraws, 2);
+  for (int i = 0; i < kDraws;) {
+    const Eigen::Vector3d p_m = random.pointInCube_m(2.5);
+    const Eigen::Vector3d b_m = random.pointInCube_m(2.5);
+    const Eigen::Vector3d distances(p_m.norm(), b_m.norm(), (p_m - b_m).norm());
+    if (distances.minCoeff() < 0.5) continue;
+    const auto metal = makeCompactMetal(b_m, -1e-6 * Eigen::Matrix3d::Identity(), 0.0);
+    const Pose tracked = trackedPose(*metal, p_m);
+    logs.row(i) << 1.0, distances.array().log().transpose();
+    errors.row(i) << std::log((tracked.position_m - p_m).norm()),
+        std::log(rotationVector_rad(tracked.orientation).norm());
+    ++i;
+  }
+  const Eigen::MatrixXd exponents = logs.colPivHouseholderQr().solve(errors);
+  FT_VERIFY_MATCH(near(exponents(1, 0), 4.29, 0.35));
+  FT_VERIFY_MATCH(near(exponents(2, 0), -3.05, 0.35));
+  FT_VERIFY_MATCH(near(exponents(3, 0), -2.81, 0.35));
+  FT_VERIFY_MATCH(near(exponents(1, 1), 3.30, 0.35));
+  FT_VERIFY_MATCH(near(exponents(2, 1), -2.82, 0.35));
+  FT_VERIFY_MATCH(near(exponents(3, 1), -3.14, 0.35));
+}
+
+// A = (4/3) pi a^3 chi, chi of the table by Wait's formula: aluminium of 5 cm -1.46 at 10 kHz, steel -0.63; at rest
+// nothing and 2.91.
+void CompactMetalTest::answersTheCarrierAndTheDelay() {
+  const auto chi = [](const nlohmann::json& parameters, const Excitation& excitation) {
+    const Eigen::Vector3d center_m(1.0, 0.0, -1.0);
+    const auto effect = makeEffect("compact_metal", parameters, excitation);
+    SensorSetting setting;
+    setting.tracker_from_sensor.position_m = {1.5, 0.2, 0.1};
+    const Eigen::Matrix3d unit =
+        dipoleField(setting.tracker_from_sensor.position_m - center_m, 1.0) * dipoleField(center_m, 0.000125 / 3.0);
+    return effect.value()->at(setting).field_per_m3(0, 0) / unit(0, 0);
+  };
+  const nlohmann::json aluminium{{"radius_m", 0.05}, {"conductivity_s_per_m", 3.5e7}};
+  nlohmann::json steel{{"radius_m", 0.05}, {"conductivity_s_per_m", 6e6}, {"material", "ferromagnetic"}};
+  const Excitation carrier{false, 1e4, 0.0};
+  const Excitation late{true, 0.0, 10.0};
+  FT_VERIFY_MATCH(near(chi(aluminium, carrier), -1.46, 0.006));
+  FT_VERIFY_MATCH(near(chi(steel, carrier), -0.63, 0.006));
+  FT_VERIFY_MATCH(near(chi(aluminium, late), 0.0, 1e-6));
+  FT_VERIFY_MATCH(near(chi(steel, late), 2.911765, 1e-4));
 }
 
 // Far from strong distortion the error is linear in the moment: twice the radius, eight times the error.
