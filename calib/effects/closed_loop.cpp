@@ -13,6 +13,32 @@ namespace fieldtrue {
 
 namespace {
 
+struct EllipticIntegrals {
+  double K = 0.0;
+  double E = 0.0;
+};
+
+/// Complete elliptic integrals by the arithmetic-geometric mean, several times as fast as the standard library's.
+/// @param modulus_squared k^2
+/// @param complement sqrt(1 - k^2), not zero
+/// @source Abramowitz and Stegun 1964, section 17.6
+EllipticIntegrals ellipticIntegrals(double modulus_squared, double complement) {
+  double a = 1.0;
+  double b = complement;
+  double weight = 0.5;
+  double sum = weight * modulus_squared;
+  for (double c = 1.0; std::abs(c) > 1e-9;) {
+    c = 0.5 * (a - b);
+    const double mean = 0.5 * (a + b);
+    b = std::sqrt(a * b);
+    a = mean;
+    weight *= 2.0;
+    sum += weight * c * c;
+  }
+  const double K = 0.5 * std::numbers::pi / a;
+  return {K, K * (1.0 - sum)};
+}
+
 /// Distance from a place to the wire of a ring about the origin.
 double fromWire_m(const Eigen::Vector3d& from_center_m, const Eigen::Vector3d& axis, double radius_m) {
   const double z_m = axis.dot(from_center_m);
@@ -187,9 +213,7 @@ Eigen::Vector3d ringField_per_m(const Eigen::Vector3d& from_center_m, const Eige
   }
   const double far_m2 = (radius_m + rho_m) * (radius_m + rho_m) + z_m * z_m;
   const double near_m2 = (radius_m - rho_m) * (radius_m - rho_m) + z_m * z_m;
-  const double modulus = std::sqrt(4.0 * radius_m * rho_m / far_m2);
-  const double K = std::comp_ellint_1(modulus);
-  const double E = std::comp_ellint_2(modulus);
+  const auto [K, E] = ellipticIntegrals(4.0 * radius_m * rho_m / far_m2, std::sqrt(near_m2 / far_m2));
   const double scale_per_m = 1.0 / (2.0 * std::numbers::pi * std::sqrt(far_m2));
   const double along = scale_per_m * (K + (radius_m * radius_m - rho_m * rho_m - z_m * z_m) / near_m2 * E);
   const double outward =

@@ -322,7 +322,16 @@ Effect finitePlateEffect() {
       "Meshed sheet: Weidelt 1975, J. Geophys. 41 85; edges: Hough 1973, J. Aircraft 10 314; sheet impedance: "
       "Wait 1962, Electromagnetic Waves in Stratified Media";
   effect.parameters = {
-      {"center_m", "m", "vector3", {1.0, 0.0, -1.0}, -100.0, 100.0, "Middle of the plate, tracker frame.", {}},
+      {"center_m",
+       "m",
+       "vector3",
+       {1.0, 0.0, -1.0},
+       -100.0,
+       100.0,
+       "Middle of the plate, tracker frame.",
+       {},
+       -10.0,
+       10.0},
       {"normal",
        "",
        "vector3",
@@ -332,8 +341,8 @@ Effect finitePlateEffect() {
        "At right angles to the plate, tracker frame; any length.",
        {}},
       {"side", "", "vector3", {1.0, 0.0, 0.0}, 0.0, 0.0, "Along the plate's length, tracker frame; any length.", {}},
-      {"length_m", "m", "scalar", 0.6, 0.01, 20.0, "Along `side`.", {}},
-      {"width_m", "m", "scalar", 0.6, 0.01, 20.0, "Across it.", {}},
+      {"length_m", "m", "scalar", 0.6, 0.01, 20.0, "Along `side`.", {}, 0.1, 4.0},
+      {"width_m", "m", "scalar", 0.6, 0.01, 20.0, "Across it.", {}, 0.1, 4.0},
       materialParameter(),
       permeabilityParameter(),
       {"conductivity_s_per_m",
@@ -343,10 +352,20 @@ Effect finitePlateEffect() {
        1.0,
        1e8,
        "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6; needs thickness_m. When given, the tracker's "
-       "carrier "
-       "or sampling delay decides how much is left of the ideal answer; null is an ideal metal.",
-       {}},
-      {"thickness_m", "m", "scalar", nullptr, 1e-6, 0.1, "Of the plate; null is thick enough not to matter.", {}},
+       "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal.",
+       {},
+       1e6,
+       6e7},
+      {"thickness_m",
+       "m",
+       "scalar",
+       nullptr,
+       1e-6,
+       0.1,
+       "Of the plate; null is thick enough not to matter.",
+       {},
+       2e-5,
+       0.02},
       {"strength",
        "",
        "scalar",
@@ -354,7 +373,9 @@ Effect finitePlateEffect() {
        -100.0,
        100.0,
        "Share of such a plate's answer; below 1 for holes and gaps. No real plate has more than 1 or less than 0.",
-       {}}};
+       {},
+       0.0,
+       1.0}};
   effect.make = make;
   effect.fits = fits;
   return effect;

@@ -147,8 +147,16 @@ Effect metalMovedEffect() {
   effect.label = "Metal that came or went";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; sphere: Wait 1951, Geophysics 16 666";
   effect.parameters = bodyParameters();
-  effect.parameters.push_back(
-      {"change_s", "s", "scalar", 0.0, 0.0, 1e6, "When it came or went, from the start of the session.", {}});
+  effect.parameters.push_back({"change_s",
+                               "s",
+                               "scalar",
+                               0.0,
+                               0.0,
+                               1e6,
+                               "When it came or went, from the start of the session.",
+                               {},
+                               0.0,
+                               36000.0});
   effect.parameters.push_back({"present",
                                "",
                                "text",
