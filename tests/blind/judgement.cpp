@@ -1,0 +1,153 @@
+#include "tests/blind/judgement.h"
+
+#include <algorithm>
+#include <array>
+#include <functional>
+
+namespace blind {
+namespace {
+
+constexpr std::array<std::string_view, 3> kFloorEffects = {"range_noise", "correlated_samples", "quantization"};
+
+std::string labelOf(const Session& session, std::string_view effect) {
+  std::vector<std::string> ids = classOf(session, effect);
+  std::sort(ids.begin(), ids.end());
+  std::string label;
+  for (const std::string& id : ids) label += (label.empty() ? "" : "+") + id;
+  return label;
+}
+
+const NamedCause* rightCandidate(const Session& session) {
+  if (!session.answer.is_answered || session.answer.candidates.empty()) return nullptr;
+  const NamedCause& first = session.answer.candidates.front();
+  return isRight(session, first.effect) ? &first : nullptr;
+}
+
+bool holds(const AnsweredParameter& parameter, double truth) {
+  return *parameter.low90 <= truth && truth <= *parameter.high90;
+}
+
+}  // namespace
+
+std::vector<std::string> classOf(const Session& session, std::string_view effect) {
+  for (const std::vector<std::string>& ids : session.classes)
+    if (std::find(ids.begin(), ids.end(), effect) != ids.end()) return ids;
+  return {std::string(effect)};
+}
+
+bool areAlike(const Session& session, std::string_view a, std::string_view b) {
+  return labelOf(session, a) == labelOf(session, b);
+}
+
+std::string firstNamed(const Session& session) {
+  if (!session.answer.is_answered) return "";
+  if (isSilent(session) || session.answer.candidates.empty()) return "none";
+  return session.answer.candidates.front().effect;
+}
+
+std::string firstSelected(const Session& session) {
+  if (!session.answer.is_answered) return "";
+  if (isSilent(session) || session.answer.selected.empty()) return "none";
+  return session.answer.selected.front().effect;
+}
+
+bool isRight(const Session& session, std::string_view named) {
+  if (session.effects.empty()) return named == "none";
+  return std::any_of(session.effects.begin(), session.effects.end(),
+                     [&](const TrueEffect& effect) { return areAlike(session, effect.id, named); });
+}
+
+bool isAbstention(const Session& session) {
+  return session.answer.is_answered &&
+         (session.answer.verdict == "unexplained" || session.answer.verdict == "partly_explained");
+}
+
+bool isSilent(const Session& session) { return session.answer.is_answered && session.answer.verdict == "no_gap"; }
+
+bool namesCause(const Session& session) {
+  if (!session.answer.is_answered || isSilent(session) || session.answer.verdict == "unexplained") return false;
+  return std::any_of(session.answer.selected.begin(), session.answer.selected.end(), [](const NamedCause& cause) {
+    return std::find(kFloorEffects.begin(), kFloorEffects.end(), cause.effect) == kFloorEffects.end();
+  });
+}
+
+std::set<std::string> trueClasses(const Session& session) {
+  std::set<std::string> labels;
+  for (const TrueEffect& effect : session.effects) labels.insert(labelOf(session, effect.id));
+  return labels;
+}
+
+std::set<std::string> selectedClasses(const Session& session) {
+  std::set<std::string> labels;
+  if (!session.answer.is_answered || isSilent(session)) return labels;
+  for (const NamedCause& cause : session.answer.selected) labels.insert(labelOf(session, cause.effect));
+  return labels;
+}
+
+bool isFound(const Session& session) {
+  if (!session.answer.is_answered) return false;
+  const auto is_right = [&](const std::string& effect) { return isRight(session, effect); };
+  return std::any_of(session.answer.findings.begin(), session.answer.findings.end(), is_right) ||
+         std::any_of(session.answer.selected.begin(), session.answer.selected.end(),
+                     [&](const NamedCause& cause) { return is_right(cause.effect); });
+}
+
+std::optional<double> locationError(const Session& session) {
+  const NamedCause* named = rightCandidate(session);
+  if (named == nullptr || !named->location_m) return std::nullopt;
+  if (session.effects.empty() || !session.effects.front().location_m) return std::nullopt;
+  return (*named->location_m - *session.effects.front().location_m).norm();
+}
+
+std::optional<double> relativeShrinkage(const Session& session) {
+  if (!session.oracle_fraction || *session.oracle_fraction <= 0.0) return std::nullopt;
+  if (!session.answer.is_answered || isSilent(session)) return 0.0;
+  return (1.0 - session.answer.remaining_fraction.value_or(1.0)) / *session.oracle_fraction;
+}
+
+std::vector<bool> locationCoverage(const Session& session) {
+  const NamedCause* named = rightCandidate(session);
+  if (named == nullptr || session.effects.empty() || !session.effects.front().location_m) return {};
+  const Eigen::Vector3d truth = *session.effects.front().location_m;
+  std::vector<bool> covered;
+  for (const std::string stem : {"center", "position", "location"}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto found = named->parameters.find(stem + "_" + "xyz"[axis] + "_m");
+      if (found == named->parameters.end() || !found->second.low90 || !found->second.high90) continue;
+      covered.push_back(holds(found->second, truth[axis]));
+    }
+    if (!covered.empty()) break;
+  }
+  return covered;
+}
+
+std::vector<bool> amplitudeCoverage(const Session& session) {
+  const NamedCause* named = rightCandidate(session);
+  if (named == nullptr || session.effects.empty()) return {};
+  const TrueEffect& effect = session.effects.front();
+  if (effect.amplitude_name.empty() || named->effect != effect.id) return {};
+  const auto found = named->parameters.find(effect.amplitude_name);
+  if (found == named->parameters.end() || !found->second.low90 || !found->second.high90) return {};
+  return {holds(found->second, effect.amplitude)};
+}
+
+std::optional<CredibleSet> credibleSet(const Session& session) {
+  if (!session.answer.is_answered || session.answer.candidates.empty()) return std::nullopt;
+  std::vector<const NamedCause*> candidates;
+  for (const NamedCause& candidate : session.answer.candidates) candidates.push_back(&candidate);
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const NamedCause* a, const NamedCause* b) { return a->probability > b->probability; });
+  CredibleSet set;
+  double held = 0.0;
+  std::set<std::string> labels;
+  for (const NamedCause* candidate : candidates) {
+    if (held >= 0.9 - 1e-9) break;
+    held += candidate->probability;
+    labels.insert(labelOf(session, candidate->effect));
+    set.holds_truth = set.holds_truth || isRight(session, candidate->effect);
+  }
+  set.size = labels.size();
+  return set;
+}
+
+}  // namespace blind

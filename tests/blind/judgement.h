@@ -1,0 +1,54 @@
+#pragma once
+
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/blind/sealed_folder.h"
+
+namespace blind {
+
+/// The class of effects that the session's design cannot tell apart, the given effect among them.
+std::vector<std::string> classOf(const Session& session, std::string_view effect);
+bool areAlike(const Session& session, std::string_view a, std::string_view b);
+
+/// The effect answered first: candidates[0], `none` when the verdict is no_gap, "" when there is no answer.
+std::string firstNamed(const Session& session);
+/// The effect selected first, `none` when nothing is selected or the verdict is no_gap, "" when there is no answer.
+std::string firstSelected(const Session& session);
+/// Whether a named effect is in the class of one of the session's true effects, or is `none` where there is none.
+bool isRight(const Session& session, std::string_view named);
+
+/// Called unexplained or partly explained.
+bool isAbstention(const Session& session);
+/// Answered no_gap.
+bool isSilent(const Session& session);
+/// A cause was named where there is none to name: explained or partly explained by anything but the noise floor.
+bool namesCause(const Session& session);
+
+/// Classes, one label each, of the session's true effects and of those the answer selected.
+std::set<std::string> trueClasses(const Session& session);
+std::set<std::string> selectedClasses(const Session& session);
+/// Whether a true effect is selected or stands among the findings.
+bool isFound(const Session& session);
+
+/// Distance of the first candidate's place from the true one.
+/// @return metres; nothing unless a right candidate and the truth both have a place
+std::optional<double> locationError(const Session& session);
+/// Shrinkage by the selected effects over the shrinkage the true effect itself gives; 0 when there is no answer.
+/// @return nothing where the true effect shrinks nothing or the oracle is unknown
+std::optional<double> relativeShrinkage(const Session& session);
+
+/// For each 90 % interval that has a true value beside it: whether it holds that value.
+std::vector<bool> locationCoverage(const Session& session);
+std::vector<bool> amplitudeCoverage(const Session& session);
+
+/// Fewest candidates, most probable first, that hold 90 % of the probability, and whether the true effect is in them.
+struct CredibleSet {
+  std::size_t size = 0;
+  bool holds_truth = false;
+};
+std::optional<CredibleSet> credibleSet(const Session& session);
+
+}  // namespace blind
