@@ -130,6 +130,7 @@ int main(int argc, char** argv) {
   fieldtrue::cli::addEmulateCommand(line);
   fieldtrue::cli::addFitCommands(line);
   fieldtrue::cli::addResampleCommand(line);
+  fieldtrue::cli::addGapCommands(line);
   fieldtrue::cli::addListCommands(line);
   return line.run(argc, argv);
 }

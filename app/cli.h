@@ -95,6 +95,7 @@ void addFitCommands(CommandLine& line);      ///< fit, compare, report
 void addAcquireCommand(CommandLine& line);   ///< acquire
 void addEmulateCommand(CommandLine& line);   ///< emulate
 void addResampleCommand(CommandLine& line);  ///< resample
+void addGapCommands(CommandLine& line);      ///< diagnose, plan-check, blind
 void addListCommands(CommandLine& line);     ///< methods, effects, devices, formats
 
 }  // namespace fieldtrue::cli
