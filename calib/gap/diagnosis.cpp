@@ -54,10 +54,11 @@ struct Evidence {
 Evidence weigh(const GapSearch& search, const Selection& selection, const HeldOutGap& held_out, const Structure& left,
                const GapRows& stated, const GapReport& report) {
   constexpr double kSure = 1e-4;
-  constexpr double kClearlyAbove = 1.6;  // A floor stated 20 % too low is no gap, nor is one stated by guess.
+  constexpr double kSureOfNothingNamed = 1e-6;  // F tests of many columns are a little too sure.
+  constexpr double kClearlyAbove = 1.6;         // A floor stated 20 % too low is no gap, nor is one stated by guess.
   Evidence evidence;
   evidence.has_effect = !selection.ways.empty();
-  evidence.has_structure = search.structureOfNone().p_value < kSure;
+  evidence.has_structure = search.structureOfNone().p_value < kSureOfNothingNamed;
   const double placed_mm = stated.placing_sd_m ? 1e3 * *stated.placing_sd_m : 0.0;
   evidence.is_above_floor = placed_mm > 0.0 && 1e3 * search.placingSd_m() > kClearlyAbove * placed_mm;
   evidence.left_is_sure = left.p_value < kSure;

@@ -146,6 +146,21 @@ double evidenceOf(const GapCandidate& c) {
   return c.bic_gain - (c.effect != "none" && c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
 }
 
+/// Two names of one thing, as a wrong scale of the rig and of the tracker: the first carries the probability of both.
+void joinExactTwins(std::vector<GapCandidate>& candidates) {
+  constexpr double kSame = 0.5;  // BIC.
+  for (std::size_t a = 0; a < candidates.size(); ++a) {
+    for (std::size_t b = a + 1; b < candidates.size(); ++b) {
+      const auto& names = candidates[a].equivalents;
+      const bool is_twin = std::find(names.begin(), names.end(), candidates[b].effect) != names.end() &&
+                           std::abs(candidates[a].bic_gain - candidates[b].bic_gain) < kSame;
+      if (!is_twin) continue;
+      candidates[a].probability += candidates[b].probability;
+      candidates[b].probability = 0.0;
+    }
+  }
+}
+
 void setProbabilities(std::vector<GapCandidate>& candidates) {
   double most = 0.0;
   for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c));
@@ -155,6 +170,7 @@ void setProbabilities(std::vector<GapCandidate>& candidates) {
     sum += c.probability;
   }
   for (GapCandidate& c : candidates) c.probability /= sum;
+  joinExactTwins(candidates);
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const GapCandidate& a, const GapCandidate& b) { return a.probability > b.probability; });
 }

@@ -163,7 +163,7 @@ LocalFit refineLocally(const Linearized& at, const EffectFit& fit, const Eigen::
   if (start.size() > 0) {
     using Solver = ceres::TinySolver<ProjectedFit>;
     Solver solver;
-    solver.options.max_num_iterations = 12;
+    solver.options.max_num_iterations = 30;
     solver.options.gradient_tolerance = 1e-6;
     solver.options.parameter_tolerance = 1e-6;
     Solver::Parameters parameters = start;

@@ -48,7 +48,7 @@ LocalFit refineLocally(const Linearized& at, const EffectFit& fit, const Eigen::
 struct RefineOptions {
   ResidualLaw law;
   std::span<const char> used = {};  ///< Per row; empty = all.
-  int most_steps = 20;
+  int most_steps = 30;
   std::optional<Eigen::Index> frozen = std::nullopt;  ///< A parameter that stays as it is, counted as in `covariance`.
 };
 

@@ -112,7 +112,7 @@ RefinedModel GapSearch::refinedWithout(const GapModel& start, Eigen::Index froze
 
 std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
                                              const RefinedModel& base, const RunControl& control) const {
-  constexpr std::size_t kStarts = 3;
+  constexpr std::size_t kStarts = 5;
   const EffectWay& chosen = ways_[way];
   const Linearized& at = chosen.needs_time ? in_time : in_space;
   TriedEffect tried;
@@ -153,14 +153,14 @@ std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunCont
   }
   const auto better = [](const TriedEffect& a, const TriedEffect& b) { return a.bic_gain > b.bic_gain; };
   std::stable_sort(tried.begin(), tried.end(), better);
+  // The linearised gain of a strong effect can be a fifth off.
   constexpr double kNear = 60.0;
-  constexpr std::size_t kMost = 12;
+  constexpr double kNearShare = 0.35;
   const double best = tried.empty() ? 0.0 : tried.front().bic_gain;
   const double base_bic = bicOf(base.model);
   std::vector<char> is_finished(tried.size(), 0);
-  control.parallel_for(std::min(kMost, tried.size()), [&](std::size_t i) {
-    const double near = std::max(kNear, 0.25 * best);
-    if (tried[i].bic_gain < best - near && i > 2) return;
+  control.parallel_for(tried.size(), [&](std::size_t i) {
+    if (tried[i].bic_gain < best - std::max(kNear, kNearShare * best)) return;
     finish(tried[i], base, base_bic);
     is_finished[i] = 1;
   });
@@ -206,6 +206,7 @@ class Selector {
       next = firstWorth(following_, options_.least_gain_more);
     }
     if (selection.ways.size() > 1) findLeading(selection);
+    if (selection.ways.size() == 1) takeOver(selection);
     selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
     return selection;
   }
@@ -256,6 +257,19 @@ class Selector {
       } else {
         ++term;
       }
+    }
+  }
+
+  /// A single effect that exchanging and dropping ended at may be fitted better than when it was first tried.
+  void takeOver(Selection& selection) const {
+    const double gain = none_bic_ - search_.bicOf(selection.model.model);
+    const Effect* effect = search_.ways()[selection.ways.front()].effect;
+    for (TriedEffect& tried : selection.alternatives) {
+      if (search_.ways()[tried.way].effect != effect || tried.bic_gain >= gain) continue;
+      tried.way = selection.ways.front();
+      tried.refined = selection.model;
+      tried.model = selection.model.model;
+      tried.bic_gain = gain;
     }
   }
 
