@@ -162,10 +162,7 @@ class CliErrorsTest : public QObject {
   }
 
   void commandsThatAreNotHereAreNotListed() {
-    const CliRun run = runCli({"--help"});
-    for (const char* command : {"diagnose", "plan-check", "blind", "serve"}) {
-      QVERIFY2(!run.out.contains(command), command);
-    }
+    QVERIFY(!runCli({"--help"}).out.contains("serve"));
   }
 
   void sessionsOfANewerVersionAreLeftAlone() {
