@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "answer.h"
-#include "controls.h"
-#include "generate.h"
-#include "score.h"
+#include "tests/blind/answer.h"
+#include "tests/blind/controls.h"
+#include "tests/blind/generate.h"
+#include "tests/blind/score.h"
 
 namespace {
 

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/blind/session.h"
+
+namespace blind {
+
+/// An effect drawn for one session whose size is still open.
+struct Drawn {
+  std::string id;
+  std::string kind;
+  double smallest = 0.1, largest = 1;  ///< believable range of `size`
+  std::function<void(World&, double size)> apply;
+  std::function<void(double size, nlohmann::json& effect)> describe;
+};
+
+/// A kind of effect and how one of it is drawn. The registry of this program.
+struct Kind {
+  std::string id;
+  double weight = 1;
+  Drawn (*draw)(const Setup&, Random&);
+};
+
+/// Effects of the catalogue that change the mean pose.
+const std::vector<Kind>& catalogueKinds();
+
+/// Effects that need the alignment to be known.
+const std::vector<Kind>& alignedKinds();
+
+/// Effects that stand in no catalogue.
+const std::vector<Kind>& foreignKinds();
+
+/// Effects that only raw samples show.
+const std::vector<std::string>& signalIds();
+
+// Drawing rules of metal and wire, in generate_metal.cpp.
+Drawn drawCompactMetal(const Setup& setup, Random& random);
+Drawn drawMetalPlane(const Setup& setup, Random& random);
+Drawn drawFinitePlate(const Setup& setup, Random& random);
+Drawn drawClosedLoop(const Setup& setup, Random& random);
+Drawn drawMetalMoved(const Setup& setup, Random& random);
+Drawn drawOpposedBodies(const Setup& setup, Random& random);
+Drawn drawFerriteAtTransmitter(const Setup& setup, Random& random);
+
+}  // namespace blind

@@ -1,0 +1,269 @@
+#include "tests/blind/generate_session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "tests/blind/generate_effects.h"
+#include "tests/blind/session_draw.h"
+#include "tests/blind/signatures.h"
+
+namespace blind {
+namespace {
+
+using nlohmann::json;
+
+struct Placed {
+  Drawn drawn;
+  double size = 1;
+  double rho = 0;
+};
+
+double rhoOf(const Alignment& alignment, const Drawn& drawn, double size) {
+  World world;
+  drawn.apply(world, size);
+  const double value = alignment.rho(alignment.whitened(world));
+  return std::isfinite(value) ? value : 1e9;
+}
+
+/// Finds the size at which one effect has the wished gap to noise, by false position on the logarithms.
+bool reach(const Alignment& alignment, Placed& placed, double wished) {
+  double low = std::log(placed.drawn.smallest), high = std::log(placed.drawn.largest);
+  double low_value = std::log(rhoOf(alignment, placed.drawn, placed.drawn.smallest) / wished);
+  double high_value = std::log(rhoOf(alignment, placed.drawn, placed.drawn.largest) / wished);
+  if (!(low_value < 0 && high_value > 0)) return false;
+  for (int step = 0; step < 40; ++step) {
+    double share = -low_value / (high_value - low_value);
+    if (step % 3 == 2) share = 0.5;
+    const double middle = low + std::clamp(share, 0.01, 0.99) * (high - low);
+    placed.size = std::exp(middle);
+    placed.rho = rhoOf(alignment, placed.drawn, placed.size);
+    const double value = std::log(placed.rho / wished);
+    if (std::abs(value) < 0.002) return true;
+    (value < 0 ? low : high) = middle;
+    (value < 0 ? low_value : high_value) = value;
+  }
+  return false;
+}
+
+const Kind& pick(const std::vector<Kind>& kinds, Random& random) {
+  double total = 0;
+  for (const Kind& kind : kinds) total += kind.weight;
+  double at = uniform(random, 0, total);
+  for (const Kind& kind : kinds)
+    if ((at -= kind.weight) < 0) return kind;
+  return kinds.back();
+}
+
+/// Draws geometry until the wished strength is believable.
+bool place(const Kind& kind, const Setup& setup, const Alignment& alignment, double wished, Random& random,
+           Placed& placed) {
+  for (int attempt = 0; attempt < 60; ++attempt) {
+    placed.drawn = kind.draw(setup, random);
+    if (reach(alignment, placed, wished)) return true;
+  }
+  return false;
+}
+
+double drawStrength(bool levels, Random& random, json& level) {
+  constexpr double kLevels[] = {0.35, 0.7, 1.4, 2.8};
+  level = nullptr;
+  const bool exact = uniform(random, 0, 1) < 0.7;
+  const double chosen = kLevels[uniformInt(random, 0, 3)];
+  const double free = logUniform(random, 0.2, 3.0);
+  if (!levels || !exact) return free;
+  level = chosen;
+  return chosen;
+}
+
+json describe(const Placed& placed) {
+  json effect = {{"id", placed.drawn.id},       {"kind", placed.drawn.kind}, {"rho", placed.rho},
+                 {"location_m", nullptr},       {"material", nullptr},       {"amplitude", nullptr},
+                 {"parameters", json::object()}};
+  placed.drawn.describe(placed.size, effect);
+  return effect;
+}
+
+World worldOf(const std::vector<Placed>& effects) {
+  World world;
+  for (const Placed& placed : effects) placed.drawn.apply(world, placed.size);
+  return world;
+}
+
+bool clash(const std::string& a, const std::string& b) {
+  const auto scale = [](const std::string& id) { return id == "global_gain" || id == "grid_scale"; };
+  return a == b || (scale(a) && scale(b)) || (a == "compact_metal" && b == "metal_moved") ||
+         (b == "compact_metal" && a == "metal_moved");
+}
+
+/// A second or third effect; a third of the pairs take, of several draws, the one that cancels most.
+void drawPair(const Setup& setup, const Alignment& alignment, Random& random, std::vector<Placed>& effects) {
+  const int count = uniform(random, 0, 1) < 0.8 ? 2 : 3;
+  const bool cancelling = uniform(random, 0, 1) < 1.0 / 3;
+  for (int attempt = 0; attempt < 200 && static_cast<int>(effects.size()) < count; ++attempt) {
+    const Kind& kind = pick(catalogueKinds(), random);
+    bool clashes = false;
+    for (const Placed& other : effects) clashes = clashes || clash(kind.id, other.drawn.id);
+    if (clashes) continue;
+    Placed best;
+    double best_total = 1e300;
+    for (int draw = 0; draw < (cancelling && !effects.empty() ? 5 : 1); ++draw) {
+      Placed placed;
+      if (!place(kind, setup, alignment, logUniform(random, 0.85, 1.2), random, placed)) continue;
+      effects.push_back(placed);
+      const double total = alignment.rho(alignment.whitened(worldOf(effects)));
+      effects.pop_back();
+      if (total < best_total) best = placed, best_total = total;
+    }
+    if (best_total < 1e299) effects.push_back(best);
+  }
+}
+
+Vector3d bodyPlace(const Setup& setup, const json& effects) {
+  for (const json& effect : effects)
+    if (effect["location_m"].is_array() && effect["id"] != "metal_plane")
+      return Vector3d(effect["location_m"][0].get<double>(), effect["location_m"][1].get<double>(),
+                      effect["location_m"][2].get<double>());
+  const Vector3d half_m = 0.5 * setup.pitch_m * (setup.counts - Eigen::Vector3i::Ones()).cast<double>();
+  return setup.jig_in_tracker_m +
+         setup.tracker_from_jig * (setup.middle_m + half_m + Vector3d(0.1, 0.4, -0.5 * half_m.z()));
+}
+
+json classesOf(const Setup& setup, const Alignment& alignment, const std::vector<Placed>& effects,
+               const json& described) {
+  Signatures signatures = catalogueSignatures(setup, alignment, bodyPlace(setup, described));
+  if (effects.size() == 1 && signatures.count(effects[0].drawn.id) != 0)
+    signatures[effects[0].drawn.id] = alignment.whitened(worldOf(effects));
+  auto classes = equivalenceClasses(signatures, alignment);
+  const bool one = effects.size() == 1;
+  const bool isotropic =
+      one && (effects[0].drawn.id == "global_gain" ||
+              (effects[0].drawn.id == "grid_scale" && described[0]["parameters"]["isotropic"] == true));
+  const auto holding = [&](const char* id) {
+    return std::find_if(classes.begin(), classes.end(), [&](const std::vector<std::string>& members) {
+      return std::find(members.begin(), members.end(), id) != members.end();
+    });
+  };
+  if (isotropic && holding("global_gain") != holding("grid_scale")) {
+    const auto from = holding("grid_scale");
+    const std::vector<std::string> moved = *from;
+    classes.erase(from);
+    const auto to = holding("global_gain");
+    to->insert(to->end(), moved.begin(), moved.end());
+  }
+  return classes;
+}
+
+StreamFault drawFault(const std::string& id, Setup& setup, Random& random, json& effect) {
+  StreamFault fault;
+  effect = {{"id", id},
+            {"kind", "sample stream"},
+            {"rho", 0.0},
+            {"location_m", nullptr},
+            {"material", nullptr},
+            {"amplitude", nullptr},
+            {"parameters", json::object()}};
+  json& parameters = effect["parameters"];
+  if (id == "mains_interference") {
+    fault.line_hz = uniform(random, 0, 1) < 0.5 ? 50 : 100;
+    fault.line_amplitude = setup.coupling_noise * logUniform(random, 0.5, 2);
+    effect["rho"] = fault.line_amplitude / setup.coupling_noise;
+    parameters = {{"line_hz", fault.line_hz}, {"amplitude_per_m3", fault.line_amplitude}};
+  } else if (id == "range_noise") {
+    fault.range_power = uniform(random, 1, 2.5);
+    parameters = {{"power", fault.range_power}};
+  } else if (id == "correlated_samples") {
+    setup.filter = 0;
+    fault.hidden_filter = uniform(random, 0.7, 0.95);
+    parameters = {{"correlation", fault.hidden_filter}};
+  } else if (id == "quantization") {
+    fault.quantum_m = logUniform(random, 0.002, 0.008);
+    parameters = {{"quantum_m", fault.quantum_m}};
+  } else {
+    fault.flip_share = uniform(random, 0.02, 0.08);
+    parameters = {{"probability", fault.flip_share}};
+  }
+  return fault;
+}
+
+/// Rewrites places and attitudes so that the frame of the drawing is that of the transmitter.
+void stateInTrackerFrame(Setup& setup) {
+  for (Row& row : setup.rows) {
+    row.place_m = setup.jig_in_tracker_m + setup.tracker_from_jig * row.place_m;
+    row.attitude = (setup.tracker_from_jig * row.attitude).normalized();
+  }
+  setup.middle_m = setup.jig_in_tracker_m + setup.tracker_from_jig * setup.middle_m;
+  setup.jig_in_tracker_m.setZero();
+  setup.tracker_from_jig.setIdentity();
+}
+
+struct Plan {
+  std::vector<Placed> effects;
+  json level = nullptr;
+};
+
+Plan drawPlan(const SessionWish& wish, const Setup& setup, const Alignment& alignment, Random& random) {
+  for (int attempt = 0; attempt < 50; ++attempt) {
+    Plan plan;
+    const double wished = drawStrength(wish.levels, random, plan.level);
+    Placed placed;
+    if (wish.shelf == "pairs") {
+      plan.level = nullptr;
+      drawPair(setup, alignment, random, plan.effects);
+      if (plan.effects.size() >= 2) return plan;
+      continue;
+    }
+    const std::vector<Kind>& kinds = wish.shelf == "off"     ? foreignKinds()
+                                     : setup.alignment_known ? alignedKinds()
+                                                             : catalogueKinds();
+    if (!place(pick(kinds, random), setup, alignment, wished, random, placed)) continue;
+    plan.effects.push_back(placed);
+    return plan;
+  }
+  throw std::runtime_error("no believable geometry reaches the wished strength; another seed is needed");
+}
+
+}  // namespace
+
+GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed) {
+  Random random(seed);
+  Setup setup = drawSetup(random);
+  if ((wish.shelf == "single" || wish.shelf == "none") && uniform(random, 0, 1) < 0.07) {
+    setup.alignment_known = true;
+    setup.lever_m.setZero();
+    setup.mounting = Quaterniond::Identity();
+    stateInTrackerFrame(setup);
+    setup.alignment_m = uniform(random, 0.0005, 0.002);
+    setup.alignment_rad = uniform(random, 0.0005, 0.002);
+  }
+  json effects = json::array(), level = nullptr;
+  StreamFault fault;
+  if (wish.shelf == "signals") {
+    json effect;
+    fault = drawFault(signalIds()[static_cast<std::size_t>(uniformInt(random, 0, 4))], setup, random, effect);
+    effects.push_back(effect);
+  }
+  const Alignment alignment(setup);
+  Plan plan;
+  if (wish.shelf != "none" && wish.shelf != "signals") plan = drawPlan(wish, setup, alignment, random);
+  for (const Placed& placed : plan.effects) effects.push_back(describe(placed));
+  const World world = worldOf(plan.effects);
+  const Eigen::VectorXd gap = alignment.whitened(world);
+  const bool has_gap = !plan.effects.empty();
+  GeneratedSession session =
+      recordSession(setup, world, alignment, fault, wish.samples || wish.shelf == "signals", random);
+  session.truth = {{"shelf", wish.shelf},
+                   {"effects", effects},
+                   {"rho", has_gap ? alignment.rho(gap) : 0.0},
+                   {"rho_level", plan.level},
+                   {"position_only", setup.position_only},
+                   {"order", setup.random_order ? "random" : "serpentine"},
+                   {"orientations", setup.orientations},
+                   {"alignment_known", setup.alignment_known},
+                   {"rows", setup.rows.size()},
+                   {"classes", classesOf(setup, alignment, plan.effects, effects)},
+                   {"oracle", {{"fraction", has_gap ? json(alignment.oracleFraction(gap)) : json(nullptr)}}}};
+  return session;
+}
+
+}  // namespace blind

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/blind/session.h"
+
+namespace blind {
+
+/// A finished session: the two tables as text and its truth.
+struct GeneratedSession {
+  std::string nodes_csv;
+  std::string samples_csv;
+  nlohmann::json truth;
+};
+
+struct SessionWish {
+  std::string shelf;  ///< none, single, pairs, off, signals
+  bool levels = false;
+  bool samples = false;
+};
+
+/// Draws one session.
+/// @param seed of this session alone: the same seed gives the same bytes
+GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed);
+
+/// Faults of the sample stream of one session; zero or one: none.
+struct StreamFault {
+  double line_hz = 0, line_amplitude = 0;  ///< amplitude of the coupling [m^-3]
+  double range_power = 0;                  ///< noise grows by this power of the range more
+  double range_factor = 1;
+  double hidden_filter = 0;  ///< correlation that n_effective does not admit
+  double quantum_m = 0;
+  double flip_share = 0;
+};
+
+/// Adds seating, filtered noise and faults, and writes the tables.
+/// @return node table and, where asked for, sample table
+GeneratedSession recordSession(const Setup& setup, const World& world, const Alignment& alignment,
+                               const StreamFault& fault, bool samples, Random& random);
+
+}  // namespace blind

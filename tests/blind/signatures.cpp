@@ -1,0 +1,171 @@
+#include "tests/blind/signatures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/blind/generate_effects.h"
+#include "tests/blind/plates.h"
+
+namespace blind {
+namespace {
+
+constexpr double kSame = 0.9;
+constexpr double kVisible = 1e-6;
+
+using Bend = std::function<void(World&)>;
+
+Eigen::VectorXd columnOf(const Alignment& alignment, const Bend& bend) {
+  World world;
+  bend(world);
+  return alignment.whitened(world);
+}
+
+Eigen::MatrixXd columnsOf(const Alignment& alignment, const std::vector<Bend>& bends) {
+  Eigen::MatrixXd columns;
+  for (const Bend& bend : bends) {
+    const Eigen::VectorXd column = columnOf(alignment, bend);
+    columns.conservativeResize(column.size(), columns.cols() + 1);
+    columns.rightCols<1>() = column;
+  }
+  return columns;
+}
+
+std::vector<Bend> coilBends(bool gains) {
+  constexpr double kSmall = 1e-4;
+  std::vector<Bend> bends;
+  for (int side = 0; side < 2; ++side)
+    for (int axis = 0; axis < 3; ++axis)
+      bends.emplace_back([=](World& world) {
+        Matrix3d& coils = side == 0 ? world.transmitter : world.receiver;
+        const int a = axis, b = gains ? axis : (axis + 1) % 3;
+        coils(a, b) += kSmall;
+        if (!gains) coils(b, a) += kSmall;
+      });
+  return bends;
+}
+
+Bend rigBend(std::function<Vector3d(const Row&)> shift) {
+  return [shift = std::move(shift)](World& world) {
+    world.rig.emplace_back([shift](const Row& row, Vector3d& place_m, Quaterniond&) { place_m += 1e-4 * shift(row); });
+  };
+}
+
+std::vector<Bend> tensorBends(const Vector3d& at_m) {
+  std::vector<Bend> bends;
+  for (int a = 0; a < 3; ++a)
+    for (int b = a; b < 3; ++b) {
+      Matrix3d tensor = Matrix3d::Zero();
+      tensor(a, b) = tensor(b, a) = 1e-7;
+      Scatterer point;
+      point.at_m.push_back(at_m);
+      point.moment.push_back(tensor * dipoleField(at_m));
+      bends.emplace_back([point](World& world) { world.metal.emplace_back(1.0, point); });
+    }
+  return bends;
+}
+
+Bend metalBend(const Scatterer& metal, double share) {
+  return [=](World& world) { world.metal.emplace_back(share, metal); };
+}
+
+}  // namespace
+
+Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, const Vector3d& body_m) {
+  Signatures all;
+  const auto add = [&](const char* id, const std::vector<Bend>& bends) { all[id] = columnsOf(alignment, bends); };
+  const Vector3d down = setup.tracker_from_jig * Vector3d(0, 0, -1);
+  const Vector3d middle_m = setup.middle_m;
+  double lowest = 0;
+  for (const Row& row : setup.rows) lowest = std::max(lowest, down.dot(setup.expected(row).position_m));
+  const Quaterniond flat = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), down);
+  add("compact_metal", tensorBends(body_m));
+  add("metal_plane",
+      {metalBend(MeshedSheet(12, 12, 0.5, 1e-4, setup.carrier_hz).solve((lowest + 0.9) * down, flat), 0.02)});
+  add("finite_plate", {metalBend(MeshedSheet(6, 6, 0.1, 1e-4, setup.carrier_hz).solve(body_m, flat), 0.02)});
+  add("closed_loop",
+      {metalBend(solveClosedLoop(roundLoop(body_m, down, 0.25, 24), 0.01, 1.5e-6, setup.carrier_hz), 0.02)});
+  add("coil_gain", coilBends(true));
+  add("coil_nonorthogonality", coilBends(false));
+  add("finite_coil",
+      {[](World& world) { world.transmitter_half_m = 0.02; }, [](World& world) { world.receiver_half_m = 0.02; }});
+  add("global_gain", {[](World& world) { world.receiver *= 1 + 1e-4; }});
+  std::vector<Bend> scales, layers;
+  for (int axis = 0; axis < 3; ++axis)
+    scales.push_back(
+        rigBend([=](const Row& row) { return Vector3d((row.place_m - middle_m)[axis] * Vector3d::Unit(axis)); }));
+  for (int layer = 0; layer < setup.counts.z(); ++layer)
+    layers.push_back(rigBend([=](const Row& row) { return Vector3d(0, 0, row.k == layer ? 1 : 0); }));
+  add("grid_scale", scales);
+  add("jig_layer_offset", layers);
+  add("jig_tilt", {rigBend([=](const Row& row) { return Vector3d(row.place_m.z() - middle_m.z(), 0, 0); }),
+                   rigBend([=](const Row& row) { return Vector3d(0, row.place_m.z() - middle_m.z(), 0); })});
+  std::vector<Bend> offsets, shifts;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3d e = 1e-4 * Vector3d::Unit(axis);
+    offsets.emplace_back([=](World& world) {
+      world.mounting.emplace_back([=](const Row&, SolvedPose& s) { s.position_m += s.orientation * e; });
+    });
+    shifts.emplace_back(
+        [=](World& world) { world.mounting.emplace_back([=](const Row&, SolvedPose& s) { s.position_m += e; }); });
+    shifts.emplace_back([=](World& world) {
+      world.mounting.emplace_back([=](const Row&, SolvedPose& s) {
+        s.position_m = turned(e, Quaterniond::Identity()) * s.position_m;
+        s.orientation = turned(e, s.orientation);
+      });
+    });
+  }
+  add("sensor_offset", offsets);
+  add("transmitter_misalignment", shifts);
+  const double end_s = setup.duration_s();
+  add("gain_drift", {[=](World& world) {
+        world.signal.emplace_back([=](const Row& row, const SolvedPose&, Matrix3d& couplings) {
+          couplings *= 1 + 1e-4 * (1 - std::exp(-2.5 * row.start_s / end_s));
+        });
+      }});
+  std::vector<Bend> moved = tensorBends(body_m);
+  for (Bend& bend : moved)
+    bend = [inner = bend, end_s](World& world) {
+      inner(world);
+      world.metal.back().second.from_s = 0.5 * end_s;
+    };
+  add("metal_moved", moved);
+  for (const std::string& id : signalIds()) all[id] = Eigen::MatrixXd();
+  return all;
+}
+
+std::vector<std::vector<std::string>> equivalenceClasses(const Signatures& signatures, const Alignment& alignment) {
+  std::vector<std::string> ids;
+  std::vector<Eigen::MatrixXd> bases;
+  for (const auto& [id, columns] : signatures) {
+    ids.push_back(id);
+    bases.emplace_back();
+    if (columns.size() == 0) continue;
+    const Eigen::MatrixXd left = alignment.projected(columns);
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(left, Eigen::ComputeThinU);
+    Eigen::Index rank = 0;
+    while (rank < svd.singularValues().size() && svd.singularValues()[rank] > kVisible * columns.norm()) ++rank;
+    if (rank > 0) bases.back() = svd.matrixU().leftCols(rank);
+  }
+  std::vector<std::size_t> group(ids.size());
+  for (std::size_t a = 0; a < ids.size(); ++a) group[a] = a;
+  for (std::size_t a = 0; a < ids.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) {
+      if (bases[a].size() == 0 || bases[b].size() == 0) continue;
+      const double shared = (bases[a].transpose() * bases[b]).squaredNorm();
+      // R2 both ways: the share of each space that lies in the other.
+      if (shared <= kSame * static_cast<double>(std::max(bases[a].cols(), bases[b].cols()))) continue;
+      const std::size_t from = group[a], to = group[b];
+      for (std::size_t& g : group)
+        if (g == from) g = to;
+    }
+  std::vector<std::vector<std::string>> classes;
+  for (std::size_t g = 0; g < ids.size(); ++g) {
+    std::vector<std::string> members;
+    for (std::size_t a = 0; a < ids.size(); ++a)
+      if (group[a] == g) members.push_back(ids[a]);
+    if (!members.empty()) classes.push_back(std::move(members));
+  }
+  return classes;
+}
+
+}  // namespace blind

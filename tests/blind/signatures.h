@@ -1,0 +1,21 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/blind/session.h"
+
+namespace blind {
+
+/// What one effect would show, one whitened column per free amplitude, alignment not yet removed.
+using Signatures = std::map<std::string, Eigen::MatrixXd>;
+
+/// Linearised signatures of the catalogue for one design.
+/// @param body_m where compact metal, plates and loops are taken to stand, transmitter frame [m]
+Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, const Vector3d& body_m);
+
+/// Every effect of the catalogue in exactly one class: merged where each explains more than 0.9 of the other.
+std::vector<std::vector<std::string>> equivalenceClasses(const Signatures& signatures, const Alignment& alignment);
+
+}  // namespace blind
