@@ -123,7 +123,7 @@ class ClosedLoopFit final : public EffectFit {
     return parameters;
   }
 
-  std::vector<FitParameter> linear() const override { return {{"strength", "", 0.0, 1.0}}; }
+  std::vector<FitParameter> linear() const override { return {{"strength", "", 0.0, 2.0}}; }
 
   std::vector<Eigen::VectorXd> starts() const override {
     constexpr double kDiagonal = 0.57735026918962576;

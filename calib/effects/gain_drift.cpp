@@ -11,7 +11,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr double kPlausibleGain = 0.1;
-constexpr double kPlausibleDrift = 0.05;
+constexpr double kPlausibleDrift = 0.1;
 constexpr double kShortest = 0.02;  ///< Time constant over the length of the session.
 constexpr double kLongest = 2.0;
 constexpr int kStarts = 10;

@@ -7,7 +7,7 @@ namespace fieldtrue {
 
 namespace {
 
-constexpr double kPlausible = 0.05;
+constexpr double kPlausible = 0.1;
 
 void perAxisResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
   const Eigen::Vector3d q_m = inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m;

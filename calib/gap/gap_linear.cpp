@@ -82,6 +82,54 @@ Vector6d alignmentDeviation(const GapAlignment& alignment, const GapRows& rows, 
   return deviation;
 }
 
+namespace {
+
+constexpr double kLeastTolerance = 1e-6;
+constexpr double kFarthestInTolerances = 2.5;
+
+Eigen::Vector3d shortened(const Eigen::Vector3d& v, double longest) {
+  const double length = v.norm();
+  return length > longest ? Eigen::Vector3d(v * (longest / length)) : v;
+}
+
+}  // namespace
+
+bool keepNearStated(const GapRows& rows, const Eigen::Vector3d& center_m, GapAlignment& alignment) {
+  const Vector6d deviation = alignmentDeviation(alignment, rows, center_m);
+  const double farthest_m = kFarthestInTolerances * std::max(kLeastTolerance, rows.alignment_tolerance_m);
+  const double farthest_rad = kFarthestInTolerances * std::max(kLeastTolerance, rows.alignment_tolerance_rad);
+  if (deviation.head<3>().norm() <= farthest_m && deviation.tail<3>().norm() <= farthest_rad) return false;
+  const Eigen::Quaterniond turn = rotationFromVector(shortened(deviation.tail<3>(), farthest_rad));
+  const Pose& stated = rows.stated_tracker_from_reference;
+  Pose& rig = alignment.tracker_from_reference;
+  rig.position_m = turn * (stated.position_m - center_m) + center_m + shortened(deviation.head<3>(), farthest_m);
+  rig.orientation = (turn * stated.orientation).normalized();
+  return true;
+}
+
+double alignmentCost(const GapPhysics& physics, const GapAlignment& alignment) {
+  const GapRows& rows = physics.rows();
+  if (!rows.alignment_known || !hasFreeAlignment(rows)) return 0.0;
+  const Vector6d deviation = alignmentDeviation(alignment, rows, alignmentCenter_m(physics.settings(alignment)));
+  return deviation.head<3>().squaredNorm() / std::pow(std::max(kLeastTolerance, rows.alignment_tolerance_m), 2) +
+         deviation.tail<3>().squaredNorm() / std::pow(std::max(kLeastTolerance, rows.alignment_tolerance_rad), 2);
+}
+
+LinearPrior priorOf(const EffectFit& fit) {
+  const std::vector<FitParameter> linear = fit.linear();
+  LinearPrior prior;
+  prior.precision = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(linear.size()));
+  const bool is_searched = !fit.searched().empty();
+  if (linear.size() == 1 && (is_searched || linear.front().low >= 0.0)) {
+    prior.low = linear.front().low;
+    prior.high = linear.front().high;
+  } else if (!is_searched) {
+    for (std::size_t j = 0; j < linear.size(); ++j)
+      prior.precision[static_cast<Eigen::Index>(j)] = 1.0 / (linear[j].high * linear[j].high);
+  }
+  return prior;
+}
+
 Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening,
                        std::span<const int> block)
     : channels_(physics.rows().channels()), order_(physics.size()) {
@@ -125,10 +173,9 @@ void Linearized::addAlignment(const GapRows& rows, const GapAlignment& alignment
   n_alignment_ = static_cast<int>(responses.size() / settings_.size());
   nuisance_ = columnsOf(responses, n_alignment_);
   if (n_prior_ == 0) return;
-  constexpr double kLeast = 1e-6;
   const Vector6d deviation = alignmentDeviation(alignment, rows, center_m);
   for (Eigen::Index k = 0; k < 6; ++k) {
-    const double tolerance = std::max(kLeast, k < 3 ? rows.alignment_tolerance_m : rows.alignment_tolerance_rad);
+    const double tolerance = std::max(kLeastTolerance, k < 3 ? rows.alignment_tolerance_m : rows.alignment_tolerance_rad);
     nuisance_(residual_.size() - 6 + k, k) = 1.0 / tolerance;
     residual_[residual_.size() - 6 + k] = -deviation[k] / tolerance;
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,17 @@ struct Whitening {
   std::vector<double> rotation;           ///< [1/rad], per row.
 };
 Whitening makeWhitening(const GapRows& rows, double placing_sd_m, double placing_sd_rad);
+
+/// What is believable of a fit's linear parameters before any data: those of purely linear effects are about zero, as
+/// far as is plausible; the only one of a searched effect lies within its bounds.
+struct LinearPrior {
+  Eigen::VectorXd precision;  ///< 1/variance, per parameter; 0 = anything.
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+
+  double costOf(const Eigen::VectorXd& linear) const { return linear.cwiseAbs2().dot(precision); }
+};
+LinearPrior priorOf(const EffectFit& fit);
 
 /// Rows of one hold-out block, in the permuted order of a Linearized model.
 struct Segment {
@@ -66,6 +78,10 @@ class Linearized {
 /// @param center_m the rotation's fixed point, tracker frame
 void applyAlignmentStep(const Eigen::VectorXd& step, const Eigen::Vector3d& center_m, const GapRows& rows,
                         GapAlignment& alignment);
+/// Keeps an alignment that the rig states within what its tolerances allow; true where it had to be moved.
+bool keepNearStated(const GapRows& rows, const Eigen::Vector3d& center_m, GapAlignment& alignment);
+/// Minus twice the log likelihood of an alignment by the rig's stated tolerances; 0 where it states none.
+double alignmentCost(const GapPhysics& physics, const GapAlignment& alignment);
 /// How far an alignment that the rig states is from what it stated: shift of the centre [m], then rotation [rad].
 Vector6d alignmentDeviation(const GapAlignment& alignment, const GapRows& rows, const Eigen::Vector3d& center_m);
 /// Fixed point of the alignment's rotation: the middle of the places in the tracker frame.

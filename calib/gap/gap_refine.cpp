@@ -44,7 +44,8 @@ class ProjectedFit {
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = Eigen::Dynamic };
 
-  ProjectedFit(const Linearized& at, const EffectFit& fit, std::optional<std::size_t> held_out) : at_(at), fit_(fit) {
+  ProjectedFit(const Linearized& at, const EffectFit& fit, std::optional<std::size_t> held_out)
+      : at_(at), fit_(fit), prior_(priorOf(fit)) {
     for (std::size_t b = 0; b < at.segments().size(); ++b)
       if (held_out != b) parts_.push_back(at.segments()[b]);
     const Segment& last = at.segments().back();
@@ -80,7 +81,9 @@ class ProjectedFit {
     }
     Eigen::MatrixXd normal = columns.transpose() * columns;
     normal.diagonal().array() += 1e-9;
-    const Eigen::VectorXd y = normal.llt().solve(columns.transpose() * residual_);
+    normal.diagonal() += scale.cwiseAbs2().cwiseProduct(prior_.precision);
+    Eigen::VectorXd y = normal.llt().solve(columns.transpose() * residual_);
+    if (y.size() == 1 && scale[0] > 0.0) y[0] = std::clamp(y[0], prior_.low / scale[0], prior_.high / scale[0]);
     return {scale.asDiagonal() * y, residual_ - columns * y};
   }
 
@@ -120,6 +123,7 @@ class ProjectedFit {
 
   const Linearized& at_;
   const EffectFit& fit_;
+  LinearPrior prior_;
   std::vector<Segment> parts_;
   Eigen::MatrixXd basis_;
   Eigen::VectorXd residual_;
@@ -153,6 +157,12 @@ std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapMode
     residuals[i].tail<3>() *= whitening.rotation[i];
   }
   return residuals;
+}
+
+double priorCost(const GapPhysics& physics, const GapModel& model) {
+  double cost = alignmentCost(physics, model.alignment);
+  for (const GapTerm& term : model.terms) cost += priorOf(*term.fit).costOf(term.linear);
+  return cost;
 }
 
 LocalFit refineLocally(const Linearized& at, const EffectFit& fit, const Eigen::VectorXd& start,
@@ -193,7 +203,8 @@ class JointFit {
       if (options_.frozen) J.col(*options_.frozen).setZero();
       const Eigen::VectorXd w = weights(at);
       Eigen::MatrixXd normal = J.transpose() * w.asDiagonal() * J;
-      const Eigen::VectorXd right = J.transpose() * (w.asDiagonal() * at.residual());
+      Eigen::VectorXd right = J.transpose() * (w.asDiagonal() * at.residual());
+      addPriors(model, at.nAlignment(), normal, right);
       const Eigen::Vector3d center_m = alignmentCenter_m(at.settings());
       Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
       normal = scale.asDiagonal() * normal * scale.asDiagonal();
@@ -202,16 +213,19 @@ class JointFit {
       for (int attempt = 0; attempt < 7 && !improved; ++attempt) {
         Eigen::MatrixXd damped = normal;
         damped.diagonal().array() += damping + 1e-10;
-        const Eigen::VectorXd y = scale.asDiagonal() * damped.ldlt().solve(scale.asDiagonal() * right);
-        GapModel next = model;
-        if (y.allFinite() && apply(y, center_m, at.nAlignment(), next)) {
-          const double next_cost = costOf(next, false);
+        for (const bool moves_rig : {true, false}) {
+          const Eigen::Index fixed = moves_rig ? 0 : at.nAlignment();
+          const Eigen::VectorXd y = stepOf(damped, right, scale, fixed);
+          GapModel next = model;
+          const Applied applied = y.allFinite() ? apply(y, center_m, at.nAlignment(), next) : Applied::kForbidden;
+          const double next_cost = applied == Applied::kForbidden ? cost : costOf(next, false);
           if (next_cost < cost) {
             fall = cost - next_cost;
             model = std::move(next);
             cost = next_cost;
             improved = true;
           }
+          if (improved || applied != Applied::kAtTolerance) break;
         }
         damping = improved ? std::max(1e-9, 0.2 * damping) : 6.0 * std::max(damping, 1e-6);
       }
@@ -225,17 +239,44 @@ class JointFit {
  private:
   bool isUsed(std::size_t row) const { return options_.used.empty() || options_.used[row] != 0; }
 
-  bool apply(const Eigen::VectorXd& step, const Eigen::Vector3d& center_m, int n_alignment, GapModel& model) const {
+  enum class Applied { kFully, kAtTolerance, kForbidden };
+
+  /// One damped step; the first `fixed` parameters stay.
+  static Eigen::VectorXd stepOf(const Eigen::MatrixXd& damped, const Eigen::VectorXd& right,
+                                const Eigen::VectorXd& scale, Eigen::Index fixed) {
+    const Eigen::Index free = right.size() - fixed;
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(right.size());
+    if (free == 0) return y;
+    const Eigen::VectorXd scaled = scale.tail(free).cwiseProduct(right.tail(free));
+    y.tail(free) = scale.tail(free).cwiseProduct(damped.bottomRightCorner(free, free).ldlt().solve(scaled));
+    return y;
+  }
+
+  void addPriors(const GapModel& model, Eigen::Index at, Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
+    for (const GapTerm& term : model.terms) {
+      const Eigen::Index m = term.linear.size();
+      const LinearPrior prior = priorOf(*term.fit);
+      normal.diagonal().segment(at, m) += prior.precision;
+      right.segment(at, m) -= prior.precision.cwiseProduct(term.linear);
+      at += m + term.searched.size();
+    }
+  }
+
+  Applied apply(const Eigen::VectorXd& step, const Eigen::Vector3d& center_m, int n_alignment, GapModel& model) const {
     applyAlignmentStep(step.head(n_alignment), center_m, physics_.rows(), model.alignment);
+    const bool is_bounded = physics_.rows().alignment_known && n_alignment > 0;
+    const bool is_moved = is_bounded && keepNearStated(physics_.rows(), center_m, model.alignment);
     Eigen::Index at = n_alignment;
     for (GapTerm& term : model.terms) {
       term.linear += step.segment(at, term.linear.size());
       at += term.linear.size();
       term.searched += step.segment(at, term.searched.size());
       at += term.searched.size();
-      if (term.searched.size() > 0 && !term.fit->allows(term.searched)) return false;
+      if (term.searched.size() > 0 && !term.fit->allows(term.searched)) return Applied::kForbidden;
+      const LinearPrior prior = priorOf(*term.fit);
+      if (term.linear.size() == 1) term.linear[0] = std::clamp(term.linear[0], prior.low, prior.high);
     }
-    return true;
+    return is_moved ? Applied::kAtTolerance : Applied::kFully;
   }
 
   /// Sum over rows of the residual law's penalty at the present scales, and that of the alignment's tolerances.
@@ -252,19 +293,7 @@ class JointFit {
       sum += (nu + 3.0) * std::log1p(r.head<3>().squaredNorm() / (nu * scale_.position * scale_.position));
       if (both) sum += (nu + 3.0) * std::log1p(r.tail<3>().squaredNorm() / (nu * scale_.rotation * scale_.rotation));
     }
-    return sum + priorOf(model);
-  }
-
-  double priorOf(const GapModel& model) const {
-    const GapRows& rows = physics_.rows();
-    if (!rows.alignment_known) return 0.0;
-    constexpr double kLeast = 1e-6;
-    const Vector6d deviation =
-        alignmentDeviation(model.alignment, rows, alignmentCenter_m(physics_.settings(model.alignment)));
-    const double shift = deviation.head<3>().norm();
-    const double turn = deviation.tail<3>().norm();
-    return std::pow(shift / std::max(kLeast, rows.alignment_tolerance_m), 2) +
-           std::pow(turn / std::max(kLeast, rows.alignment_tolerance_rad), 2);
+    return sum + priorCost(physics_, model);
   }
 
   Eigen::VectorXd weights(const Linearized& at) const {
@@ -290,6 +319,8 @@ class JointFit {
     const Linearized at(physics_, model, whitening_, block_);
     const Eigen::MatrixXd& J = at.nuisance();
     Eigen::MatrixXd normal = J.transpose() * weights(at).asDiagonal() * J;
+    Eigen::VectorXd unused = Eigen::VectorXd::Zero(J.cols());
+    addPriors(model, at.nAlignment(), normal, unused);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
     normal = scale.asDiagonal() * normal * scale.asDiagonal();
     normal.diagonal().array() += 1e-9;

@@ -33,6 +33,9 @@ Deviance devianceOf(std::span<const Vector6d> whitened, bool has_orientation, co
 /// Whitened residuals of a model, one per row.
 std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapModel& model, const Whitening& whitening);
 
+/// Minus twice the log prior of a model: the rig's stated tolerances, and what is believable of linear effects.
+double priorCost(const GapPhysics& physics, const GapModel& model);
+
 /// Refines the searched parameters of one fit near a start by Levenberg and Marquardt, all linear parameters and the
 /// nuisance projected out.
 /// @param held_out block left out; none = all rows

@@ -16,18 +16,27 @@ struct Solution {
 };
 
 /// Least squares from cross products by columns scaled to unit length; a column that others make up gets next to
-/// nothing.
-Solution solve(const Gram& gram) {
+/// nothing. The last columns are those that `prior` is about.
+Solution solve(const Gram& gram, const LinearPrior& prior = {}) {
   const Eigen::Index n = gram.cols() - 1;
   Eigen::VectorXd scale(n);
   for (Eigen::Index j = 0; j < n; ++j) scale[j] = gram(j, j) > 0.0 ? 1.0 / std::sqrt(gram(j, j)) : 0.0;
   Eigen::MatrixXd normal = scale.asDiagonal() * gram.topLeftCorner(n, n) * scale.asDiagonal();
   normal.diagonal().array() += 1e-9;
+  const Eigen::Index m = prior.precision.size();
+  normal.diagonal().tail(m) += scale.tail(m).cwiseAbs2().cwiseProduct(prior.precision);
   const Eigen::VectorXd right = scale.asDiagonal() * gram.col(n).head(n);
+  Eigen::VectorXd y = normal.llt().solve(right);
   Solution solution;
-  const Eigen::VectorXd y = normal.llt().solve(right);
   solution.x = scale.asDiagonal() * y;
-  solution.gain = right.dot(y);
+  if (m == 1 && (solution.x[n - 1] < prior.low || solution.x[n - 1] > prior.high)) {
+    solution.x[n - 1] = std::clamp(solution.x[n - 1], prior.low, prior.high);
+    y[n - 1] = scale[n - 1] > 0.0 ? solution.x[n - 1] / scale[n - 1] : 0.0;
+    const Eigen::VectorXd rest = right.head(n - 1) - normal.col(n - 1).head(n - 1) * y[n - 1];
+    y.head(n - 1) = normal.topLeftCorner(n - 1, n - 1).llt().solve(rest);
+    solution.x = scale.asDiagonal() * y;
+  }
+  solution.gain = 2.0 * right.dot(y) - y.dot(normal * y);
   return solution;
 }
 
@@ -61,7 +70,7 @@ class Scanner {
     std::vector<double> held_out;
   };
 
-  Tried tryColumns(const Eigen::MatrixXd& columns) const {
+  Tried tryColumns(const Eigen::MatrixXd& columns, const LinearPrior& prior) const {
     const Eigen::Index q = at_.nuisance().cols();
     const Eigen::Index m = columns.cols();
     std::vector<Gram> grams;
@@ -83,9 +92,9 @@ class Scanner {
     }
     const Gram total = sum(grams);
     Tried tried;
-    tried.gain = solve(total).gain - base_gain_;
+    tried.gain = solve(total, prior).gain - base_gain_;
     for (std::size_t b = 0; b < at_.segments().size(); ++b) {
-      const Solution without = solve(total - grams[b]);
+      const Solution without = solve(total - grams[b], prior);
       tried.without.push_back(without.gain - base_without_[b]);
       tried.held_out.push_back(base_held_out_[b] - heldOut(grams[b], without.x));
     }
@@ -125,9 +134,10 @@ ScanResult scan(const Linearized& at, const EffectFit& fit, std::size_t kept, co
   std::vector<Eigen::VectorXd> starts = fit.starts();
   std::erase_if(starts, [&](const Eigen::VectorXd& start) { return !fit.allows(start); });
   const Scanner scanner(at);
+  const LinearPrior prior = priorOf(fit);
   std::vector<Scanner::Tried> tried(starts.size());
   control.parallel_for(starts.size(), [&](std::size_t i) {
-    if (!control.stop.stop_requested()) tried[i] = scanner.tryColumns(at.columns(fit, starts[i]));
+    if (!control.stop.stop_requested()) tried[i] = scanner.tryColumns(at.columns(fit, starts[i]), prior);
   });
   ScanResult result;
   if (control.stop.stop_requested() || starts.empty()) return result;

@@ -92,7 +92,8 @@ double GapSearch::bicOf(const GapModel& model) const {
   double parameters = 0.0;
   for (const GapTerm& term : model.terms) parameters += parametersOf(term);
   const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
-  return devianceOf(left, rows_.has_orientation, law_).value + parameters * std::log(count);
+  return devianceOf(left, rows_.has_orientation, law_).value + parameters * std::log(count) +
+         priorCost(physics_, model);
 }
 
 RefinedModel GapSearch::refined(const GapModel& start, std::span<const char> used) const {
