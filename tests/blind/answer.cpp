@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <iostream>
+#include <memory>
 #include <stdexcept>
 #include <thread>
 
@@ -34,10 +36,39 @@ struct Request {
   bool replaces = false;
 };
 
+/// A folder with the tables of one session under names that tell nothing; gone with its last owner.
+class Desk {
+ public:
+  Desk(const fs::path& folder, const std::string& file) {
+    std::string path = (fs::temp_directory_path() / "fieldtrue-blind-XXXXXX").string();
+    if (::mkdtemp(path.data()) == nullptr) throw std::runtime_error("cannot make a folder like " + path);
+    path_ = path;
+    replaceFile(path_ / "nodes.csv", textOf(folder / (file + ".nodes.csv")));
+    const fs::path samples = folder / (file + ".samples.csv");
+    has_samples_ = fs::exists(samples);
+    if (has_samples_) replaceFile(path_ / "samples.csv", textOf(samples));
+  }
+  ~Desk() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  Desk(const Desk&) = delete;
+  Desk& operator=(const Desk&) = delete;
+
+  const fs::path& path() const { return path_; }
+  bool hasSamples() const { return has_samples_; }
+  fs::path report() const { return path_ / "report.gap.json"; }
+
+ private:
+  fs::path path_;
+  bool has_samples_ = false;
+};
+
 struct Running {
   pid_t pid = 0;
   std::string file;
   Clock::time_point start;
+  std::unique_ptr<Desk> desk;
 };
 
 /// Held while answers.json is read and replaced, so that processes sharing a set do not lose each other's records.
@@ -83,6 +114,7 @@ Request requestOf(std::span<const std::string> words) {
     if (option == "--to") request.to = static_cast<std::size_t>(std::max(1.0, positiveNumber(option, text)));
   }
   if (request.folder.empty()) throw std::invalid_argument("answer: --in DIR is needed");
+  request.cli = request.cli.empty() ? fs::path() : fs::absolute(request.cli);
   if (request.cli.empty()) request.cli = fs::read_symlink("/proc/self/exe").parent_path() / "fieldtrue-cli";
   return request;
 }
@@ -107,21 +139,28 @@ json recordsIn(const fs::path& folder) {
   return records;
 }
 
-void refuseAnswered(const Request& request, const std::vector<std::string>& files) {
+/// What has a record is answered; a report without one is left over from a run that was stopped.
+std::vector<std::string> unanswered(const Request& request, const std::vector<std::string>& files) {
+  if (request.replaces) return files;
   const json records = recordsIn(request.folder);
-  for (const std::string& file : files) {
-    const auto& list = records["sessions"];
-    const bool is_recorded =
-        std::any_of(list.begin(), list.end(), [&](const json& record) { return record.value("file", "") == file; });
-    if (is_recorded || fs::exists(request.folder / (file + ".gap.json")))
-      throw std::runtime_error(file + " is answered already; answers are written once (--again replaces them)");
-  }
+  const json& list = records["sessions"];
+  std::vector<std::string> open;
+  for (const std::string& file : files)
+    if (std::none_of(list.begin(), list.end(), [&](const json& record) { return record.value("file", "") == file; }))
+      open.push_back(file);
+  return open;
 }
 
 void recordAnswer(const Request& request, const Running& done, double seconds, int status) {
   const fs::path report = request.folder / (done.file + ".gap.json");
   json entry = {{"file", done.file}, {"seconds", seconds}, {"exit_status", status}};
-  if (status == 0 && fs::exists(report)) entry["answer_sha256"] = sha256Hex(textOf(report));
+  if (status == 0 && fs::exists(done.desk->report())) {
+    const std::string text = textOf(done.desk->report());
+    replaceFile(report, text);
+    entry["answer_sha256"] = sha256Hex(text);
+  } else {
+    fs::remove(report);
+  }
   const RecordLock lock(request.folder);
   json records = recordsIn(request.folder);
   json& list = records["sessions"];
@@ -136,7 +175,8 @@ void recordAnswer(const Request& request, const Running& done, double seconds, i
   replaceFile(request.folder / "answers.json", records.dump(1));
 }
 
-[[noreturn]] void becomeDiagnosis(std::vector<std::string>& words, const std::string& log_path) {
+[[noreturn]] void becomeDiagnosis(std::vector<std::string>& words, const fs::path& folder,
+                                  const std::string& log_path) {
   const int nothing = ::open("/dev/null", O_RDWR);
   const int log = ::open(log_path.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
   if (nothing >= 0) {
@@ -147,23 +187,20 @@ void recordAnswer(const Request& request, const Running& done, double seconds, i
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
-  ::execv(arguments[0], arguments.data());
+  if (::chdir(folder.c_str()) == 0) ::execv(arguments[0], arguments.data());
   ::_exit(127);
 }
 
 Running startDiagnosis(const Request& request, const std::string& file) {
-  const fs::path stem = request.folder / file;
-  const std::string report = stem.string() + ".gap.json";
-  fs::remove(report);
-  std::vector<std::string> words = {request.cli.string(), "diagnose", "--nodes", stem.string() + ".nodes.csv"};
-  if (const std::string samples = stem.string() + ".samples.csv"; fs::exists(samples))
-    words.insert(words.end(), {"--samples", samples});
-  words.insert(words.end(), {"--out", report, "--threads", "1"});
-  const std::string log_path = stem.string() + ".stderr";
-  Running running{0, file, Clock::now()};
+  Running running{0, file, {}, std::make_unique<Desk>(request.folder, file)};
+  std::vector<std::string> words = {request.cli.string(), "diagnose", "--nodes", "nodes.csv"};
+  if (running.desk->hasSamples()) words.insert(words.end(), {"--samples", "samples.csv"});
+  words.insert(words.end(), {"--out", running.desk->report().filename().string(), "--threads", "1"});
+  const std::string log_path = fs::absolute(request.folder / (file + ".stderr")).string();
+  running.start = Clock::now();
   running.pid = ::fork();
   if (running.pid < 0) throw std::runtime_error("cannot start another process");
-  if (running.pid == 0) becomeDiagnosis(words, log_path);
+  if (running.pid == 0) becomeDiagnosis(words, running.desk->path(), log_path);
   return running;
 }
 
@@ -175,7 +212,6 @@ bool wasCollected(const Request& request, const Running& running, std::size_t& f
   if (is_late) ::kill(running.pid, SIGKILL);
   if (::waitpid(running.pid, &raw, is_late ? 0 : WNOHANG) == 0) return false;
   const int status = is_late ? kTimedOut : WIFEXITED(raw) ? WEXITSTATUS(raw) : 128 + WTERMSIG(raw);
-  if (is_late) fs::remove(request.folder / (running.file + ".gap.json"));
   const fs::path log_path = request.folder / (running.file + ".stderr");
   if (status == 0) {
     fs::remove(log_path);
@@ -205,12 +241,15 @@ std::size_t answerAll(const Request& request, const std::vector<std::string>& fi
 int runAnswer(std::span<const std::string> words) {
   try {
     const Request request = requestOf(words);
-    const std::vector<std::string> files = filesOf(openSealed(request.folder), request);
+    const std::vector<std::string> asked = filesOf(openSealed(request.folder), request);
     if (::access(request.cli.c_str(), X_OK) != 0)
       throw std::runtime_error("cannot run " + request.cli.string() + "; name the program with --cli PATH");
-    if (!request.replaces) refuseAnswered(request, files);
+    const std::vector<std::string> files = unanswered(request, asked);
     const std::size_t failed = answerAll(request, files);
-    std::cout << files.size() << " sessions answered, " << failed << " of them failed\n";
+    std::cout << files.size() << " sessions answered, " << failed << " of them failed";
+    if (files.size() < asked.size())
+      std::cout << "; " << asked.size() - files.size() << " had been answered before (--again replaces them)";
+    std::cout << "\n";
     return 0;
   } catch (const std::invalid_argument& error) {
     std::cerr << error.what() << "\n";

@@ -175,7 +175,7 @@ struct Unanswered {
     replaceFile(path / "s02.samples.csv", "node\n1\n");
     replaceFile(cli,
                 "#!/bin/sh\n"
-                "echo \"$@\" >> \"$(dirname \"$0\")/calls\"\n"
+                "echo \"$@\": $(ls) >> \"$(dirname \"$0\")/calls\"\n"
                 "[ -e \"$(dirname \"$0\")/broken\" ] && exit 3\n"
                 "while [ \"$1\" != --out ]; do shift; done\n"
                 "echo '{\"verdict\": \"no_gap\", \"candidates\": [], \"selected\": []}' > \"$2\"\n");
@@ -218,6 +218,8 @@ class BlindScoreTest : public QObject {
   void answersAreWrittenOnce();
   void theDiagnosisSeesNoLabel();
   void failuresAreRecorded();
+  void aStoppedRunGoesOnWhereItStopped();
+  void aDiagnosisThatTakesTooLongIsWrong();
   void onlyTheAskedSessionsAreAnswered();
   void wrongUsageIsTold_data();
   void wrongUsageIsTold();
@@ -397,7 +399,7 @@ void BlindScoreTest::answersAreWrittenOnce() {
   QCOMPARE(folder.answer(), 0);
   const std::string first_calls = folder.calls();
   const std::string records = textOf(folder.path / "answers.json");
-  QCOMPARE(folder.answer(), 1);
+  QCOMPARE(folder.answer(), 0);
   QCOMPARE(folder.calls(), first_calls);
   QCOMPARE(textOf(folder.path / "answers.json"), records);
   QCOMPARE(folder.answer({"--again"}), 0);
@@ -408,13 +410,11 @@ void BlindScoreTest::answersAreWrittenOnce() {
 void BlindScoreTest::theDiagnosisSeesNoLabel() {
   const Unanswered folder;
   QCOMPARE(folder.answer(), 0);
-  const std::string stem = folder.path.string() + "/";
+  // What it is told, and all that lies in the folder it works in.
   const std::string calls = folder.calls();
-  QVERIFY(calls.find("diagnose --nodes " + stem + "s01.nodes.csv --out " + stem + "s01.gap.json --threads 1\n") !=
-          std::string::npos);
-  QVERIFY(calls.find("diagnose --nodes " + stem + "s02.nodes.csv --samples " + stem + "s02.samples.csv --out " + stem +
-                     "s02.gap.json --threads 1\n") != std::string::npos);
-  QVERIFY(calls.find("truth") == std::string::npos);
+  QVERIFY(calls.find("diagnose --nodes nodes.csv --out report.gap.json --threads 1: nodes.csv\n") != std::string::npos);
+  QVERIFY(calls.find("diagnose --nodes nodes.csv --samples samples.csv --out report.gap.json --threads 1: nodes.csv "
+                     "samples.csv\n") != std::string::npos);
 }
 
 void BlindScoreTest::failuresAreRecorded() {
@@ -424,8 +424,35 @@ void BlindScoreTest::failuresAreRecorded() {
   const json records = documentOf(folder.path / "answers.json")["sessions"];
   QCOMPARE(records.size(), std::size_t(2));
   for (const json& record : records) QVERIFY(record["exit_status"] == 3);
-  QCOMPARE(folder.answer(), 1);
+  const std::string calls = folder.calls();
+  QCOMPARE(folder.answer(), 0);
+  QCOMPARE(folder.calls(), calls);
   QCOMPARE(runScore(std::vector<std::string>{"--in", folder.path.string()}), 1);
+}
+
+void BlindScoreTest::aStoppedRunGoesOnWhereItStopped() {
+  const Unanswered folder;
+  QCOMPARE(folder.answer({"--to", "1"}), 0);
+  const std::string first = textOf(folder.path / "s01.gap.json");
+  // The second was stopped after its report was written, before it was recorded.
+  replaceFile(folder.path / "s02.gap.json", "half a rep");
+  QCOMPARE(folder.answer(), 0);
+  QCOMPARE(textOf(folder.path / "s01.gap.json"), first);
+  QCOMPARE(documentOf(folder.path / "s02.gap.json")["verdict"].get<std::string>(), std::string("no_gap"));
+  const std::string calls = folder.calls();
+  QCOMPARE(std::count(calls.begin(), calls.end(), '\n'), 2);
+}
+
+void BlindScoreTest::aDiagnosisThatTakesTooLongIsWrong() {
+  const Unanswered folder;
+  replaceFile(folder.cli, "#!/bin/sh\necho '{\"verdict\": \"no_gap\"}' > report.gap.json\nexec sleep 20\n");
+  fs::permissions(folder.cli, fs::perms::owner_all);
+  QCOMPARE(folder.answer({"--limit", "0.3"}), 0);
+  for (const json& record : documentOf(folder.path / "answers.json")["sessions"]) {
+    QVERIFY(record["exit_status"] == 124);
+    QVERIFY(record["seconds"].get<double>() < 10.0);
+  }
+  QVERIFY(!fs::exists(folder.path / "s01.gap.json"));
 }
 
 void BlindScoreTest::onlyTheAskedSessionsAreAnswered() {

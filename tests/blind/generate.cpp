@@ -1,19 +1,27 @@
 #include "tests/blind/generate.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <atomic>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <fstream>
+#include <cstdio>
+#include <initializer_list>
 #include <iostream>
+#include <limits>
+#include <map>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "tests/blind/generate_session.h"
 #include "tests/blind/physics.h"
+#include "tests/blind/plan_classes.h"
+#include "tests/blind/sealed_folder.h"
 #include "tests/blind/sha256.h"
 
 namespace blind {
@@ -24,84 +32,87 @@ namespace fs = std::filesystem;
 
 struct Options {
   fs::path out;
+  fs::path cli;
   std::uint64_t seed = 0;
-  int sessions = 0;
-  int threads = 1;
+  std::size_t sessions = 0;
+  std::size_t jobs = 1;
+  std::size_t most_rows = 0;
   std::string shelf = "all";
   std::string role = "dev";
   bool samples = false;
   bool levels = false;
-  bool seed_given = false;
 };
 
-template <typename Number>
-bool parseNumber(const std::string& text, Number& value) {
+std::uint64_t wholeNumber(const std::string& option, const std::string& text, std::uint64_t low, std::uint64_t high) {
+  std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
+  if (error != std::errc() || end != text.data() + text.size() || value < low || value > high)
+    throw std::invalid_argument("generate: " + option + " needs a whole number from " + std::to_string(low) + " to " +
+                                std::to_string(high) + ", got '" + text + "'");
+  return value;
 }
 
-std::optional<std::string> parse(std::span<const std::string> arguments, Options& options) {
-  for (std::size_t a = 0; a < arguments.size(); ++a) {
-    const std::string& name = arguments[a];
-    if (name == "--samples" || name == "--levels") {
-      (name == "--samples" ? options.samples : options.levels) = true;
-      continue;
-    }
-    if (a + 1 == arguments.size()) return name + " is not known or needs a value after it";
-    const std::string& value = arguments[++a];
-    bool good = true;
-    if (name == "--out") {
-      options.out = value;
-    } else if (name == "--seed") {
-      good = options.seed_given = parseNumber(value, options.seed);
-    } else if (name == "--sessions") {
-      good = parseNumber(value, options.sessions) && options.sessions > 0 && options.sessions < 100000;
-    } else if (name == "--threads") {
-      good = parseNumber(value, options.threads) && options.threads > 0 && options.threads <= 256;
-    } else if (name == "--role") {
-      options.role = value;
-      good = value == "dev" || value == "test";
-    } else if (name == "--shelf") {
-      options.shelf = value;
-      const std::string known[] = {"all", "none", "single", "pairs", "off", "signals"};
-      good = std::find(std::begin(known), std::end(known), value) != std::end(known);
-    } else {
-      return "unknown option " + name;
-    }
-    if (!good) return "cannot use " + name + " " + value;
+std::string oneOf(const std::string& option, const std::string& text, std::initializer_list<const char*> known) {
+  std::string list;
+  for (const char* word : known) {
+    if (text == word) return text;
+    list += (list.empty() ? "" : ", ") + std::string(word);
   }
-  if (options.out.empty()) return "needs --out, the folder to write";
-  if (!options.seed_given) return "needs --seed, a whole number from 0";
-  if (options.sessions == 0) return "needs --sessions, how many to write";
-  return std::nullopt;
+  throw std::invalid_argument("generate: " + option + " is one of " + list + ", got '" + text + "'");
 }
 
-/// Shelves in their shares, in an order that tells nothing.
-std::vector<std::string> drawShelves(const Options& options, Random& random) {
+Options parse(std::span<const std::string> arguments) {
+  static constexpr std::string_view kWithValue[] = {"--out",  "--seed", "--sessions", "--count",    "--threads",
+                                                    "--jobs", "--role", "--shelf",    "--max-rows", "--cli"};
+  static constexpr std::string_view kFlags[] = {"--samples", "--levels"};
+  const auto given = optionsOf(arguments, "generate", kWithValue, kFlags);
+  Options options;
+  for (const auto& [name, text] : given) {
+    if (name == "--out") options.out = text;
+    if (name == "--cli") options.cli = text;
+    if (name == "--seed") options.seed = wholeNumber(name, text, 0, std::numeric_limits<std::uint64_t>::max());
+    if (name == "--sessions" || name == "--count") options.sessions = wholeNumber(name, text, 1, 99999);
+    if (name == "--threads" || name == "--jobs") options.jobs = wholeNumber(name, text, 1, 256);
+    if (name == "--max-rows") options.most_rows = wholeNumber(name, text, 48, 100000);
+    if (name == "--role") options.role = oneOf(name, text, {"dev", "test"});
+    if (name == "--shelf") options.shelf = oneOf(name, text, {"all", "none", "single", "pairs", "off", "signals"});
+  }
+  options.samples = given.count("--samples") > 0;
+  options.levels = given.count("--levels") > 0;
+  if (options.out.empty()) throw std::invalid_argument("generate: --out DIR is needed, the folder to write");
+  if (given.count("--seed") == 0) throw std::invalid_argument("generate: --seed N is needed, a whole number from 0");
+  if (options.sessions == 0) throw std::invalid_argument("generate: --sessions K is needed, how many to write");
+  if (options.cli.empty()) options.cli = fs::read_symlink("/proc/self/exe").parent_path() / "fieldtrue-cli";
+  return options;
+}
+
+/// Shelves in their shares; of one effect alone a fifth of the sessions at each of the four strengths.
+std::vector<SessionWish> drawWishes(const Options& options, Random& random) {
   struct Share {
     const char* shelf;
     double share;
   };
   constexpr Share kShares[] = {{"none", 0.25}, {"single", 0.45}, {"pairs", 0.12}, {"off", 0.15}, {"signals", 0.03}};
-  const auto wanted = static_cast<std::size_t>(options.sessions);
+  constexpr double kLevels[] = {0.35, 0.7, 1.4, 2.8};
   std::vector<std::string> shelves;
   double upto = 0;
   for (const Share& share : kShares) {
     upto += share.share;
-    const auto end = static_cast<std::size_t>(std::llround(upto * options.sessions));
-    while (shelves.size() < std::min(end, wanted)) shelves.emplace_back(share.shelf);
+    const auto end = static_cast<std::size_t>(std::llround(upto * static_cast<double>(options.sessions)));
+    while (shelves.size() < end) shelves.emplace_back(options.shelf == "all" ? share.shelf : options.shelf);
   }
-  if (options.shelf != "all") return std::vector<std::string>(wanted, options.shelf);
-  for (std::size_t n = shelves.size(); n > 1; --n)
-    std::swap(shelves[n - 1], shelves[static_cast<std::size_t>(uniformInt(random, 0, static_cast<int>(n) - 1))]);
-  return shelves;
-}
-
-void write(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error("cannot write " + path.string());
+  std::map<std::string, std::size_t> seen;
+  std::vector<SessionWish> wishes;
+  for (const std::string& shelf : shelves) {
+    SessionWish wish{shelf, std::nullopt, options.samples, options.most_rows};
+    const std::size_t turn = seen[shelf]++ % 5;
+    if (options.levels && turn < 4 && (shelf == "single" || shelf == "off")) wish.level = kLevels[turn];
+    wishes.push_back(std::move(wish));
+  }
+  // An order that tells nothing.
+  for (std::size_t n = wishes.size(); n > 1; --n)
+    std::swap(wishes[n - 1], wishes[static_cast<std::size_t>(uniformInt(random, 0, static_cast<int>(n) - 1))]);
+  return wishes;
 }
 
 std::string nameOf(std::size_t index) {
@@ -110,55 +121,88 @@ std::string nameOf(std::size_t index) {
   return name;
 }
 
-}  // namespace
+/// Writes the tables of one session.
+/// @return its truth, with the classes that plan-check declares beside those of this program's own physics
+json writeSession(const Options& options, const SessionWish& wish, const std::string& name, std::uint64_t seed,
+                  bool asks_plan_check) {
+  GeneratedSession session = generateSession(wish, seed);
+  const fs::path nodes = options.out / (name + ".nodes.csv");
+  replaceFile(nodes, session.nodes_csv);
+  if (!session.samples_csv.empty()) replaceFile(options.out / (name + ".samples.csv"), session.samples_csv);
+  session.truth["file"] = name;
+  session.truth["own_classes"] = session.truth["classes"];
+  if (!asks_plan_check) return session.truth;
+  const std::optional<Classes> declared = planCheckClasses(options.cli, nodes, catalogueIds());
+  if (!declared) throw std::runtime_error(options.cli.string() + " plan-check declares no classes");
+  session.truth["classes"] = *declared;
+  return session.truth;
+}
 
-int runGenerate(std::span<const std::string> arguments) {
-  Options options;
-  if (const auto problem = parse(arguments, options)) {
-    std::cerr << "fieldtrue-blind generate: " << *problem << '\n';
-    return 2;
-  }
-  fs::create_directories(options.out);
+std::vector<json> writeSessions(const Options& options, bool asks_plan_check) {
   Random random(options.seed);
-  const std::vector<std::string> shelves = drawShelves(options, random);
+  const std::vector<SessionWish> wishes = drawWishes(options, random);
   std::vector<std::uint64_t> seeds;
-  for (std::size_t n = 0; n < shelves.size(); ++n) seeds.push_back(random());
-  std::vector<json> truths(shelves.size());
+  for (std::size_t n = 0; n < wishes.size(); ++n) seeds.push_back(random());
+  std::vector<json> truths(wishes.size());
   std::atomic<std::size_t> next{0};
   std::mutex guard;
   std::string problem;
   const auto work = [&] {
-    for (std::size_t n = next++; n < shelves.size(); n = next++) try {
-        GeneratedSession session = generateSession({shelves[n], options.levels, options.samples}, seeds[n]);
-        session.truth["file"] = nameOf(n);
-        truths[n] = std::move(session.truth);
-        write(options.out / (nameOf(n) + ".nodes.csv"), session.nodes_csv);
-        if (!session.samples_csv.empty()) write(options.out / (nameOf(n) + ".samples.csv"), session.samples_csv);
+    for (std::size_t n = next++; n < wishes.size(); n = next++) try {
+        truths[n] = writeSession(options, wishes[n], nameOf(n), seeds[n], asks_plan_check);
       } catch (const std::exception& error) {
         const std::lock_guard lock(guard);
         problem = nameOf(n) + ": " + error.what();
+        next = wishes.size();
       }
   };
   std::vector<std::thread> threads;
-  for (int t = 1; t < options.threads; ++t) threads.emplace_back(work);
+  for (std::size_t t = 1; t < options.jobs; ++t) threads.emplace_back(work);
   work();
   for (std::thread& thread : threads) thread.join();
-  if (!problem.empty()) {
-    std::cerr << "fieldtrue-blind generate: " << problem << '\n';
+  if (!problem.empty()) throw std::runtime_error(problem);
+  return truths;
+}
+
+/// How long a session took to make would tell what it is made of.
+void levelTimeStamps(const fs::path& folder) {
+  const fs::file_time_type now = fs::last_write_time(folder / "truth.json");
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.path().filename().string().rfind("session_", 0) == 0) fs::last_write_time(entry.path(), now);
+}
+
+void writeFolder(const Options& options) {
+  if (fs::exists(options.out / "truth.json"))
+    throw std::runtime_error(options.out.string() + " holds a sealed set already; name an empty folder");
+  std::error_code trouble;
+  fs::create_directories(options.out, trouble);
+  if (trouble) throw std::runtime_error("cannot make the folder " + options.out.string() + ": " + trouble.message());
+  const bool asks_plan_check = ::access(options.cli.c_str(), X_OK) == 0;
+  const std::vector<json> truths = writeSessions(options, asks_plan_check);
+  sealTruth(options.out, {{"schema", "fieldtrue.blind/1"},
+                          {"seed", options.seed},
+                          {"role", options.role},
+                          {"classes_from", asks_plan_check ? "plan-check" : "generator"},
+                          {"sessions", truths}});
+  levelTimeStamps(options.out);
+  std::cout << "sealed " << truths.size() << " sessions, classes as declared by "
+            << (asks_plan_check ? "plan-check" : "this program (no fieldtrue-cli; name it with --cli)")
+            << "\ntruth sha256 " << sha256Hex(textOf(options.out / "truth.json")) << '\n';
+}
+
+}  // namespace
+
+int runGenerate(std::span<const std::string> arguments) {
+  try {
+    writeFolder(parse(arguments));
+    return 0;
+  } catch (const std::invalid_argument& error) {
+    std::cerr << error.what() << '\n';
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "generate: " << error.what() << '\n';
     return 1;
   }
-  const std::string truth =
-      json{{"schema", "fieldtrue.blind/1"}, {"seed", options.seed}, {"role", options.role}, {"sessions", truths}}.dump(
-          1) +
-      "\n";
-  const json seal = {{"schema", "fieldtrue.blind-seal/1"},
-                     {"truth_sha256", sha256Hex(truth)},
-                     {"sessions", shelves.size()},
-                     {"role", options.role}};
-  write(options.out / "truth.json", truth);
-  write(options.out / "seal.json", seal.dump(1) + "\n");
-  std::cout << "sealed " << shelves.size() << " sessions, truth sha256 " << sha256Hex(truth) << '\n';
-  return 0;
 }
 
 }  // namespace blind

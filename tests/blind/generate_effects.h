@@ -24,6 +24,13 @@ struct Kind {
   std::string id;
   double weight = 1;
   Drawn (*draw)(const Setup&, Random&);
+  /// What the design must have for the effect to be drawn.
+  enum class Needs { kNothing, kRigAxes, kLayers } needs = Needs::kNothing;
+
+  /// A table stated in the transmitter's axes has lost those of the rig; scattered places have no layers.
+  bool fits(const Setup& setup) const {
+    return needs == Needs::kNothing || (!setup.alignment_known && !(needs == Needs::kLayers && setup.scattered));
+  }
 };
 
 /// Effects of the catalogue that change the mean pose.

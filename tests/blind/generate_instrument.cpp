@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "tests/blind/generate_effects.h"
 
@@ -218,25 +219,18 @@ Drawn drawCapacitive(const Setup&, Random& random) {
 
 Drawn drawHysteresis(const Setup& setup, Random& random) {
   // The core keeps a part of the field of the row before: what it reads depends on where it came from.
-  std::vector<Matrix3d> before(setup.rows.size(), Matrix3d::Zero());
+  std::map<double, Matrix3d> kept_at;
   Matrix3d memory = Matrix3d::Zero();
   const double kept = uniform(random, 0.2, 0.7);
-  std::vector<std::size_t> by_time(setup.rows.size());
-  for (std::size_t r = 0; r < by_time.size(); ++r) by_time[r] = r;
-  std::sort(by_time.begin(), by_time.end(),
-            [&](std::size_t a, std::size_t b) { return setup.rows[a].start_s < setup.rows[b].start_s; });
-  for (std::size_t r : by_time) {
-    before[r] = memory;
-    const SolvedPose at = setup.expected(setup.rows[r]);
+  for (const Row& row : setup.rows) {
+    kept_at[row.start_s] = memory;
+    const SolvedPose at = setup.expected(row);
     memory = kept * memory + (1 - kept) * (at.orientation.toRotationMatrix().transpose() * dipoleField(at.position_m));
   }
-  std::vector<std::pair<double, Matrix3d>> course;
-  for (std::size_t r : by_time) course.emplace_back(setup.rows[r].start_s, before[r]);
   return foreign("off:hysteresis", "receiver core remembers the field before", 1e-4, 0.5,
                  [=](World& world, double size) {
                    world.signal.emplace_back([=](const Row& row, const SolvedPose&, Matrix3d& couplings) {
-                     for (const auto& [time_s, memory_then] : course)
-                       if (time_s == row.start_s) couplings += size * memory_then;
+                     couplings += size * kept_at.at(row.start_s);
                    });
                  });
 }
@@ -330,9 +324,9 @@ const std::vector<Kind>& catalogueKinds() {
                                           {"coil_nonorthogonality", 1, drawNonorthogonality},
                                           {"finite_coil", 0.8, drawFiniteCoil},
                                           {"global_gain", 0.8, drawGlobalGain},
-                                          {"grid_scale", 1, drawGridScale},
-                                          {"jig_layer_offset", 1, drawLayerOffset},
-                                          {"jig_tilt", 1, drawJigTilt},
+                                          {"grid_scale", 1, drawGridScale, Kind::Needs::kRigAxes},
+                                          {"jig_layer_offset", 1, drawLayerOffset, Kind::Needs::kLayers},
+                                          {"jig_tilt", 1, drawJigTilt, Kind::Needs::kRigAxes},
                                           {"gain_drift", 1, drawGainDrift},
                                           {"metal_moved", 1, drawMetalMoved}};
   return kinds;
@@ -349,11 +343,11 @@ const std::vector<Kind>& foreignKinds() {
                                           {"off:opposed_bodies", 1, drawOpposedBodies},
                                           {"off:ferrite_at_transmitter", 1, drawFerriteAtTransmitter},
                                           {"off:hysteresis", 1, drawHysteresis},
-                                          {"off:jig_bending", 1, drawBending},
+                                          {"off:jig_bending", 1, drawBending, Kind::Needs::kRigAxes},
                                           {"off:cable_gain", 1, drawCableGain},
                                           {"off:sensor_swapped", 1, drawSensorSwapped},
-                                          {"off:wrong_units", 1, drawWrongUnits},
-                                          {"off:transposed_axes", 1, drawTransposed},
+                                          {"off:wrong_units", 1, drawWrongUnits, Kind::Needs::kLayers},
+                                          {"off:transposed_axes", 1, drawTransposed, Kind::Needs::kLayers},
                                           {"off:warm_receiver_coil", 1, drawWarmCoil}};
   return kinds;
 }

@@ -46,13 +46,17 @@ bool reach(const Alignment& alignment, Placed& placed, double wished) {
   return false;
 }
 
-const Kind& pick(const std::vector<Kind>& kinds, Random& random) {
+const Kind& pick(const std::vector<Kind>& kinds, const Setup& setup, Random& random) {
   double total = 0;
-  for (const Kind& kind : kinds) total += kind.weight;
+  for (const Kind& kind : kinds) total += kind.fits(setup) ? kind.weight : 0;
   double at = uniform(random, 0, total);
-  for (const Kind& kind : kinds)
-    if ((at -= kind.weight) < 0) return kind;
-  return kinds.back();
+  const Kind* last = nullptr;
+  for (const Kind& kind : kinds) {
+    if (!kind.fits(setup)) continue;
+    last = &kind;
+    if ((at -= kind.weight) < 0) break;
+  }
+  return *last;
 }
 
 /// Draws geometry until the wished strength is believable.
@@ -63,17 +67,6 @@ bool place(const Kind& kind, const Setup& setup, const Alignment& alignment, dou
     if (reach(alignment, placed, wished)) return true;
   }
   return false;
-}
-
-double drawStrength(bool levels, Random& random, json& level) {
-  constexpr double kLevels[] = {0.35, 0.7, 1.4, 2.8};
-  level = nullptr;
-  const bool exact = uniform(random, 0, 1) < 0.7;
-  const double chosen = kLevels[uniformInt(random, 0, 3)];
-  const double free = logUniform(random, 0.2, 3.0);
-  if (!levels || !exact) return free;
-  level = chosen;
-  return chosen;
 }
 
 json describe(const Placed& placed) {
@@ -101,7 +94,7 @@ void drawPair(const Setup& setup, const Alignment& alignment, Random& random, st
   const int count = uniform(random, 0, 1) < 0.8 ? 2 : 3;
   const bool cancelling = uniform(random, 0, 1) < 1.0 / 3;
   for (int attempt = 0; attempt < 200 && static_cast<int>(effects.size()) < count; ++attempt) {
-    const Kind& kind = pick(catalogueKinds(), random);
+    const Kind& kind = pick(catalogueKinds(), setup, random);
     bool clashes = false;
     for (const Placed& other : effects) clashes = clashes || clash(kind.id, other.drawn.id);
     if (clashes) continue;
@@ -197,73 +190,95 @@ void stateInTrackerFrame(Setup& setup) {
   setup.tracker_from_jig.setIdentity();
 }
 
-struct Plan {
-  std::vector<Placed> effects;
-  json level = nullptr;
-};
+/// States the table in the transmitter's frame, known to a tolerance, and the sensor in its own.
+void knowAlignment(Setup& setup, Random& random) {
+  setup.alignment_known = true;
+  setup.lever_m.setZero();
+  setup.mounting = Quaterniond::Identity();
+  stateInTrackerFrame(setup);
+  setup.alignment_m = uniform(random, 0.0005, 0.002);
+  setup.alignment_rad = uniform(random, 0.0005, 0.002);
+}
 
-Plan drawPlan(const SessionWish& wish, const Setup& setup, const Alignment& alignment, Random& random) {
-  for (int attempt = 0; attempt < 50; ++attempt) {
-    Plan plan;
-    const double wished = drawStrength(wish.levels, random, plan.level);
-    Placed placed;
+/// @return the effects of a session; none when no believable geometry has the wished strength on this design
+std::vector<Placed> drawEffects(const SessionWish& wish, const Setup& setup, const Alignment& alignment,
+                                Random& random) {
+  for (int attempt = 0; attempt < 20; ++attempt) {
+    std::vector<Placed> effects;
     if (wish.shelf == "pairs") {
-      plan.level = nullptr;
-      drawPair(setup, alignment, random, plan.effects);
-      if (plan.effects.size() >= 2) return plan;
+      drawPair(setup, alignment, random, effects);
+      if (effects.size() >= 2) return effects;
       continue;
     }
-    const std::vector<Kind>& kinds = wish.shelf == "off"     ? foreignKinds()
-                                     : setup.alignment_known ? alignedKinds()
-                                                             : catalogueKinds();
-    if (!place(pick(kinds, random), setup, alignment, wished, random, placed)) continue;
-    plan.effects.push_back(placed);
-    return plan;
+    const double wished = wish.level ? *wish.level : logUniform(random, 0.2, 3.0);
+    const bool aligned = setup.alignment_known && uniform(random, 0, 1) < 0.5;
+    const std::vector<Kind>& kinds = wish.shelf == "off" ? foreignKinds() : aligned ? alignedKinds() : catalogueKinds();
+    Placed placed;
+    if (place(pick(kinds, setup, random), setup, alignment, wished, random, placed)) return {placed};
   }
-  throw std::runtime_error("no believable geometry reaches the wished strength; another seed is needed");
+  return {};
+}
+
+const std::string& pickSignal(bool samples, Random& random) {
+  // Interference and a filter show in samples alone: without them only what node means and their SDs show is drawn.
+  const int first = samples ? 0 : 2;
+  return signalIds()[static_cast<std::size_t>(uniformInt(random, first, 4))];
+}
+
+/// One session on one design, or nothing when the design does not carry the wished effect.
+std::optional<GeneratedSession> drawSession(const SessionWish& wish, Random& random) {
+  // Nothing of the design and of what is written may depend on the shelf: it would be a label.
+  const bool samples = uniform(random, 0, 1) < 0.25 || wish.samples;
+  const bool knows = uniform(random, 0, 1) < 0.1;
+  Setup setup = drawSetup(random, wish.most_rows);
+  if (knows) knowAlignment(setup, random);
+  json effects = json::array();
+  StreamFault fault;
+  if (wish.shelf == "signals") {
+    json effect;
+    fault = drawFault(pickSignal(samples, random), setup, random, effect);
+    effects.push_back(effect);
+  }
+  const Alignment alignment(setup);
+  std::vector<Placed> placed;
+  if (wish.shelf != "none" && wish.shelf != "signals") {
+    placed = drawEffects(wish, setup, alignment, random);
+    if (placed.empty()) return std::nullopt;
+  }
+  for (const Placed& one : placed) effects.push_back(describe(one));
+  const World world = worldOf(placed);
+  const Eigen::VectorXd gap = alignment.whitened(world);
+  GeneratedSession session = recordSession(setup, world, alignment, fault, samples, random);
+  session.truth = {{"shelf", wish.shelf},
+                   {"effects", effects},
+                   {"rho", placed.empty() ? 0.0 : alignment.rho(gap)},
+                   {"rho_level", wish.level && !placed.empty() ? json(*wish.level) : json(nullptr)},
+                   {"position_only", setup.position_only},
+                   {"order", setup.random_order ? "random" : "serpentine"},
+                   {"orientations", setup.orientations},
+                   {"alignment_known", setup.alignment_known},
+                   {"scattered", setup.scattered},
+                   {"rows", setup.rows.size()},
+                   {"classes", classesOf(setup, alignment, placed, effects)},
+                   {"oracle", {{"fraction", placed.empty() ? json(nullptr) : json(alignment.oracleFraction(gap))}}}};
+  return session;
 }
 
 }  // namespace
 
 GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed) {
   Random random(seed);
-  Setup setup = drawSetup(random);
-  if ((wish.shelf == "single" || wish.shelf == "none") && uniform(random, 0, 1) < 0.07) {
-    setup.alignment_known = true;
-    setup.lever_m.setZero();
-    setup.mounting = Quaterniond::Identity();
-    stateInTrackerFrame(setup);
-    setup.alignment_m = uniform(random, 0.0005, 0.002);
-    setup.alignment_rad = uniform(random, 0.0005, 0.002);
-  }
-  json effects = json::array(), level = nullptr;
-  StreamFault fault;
-  if (wish.shelf == "signals") {
-    json effect;
-    fault = drawFault(signalIds()[static_cast<std::size_t>(uniformInt(random, 0, 4))], setup, random, effect);
-    effects.push_back(effect);
-  }
-  const Alignment alignment(setup);
-  Plan plan;
-  if (wish.shelf != "none" && wish.shelf != "signals") plan = drawPlan(wish, setup, alignment, random);
-  for (const Placed& placed : plan.effects) effects.push_back(describe(placed));
-  const World world = worldOf(plan.effects);
-  const Eigen::VectorXd gap = alignment.whitened(world);
-  const bool has_gap = !plan.effects.empty();
-  GeneratedSession session =
-      recordSession(setup, world, alignment, fault, wish.samples || wish.shelf == "signals", random);
-  session.truth = {{"shelf", wish.shelf},
-                   {"effects", effects},
-                   {"rho", has_gap ? alignment.rho(gap) : 0.0},
-                   {"rho_level", plan.level},
-                   {"position_only", setup.position_only},
-                   {"order", setup.random_order ? "random" : "serpentine"},
-                   {"orientations", setup.orientations},
-                   {"alignment_known", setup.alignment_known},
-                   {"rows", setup.rows.size()},
-                   {"classes", classesOf(setup, alignment, plan.effects, effects)},
-                   {"oracle", {{"fraction", has_gap ? json(alignment.oracleFraction(gap)) : json(nullptr)}}}};
-  return session;
+  for (int design = 0; design < 50; ++design)
+    if (std::optional<GeneratedSession> session = drawSession(wish, random)) return *std::move(session);
+  throw std::runtime_error("no believable geometry reaches the wished strength; another seed is needed");
+}
+
+std::vector<std::string> catalogueIds() {
+  std::vector<std::string> ids = signalIds();
+  for (const std::vector<Kind>* kinds : {&catalogueKinds(), &alignedKinds()})
+    for (const Kind& kind : *kinds) ids.push_back(kind.id);
+  std::sort(ids.begin(), ids.end());
+  return ids;
 }
 
 }  // namespace blind

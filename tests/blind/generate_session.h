@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
+#include "tests/blind/plan_classes.h"
 #include "tests/blind/session.h"
 
 namespace blind {
@@ -16,14 +18,18 @@ struct GeneratedSession {
 };
 
 struct SessionWish {
-  std::string shelf;  ///< none, single, pairs, off, signals
-  bool levels = false;
-  bool samples = false;
+  std::string shelf;            ///< none, single, pairs, off, signals
+  std::optional<double> level;  ///< gap to noise of a single effect; nothing: drawn
+  bool samples = false;         ///< sample tables for all, not for a quarter of the sessions whatever their shelf
+  std::size_t most_rows = 0;    ///< 0: any number
 };
 
 /// Draws one session.
 /// @param seed of this session alone: the same seed gives the same bytes
 GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed);
+
+/// Every effect of the catalogue, in order of name.
+std::vector<std::string> catalogueIds();
 
 /// Faults of the sample stream of one session; zero or one: none.
 struct StreamFault {

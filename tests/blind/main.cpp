@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <exception>
 #include <iostream>
 #include <span>
@@ -12,38 +13,113 @@
 namespace {
 
 constexpr const char* kUsage =
-    "usage: fieldtrue-blind generate --out DIR --seed N --sessions K [--shelf all|none|single|pairs|off|signals]\n"
-    "                                [--samples] [--role dev|test] [--levels] [--threads T]\n"
-    "       fieldtrue-blind answer|score|controls ...\n";
+    R"(fieldtrue-blind checks the diagnosis of fieldtrue-cli on recordings whose effect is withheld. It shares no code
+with the simulator and the diagnosis: it has its own physics, its own pose solver and its own scoring.
+
+  generate   write sessions as node tables without any label, and seal the truth (SHA-256)
+  answer     run `fieldtrue-cli diagnose` on them; each answer is written once
+  score      open the seal and print the scoreboard
+  controls   make negative controls of a sealed set: shuffled, wrong floor, mirrored, reversed in time
+
+A whole round:
+  fieldtrue-blind generate --seed 7 --sessions 40 --levels --out set
+  fieldtrue-blind answer --in set --jobs 2
+  fieldtrue-blind score --in set --markdown score.md
+
+`fieldtrue-blind COMMAND --help` tells the options of one command.
+)";
+
+constexpr const char* kGenerateHelp =
+    R"(Writes sessions as node tables (a quarter with sample tables too), truth.json and the seal.json that holds its SHA-256.
+The same seed and options give the same bytes, whatever --jobs. A quarter of the sessions has no effect; the others have
+one of the catalogue, two or three at once, one that stands in no catalogue, or a fault of the signal.
+
+  --out DIR        folder to write; must not hold a set already
+  --seed N         whole number from 0
+  --sessions K     how many (also --count)
+  --levels         four fifths of the single effects at exactly 0.35, 0.7, 1.4 and 2.8 of gap to noise, the rest between
+  --shelf S        only none, single, pairs, off or signals; default all
+  --samples        sample tables for every session
+  --max-rows R     no session with more rows than R (48 or more)
+  --role R         dev (default) or test, written into the seal
+  --cli PATH       fieldtrue-cli, whose plan-check declares what a design cannot tell apart; default beside this program
+  --jobs J         sessions made side by side (also --threads)
+
+Example: fieldtrue-blind generate --seed 7 --sessions 1200 --levels --role test --jobs 2 --out set
+)";
+
+constexpr const char* kAnswerHelp =
+    R"(Runs `fieldtrue-cli diagnose` on every session of a sealed set, each in a folder of its own that holds nothing but its
+tables. Sessions that are answered already are left as they are, so that a run that was stopped can be started again.
+
+  --in DIR         sealed set
+  --cli PATH       the program to run; default fieldtrue-cli beside this program
+  --jobs J         diagnoses side by side, one thread each; default 1
+  --from A --to B  only sessions A to B, counted from 1: processes and machines can share a set
+  --limit SECONDS  a diagnosis that takes longer is ended and counts as wrong; default 600
+  --again          answer again what is answered already
+
+Example: fieldtrue-blind answer --in set --jobs 2 --limit 120
+)";
+
+constexpr const char* kScoreHelp =
+    R"(Checks truth and answers against their hashes and prints every figure with its 95 % interval (Wilson for shares,
+bootstrap otherwise), its target where there is one, and the confusion matrix. What was not answered counts as wrong.
+
+  --in DIR         answered set
+  --controls DIR   answered negative controls to add
+  --json FILE      the same as JSON
+  --markdown FILE  the same as Markdown
+
+Example: fieldtrue-blind score --in set --controls set_controls --markdown score.md
+)";
+
+constexpr const char* kControlsHelp =
+    R"(Makes negative controls of a sealed set, sealed themselves: places shuffled among the nodes, stated tolerances 20 % too
+large or too small, mirrored readings, time reversed. None of them may be given a cause.
+
+  --in DIR         sealed set
+  --out DIR        folder to write; must not hold a set already
+  --count N        of each kind; default 20
+
+Example: fieldtrue-blind controls --in set --out set_controls --count 40
+)";
 
 struct Command {
   const char* name;
+  const char* help;
   int (*run)(std::span<const std::string>);
 };
 
-constexpr Command kCommands[] = {{"generate", blind::runGenerate},
-                                 {"answer", blind::runAnswer},
-                                 {"score", blind::runScore},
-                                 {"controls", blind::runControls}};
+constexpr Command kCommands[] = {{"generate", kGenerateHelp, blind::runGenerate},
+                                 {"answer", kAnswerHelp, blind::runAnswer},
+                                 {"score", kScoreHelp, blind::runScore},
+                                 {"controls", kControlsHelp, blind::runControls}};
+
+bool isHelp(const std::string& word) { return word == "--help" || word == "-h"; }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.empty()) {
-    std::cerr << kUsage;
-    return 2;
+  if (arguments.empty() || isHelp(arguments.front())) {
+    (arguments.empty() ? std::cerr : std::cout) << kUsage;
+    return arguments.empty() ? 2 : 0;
   }
   for (const Command& command : kCommands) {
     if (arguments.front() != command.name) continue;
+    if (std::any_of(arguments.begin() + 1, arguments.end(), isHelp)) {
+      std::cout << command.help;
+      return 0;
+    }
     try {
       return command.run(std::span(arguments).subspan(1));
     } catch (const std::exception& problem) {
-      std::cerr << "fieldtrue-blind " << command.name << ": " << problem.what() << '\n';
+      std::cerr << command.name << ": " << problem.what() << '\n';
       return 1;
     }
   }
-  const bool asked = arguments.front() == "--help" || arguments.front() == "-h";
-  (asked ? std::cout : std::cerr) << kUsage;
-  return asked ? 0 : 2;
+  std::cerr << "'" << arguments.front()
+            << "' is no command of fieldtrue-blind; it has generate, answer, score and controls (--help tells more)\n";
+  return 2;
 }

@@ -168,7 +168,7 @@ std::map<std::string, std::string> optionsOf(std::span<const std::string> words,
     if (isAmong(flags, word)) {
       options[word] = "";
     } else if (!isAmong(with_value, word)) {
-      throw std::invalid_argument(std::string(command) + ": unknown option '" + word + "'");
+      throw std::invalid_argument(std::string(command) + ": unknown option '" + word + "'; --help lists those it has");
     } else if (at + 1 == words.size()) {
       throw std::invalid_argument(std::string(command) + ": " + word + " needs a value");
     } else {

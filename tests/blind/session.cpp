@@ -116,8 +116,10 @@ double Alignment::oracleFraction(const Eigen::VectorXd& whitened_gap) const {
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(nuisance_(kept, Eigen::all));
     const Eigen::MatrixXd held_rows = nuisance_(held, Eigen::all);
     gap_left += (whitened_gap(held) - held_rows * fit.solve(seen)).squaredNorm();
-    const Eigen::MatrixXd spread = fit.solve(Eigen::MatrixXd::Identity(seen.size(), seen.size()));
-    estimation += (held_rows * spread).squaredNorm();
+    // The pseudo-inverse is P R^-1 Q^T; Q keeps lengths, so that the spread of what is predicted needs R alone.
+    const auto upper = fit.matrixR().topRows(nuisance_.cols()).triangularView<Eigen::Upper>();
+    const Eigen::MatrixXd permuted = (held_rows * fit.colsPermutation()).transpose();
+    estimation += upper.transpose().solve(permuted).squaredNorm();
   }
   return gap_left <= 0 ? 0.0 : std::max(0.0, 1 - std::sqrt(estimation / (gap_left + estimation)));
 }

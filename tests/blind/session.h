@@ -25,6 +25,7 @@ struct Setup {
   Vector3d middle_m = Vector3d::Zero();  ///< of the grid, jig frame
   int orientations = 1;
   bool random_order = true;
+  bool scattered = false;  ///< places anywhere in the box of the grid: no layers, no grid indices
   bool position_only = false;
   bool alignment_known = false;
   bool heavy_tails = false;

@@ -9,14 +9,29 @@ namespace {
 
 constexpr double kNearest_m = 0.5, kFarthest_m = 2.2;
 
-void placeGrid(Setup& setup, Random& random) {
-  for (;;) {
-    const bool large = uniform(random, 0, 1) < 0.12;
-    setup.counts = {5 + (uniform(random, 0, 1) < (large ? 0.7 : 0.15)),
-                    4 + (uniform(random, 0, 1) < (large ? 0.7 : 0.2)),
-                    4 + (uniform(random, 0, 1) < (large ? 0.7 : 0.25))};
-    if (large) setup.counts += Eigen::Vector3i(uniformInt(random, 0, 1), uniformInt(random, 0, 1), 0);
+/// Most grids have about a hundred places, some few, some several hundred, and a few up to five thousand.
+void drawCounts(Setup& setup, double size, Random& random) {
+  const auto extra = [&](double chance) { return uniform(random, 0, 1) < chance ? 1 : 0; };
+  if (size < 0.10) {
+    setup.counts = {4 + extra(0.5), 3 + extra(0.5), 3 + extra(0.3)};
+    setup.counts.x() += setup.counts.prod() < 40 ? 1 : 0;
+    setup.pitch_m = uniform(random, 0.2, 0.45);
+  } else if (size < 0.20) {
+    setup.counts = {uniformInt(random, 6, 9), uniformInt(random, 5, 8), uniformInt(random, 4, 6)};
+    setup.pitch_m = uniform(random, 0.08, 0.3);
+  } else if (size < 0.204) {
+    setup.counts = {uniformInt(random, 10, 17), uniformInt(random, 10, 17), uniformInt(random, 9, 17)};
+    setup.pitch_m = uniform(random, 0.05, 0.1);
+  } else {
+    setup.counts = {5 + extra(0.15), 4 + extra(0.2), 4 + extra(0.25)};
     setup.pitch_m = uniform(random, 0.15, 0.4);
+  }
+}
+
+void placeGrid(Setup& setup, Random& random) {
+  const double size = uniform(random, 0, 1);
+  for (;;) {
+    drawCounts(setup, size, random);
     setup.tracker_from_jig = turned(0.12 * normalVector(random), Quaterniond::Identity()) *
                              Quaterniond(Eigen::AngleAxisd(uniform(random, 0, 2 * kPi), Vector3d::UnitZ()));
     const double turn = uniform(random, 0, 2 * kPi);
@@ -76,12 +91,26 @@ std::vector<Quaterniond> drawOrientations(int count, Random& random) {
   return orientations;
 }
 
-}  // namespace
+/// Places by node number: on the grid, or anywhere in its box.
+std::vector<Vector3d> drawPlaces(const Setup& setup, Random& random) {
+  const Vector3d most = (setup.counts - Eigen::Vector3i::Ones()).cast<double>();
+  std::vector<Vector3d> places_m;
+  for (int k = 0; k < setup.counts.z(); ++k)
+    for (int j = 0; j < setup.counts.y(); ++j)
+      for (int i = 0; i < setup.counts.x(); ++i) {
+        Vector3d at(i, j, k);
+        if (setup.scattered)
+          for (int axis = 0; axis < 3; ++axis) at[axis] = uniform(random, 0, most[axis]);
+        places_m.push_back(setup.middle_m + setup.pitch_m * (at - 0.5 * most));
+      }
+  return places_m;
+}
 
-Setup drawSetup(Random& random) {
+Setup drawAnySetup(Random& random) {
   Setup setup;
   placeGrid(setup, random);
-  setup.random_order = uniform(random, 0, 1) < 0.8;
+  setup.scattered = uniform(random, 0, 1) < 0.1;
+  setup.random_order = uniform(random, 0, 1) < 0.8 || setup.scattered;
   setup.orientations = uniform(random, 0, 1) < 0.6 ? 1 : uniformInt(random, 2, 4);
   setup.position_only = uniform(random, 0, 1) < 0.15;
   setup.heavy_tails = uniform(random, 0, 1) < 0.25;
@@ -89,7 +118,7 @@ Setup drawSetup(Random& random) {
   setup.jig_rad = uniform(random, 0.1, 0.4) * kPi / 180;
   // Transverse SD of one sample at 1 m: 0.745 times the coupling noise.
   setup.coupling_noise = logUniform(random, 0.0004, 0.003) / 0.745;
-  setup.filter = uniform(random, 0.0, 0.75);
+  setup.filter = uniform(random, 0, 1) < 0.2 ? 0.0 : uniform(random, 0.0, 0.75);
   setup.carrier_hz = 8013 + 2003 * uniformInt(random, 0, 3);
   setup.mounting = rotation(random);
   setup.lever_m = uniform(random, 0.0, 0.015) * direction(random);
@@ -97,13 +126,13 @@ Setup drawSetup(Random& random) {
   const auto orientations = drawOrientations(setup.orientations, random);
   double time_s = uniform(random, 5, 30);
   std::map<int, int> visits_of;
+  const auto places_m = drawPlaces(setup, random);
   for (const Visit& visit : drawVisits(setup, random, reseats)) {
     Row row;
     row.i = visit.at.x(), row.j = visit.at.y(), row.k = visit.at.z();
     row.node = row.i + setup.counts.x() * (row.j + setup.counts.y() * row.k);
     row.visit = visits_of[row.node]++;
-    row.place_m = setup.middle_m + setup.pitch_m * (visit.at.cast<double>() -
-                                                    0.5 * (setup.counts - Eigen::Vector3i::Ones()).cast<double>());
+    row.place_m = places_m[static_cast<std::size_t>(row.node)];
     row.attitude = orientations[static_cast<std::size_t>(visit.orientation)];
     time_s += uniform(random, 6, 20);
     row.start_s = time_s;
@@ -113,6 +142,15 @@ Setup drawSetup(Random& random) {
   }
   setup.latest_s = time_s;
   return setup;
+}
+
+}  // namespace
+
+Setup drawSetup(Random& random, std::size_t most_rows) {
+  for (;;) {
+    Setup setup = drawAnySetup(random);
+    if (most_rows == 0 || setup.rows.size() <= most_rows) return setup;
+  }
 }
 
 }  // namespace blind

@@ -114,7 +114,8 @@ std::string nodeHeader(const Setup& setup) {
 
 std::string nodeLine(const Setup& setup, const Row& row, const Recorded& recorded, double effective) {
   std::string line = std::to_string(row.node);
-  for (int value : {row.i, row.j, row.k, 0, row.visit}) line += "," + std::to_string(value);
+  for (int value : {row.i, row.j, row.k}) line += setup.scattered ? "," : "," + std::to_string(value);
+  line += ",0," + std::to_string(row.visit);
   append(line, row.start_s, 4);
   append(line, row.end_s, 4);
   for (int c = 0; c < 3; ++c) append(line, row.place_m[c], 6);

@@ -93,7 +93,7 @@ Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, c
   for (int axis = 0; axis < 3; ++axis)
     scales.push_back(
         rigBend([=](const Row& row) { return Vector3d((row.place_m - middle_m)[axis] * Vector3d::Unit(axis)); }));
-  for (int layer = 0; layer < setup.counts.z(); ++layer)
+  for (int layer = 0; !setup.scattered && layer < setup.counts.z(); ++layer)
     layers.push_back(rigBend([=](const Row& row) { return Vector3d(0, 0, row.k == layer ? 1 : 0); }));
   add("grid_scale", scales);
   add("jig_layer_offset", layers);
@@ -133,7 +133,7 @@ Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, c
   return all;
 }
 
-std::vector<std::vector<std::string>> equivalenceClasses(const Signatures& signatures, const Alignment& alignment) {
+Classes equivalenceClasses(const Signatures& signatures, const Alignment& alignment) {
   std::vector<std::string> ids;
   std::vector<Eigen::MatrixXd> bases;
   for (const auto& [id, columns] : signatures) {
@@ -146,26 +146,12 @@ std::vector<std::vector<std::string>> equivalenceClasses(const Signatures& signa
     while (rank < svd.singularValues().size() && svd.singularValues()[rank] > kVisible * columns.norm()) ++rank;
     if (rank > 0) bases.back() = svd.matrixU().leftCols(rank);
   }
-  std::vector<std::size_t> group(ids.size());
-  for (std::size_t a = 0; a < ids.size(); ++a) group[a] = a;
-  for (std::size_t a = 0; a < ids.size(); ++a)
-    for (std::size_t b = 0; b < a; ++b) {
-      if (bases[a].size() == 0 || bases[b].size() == 0) continue;
-      const double shared = (bases[a].transpose() * bases[b]).squaredNorm();
-      // R2 both ways: the share of each space that lies in the other.
-      if (shared <= kSame * static_cast<double>(std::max(bases[a].cols(), bases[b].cols()))) continue;
-      const std::size_t from = group[a], to = group[b];
-      for (std::size_t& g : group)
-        if (g == from) g = to;
-    }
-  std::vector<std::vector<std::string>> classes;
-  for (std::size_t g = 0; g < ids.size(); ++g) {
-    std::vector<std::string> members;
-    for (std::size_t a = 0; a < ids.size(); ++a)
-      if (group[a] == g) members.push_back(ids[a]);
-    if (!members.empty()) classes.push_back(std::move(members));
-  }
-  return classes;
+  return joinedClasses(ids, [&](std::size_t a, std::size_t b) {
+    if (bases[a].size() == 0 || bases[b].size() == 0) return false;
+    const double shared = (bases[a].transpose() * bases[b]).squaredNorm();
+    // R2 both ways: the share of each space that lies in the other.
+    return shared > kSame * static_cast<double>(std::max(bases[a].cols(), bases[b].cols()));
+  });
 }
 
 }  // namespace blind

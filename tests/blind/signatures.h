@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/blind/plan_classes.h"
 #include "tests/blind/session.h"
 
 namespace blind {
@@ -16,6 +17,6 @@ using Signatures = std::map<std::string, Eigen::MatrixXd>;
 Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, const Vector3d& body_m);
 
 /// Every effect of the catalogue in exactly one class: merged where each explains more than 0.9 of the other.
-std::vector<std::vector<std::string>> equivalenceClasses(const Signatures& signatures, const Alignment& alignment);
+Classes equivalenceClasses(const Signatures& signatures, const Alignment& alignment);
 
 }  // namespace blind
