@@ -10,7 +10,8 @@ namespace blind {
 namespace {
 
 constexpr double kSame = 0.9;
-constexpr double kVisible = 1e-6;
+// Less than this left by the alignment is the curvature of the small changes that signatures are made of.
+constexpr double kVisible = 1e-3;
 
 using Bend = std::function<void(World&)>;
 
