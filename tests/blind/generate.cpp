@@ -37,6 +37,7 @@ struct Options {
   std::size_t sessions = 0;
   std::size_t jobs = 1;
   std::size_t most_rows = 0;
+  std::optional<double> strength;
   std::string shelf = "all";
   std::string role = "dev";
   bool samples = false;
@@ -52,6 +53,14 @@ std::uint64_t wholeNumber(const std::string& option, const std::string& text, st
   return value;
 }
 
+double strengthOf(const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0.1) || value > 5)
+    throw std::invalid_argument("generate: --strength needs a gap to noise from 0.1 to 5, got '" + text + "'");
+  return value;
+}
+
 std::string oneOf(const std::string& option, const std::string& text, std::initializer_list<const char*> known) {
   std::string list;
   for (const char* word : known) {
@@ -62,8 +71,9 @@ std::string oneOf(const std::string& option, const std::string& text, std::initi
 }
 
 Options parse(std::span<const std::string> arguments) {
-  static constexpr std::string_view kWithValue[] = {"--out",  "--seed", "--sessions", "--count",    "--threads",
-                                                    "--jobs", "--role", "--shelf",    "--max-rows", "--cli"};
+  static constexpr std::string_view kWithValue[] = {"--out",      "--seed",     "--sessions", "--count",
+                                                    "--threads",  "--jobs",     "--role",     "--shelf",
+                                                    "--max-rows", "--strength", "--cli"};
   static constexpr std::string_view kFlags[] = {"--samples", "--levels"};
   const auto given = optionsOf(arguments, "generate", kWithValue, kFlags);
   Options options;
@@ -74,11 +84,14 @@ Options parse(std::span<const std::string> arguments) {
     if (name == "--sessions" || name == "--count") options.sessions = wholeNumber(name, text, 1, 99999);
     if (name == "--threads" || name == "--jobs") options.jobs = wholeNumber(name, text, 1, 256);
     if (name == "--max-rows") options.most_rows = wholeNumber(name, text, 48, 100000);
+    if (name == "--strength") options.strength = strengthOf(text);
     if (name == "--role") options.role = oneOf(name, text, {"dev", "test"});
     if (name == "--shelf") options.shelf = oneOf(name, text, {"all", "none", "single", "pairs", "off", "signals"});
   }
   options.samples = given.count("--samples") > 0;
   options.levels = given.count("--levels") > 0;
+  if (options.levels && options.strength)
+    throw std::invalid_argument("generate: --levels and --strength exclude each other");
   if (options.out.empty()) throw std::invalid_argument("generate: --out DIR is needed, the folder to write");
   if (given.count("--seed") == 0) throw std::invalid_argument("generate: --seed N is needed, a whole number from 0");
   if (options.sessions == 0) throw std::invalid_argument("generate: --sessions K is needed, how many to write");
@@ -106,7 +119,8 @@ std::vector<SessionWish> drawWishes(const Options& options, Random& random) {
   for (const std::string& shelf : shelves) {
     SessionWish wish{shelf, std::nullopt, options.samples, options.most_rows};
     const std::size_t turn = seen[shelf]++ % 5;
-    if (options.levels && turn < 4 && (shelf == "single" || shelf == "off")) wish.level = kLevels[turn];
+    if (shelf == "single" || shelf == "off")
+      wish.level = options.levels && turn < 4 ? std::optional(kLevels[turn]) : options.strength;
     wishes.push_back(std::move(wish));
   }
   // An order that tells nothing.

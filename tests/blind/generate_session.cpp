@@ -122,9 +122,20 @@ Vector3d bodyPlace(const Setup& setup, const json& effects) {
          setup.tracker_from_jig * (setup.middle_m + half_m + Vector3d(0.1, 0.4, -0.5 * half_m.z()));
 }
 
+/// As the true plate or loop is turned, else level.
+Vector3d bodyNormal(const Setup& setup, const json& effects) {
+  for (const json& effect : effects)
+    if (effect["parameters"].contains("normal")) {
+      const json& normal = effect["parameters"]["normal"];
+      return {normal[0].get<double>(), normal[1].get<double>(), normal[2].get<double>()};
+    }
+  return setup.tracker_from_jig * Vector3d::UnitZ();
+}
+
 json classesOf(const Setup& setup, const Alignment& alignment, const std::vector<Placed>& effects,
                const json& described) {
-  Signatures signatures = catalogueSignatures(setup, alignment, bodyPlace(setup, described));
+  Signatures signatures =
+      catalogueSignatures(setup, alignment, bodyPlace(setup, described), bodyNormal(setup, described));
   if (effects.size() == 1 && signatures.count(effects[0].drawn.id) != 0)
     signatures[effects[0].drawn.id] = alignment.whitened(worldOf(effects));
   auto classes = equivalenceClasses(signatures, alignment);

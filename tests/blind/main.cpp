@@ -38,6 +38,7 @@ one of the catalogue, two or three at once, one that stands in no catalogue, or 
   --seed N         whole number from 0
   --sessions K     how many (also --count)
   --levels         four fifths of the single effects at exactly 0.35, 0.7, 1.4 and 2.8 of gap to noise, the rest between
+  --strength X     every single effect at X of gap to noise
   --shelf S        only none, single, pairs, off or signals; default all
   --samples        sample tables for every session
   --max-rows R     no session with more rows than R (48 or more)

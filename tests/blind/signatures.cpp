@@ -71,7 +71,8 @@ Bend metalBend(const Scatterer& metal, double share) {
 
 }  // namespace
 
-Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, const Vector3d& body_m) {
+Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, const Vector3d& body_m,
+                               const Vector3d& normal) {
   Signatures all;
   const auto add = [&](const char* id, const std::vector<Bend>& bends) { all[id] = columnsOf(alignment, bends); };
   const Vector3d down = setup.tracker_from_jig * Vector3d(0, 0, -1);
@@ -82,9 +83,10 @@ Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, c
   add("compact_metal", tensorBends(body_m));
   add("metal_plane",
       {metalBend(MeshedSheet(12, 12, 0.5, 1e-4, setup.carrier_hz).solve((lowest + 0.9) * down, flat), 0.02)});
-  add("finite_plate", {metalBend(MeshedSheet(6, 6, 0.1, 1e-4, setup.carrier_hz).solve(body_m, flat), 0.02)});
+  const Quaterniond turned_plate = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal);
+  add("finite_plate", {metalBend(MeshedSheet(6, 6, 0.1, 1e-4, setup.carrier_hz).solve(body_m, turned_plate), 0.02)});
   add("closed_loop",
-      {metalBend(solveClosedLoop(roundLoop(body_m, down, 0.25, 24), 0.01, 1.5e-6, setup.carrier_hz), 0.02)});
+      {metalBend(solveClosedLoop(roundLoop(body_m, normal, 0.25, 24), 0.01, 1.5e-6, setup.carrier_hz), 0.02)});
   add("coil_gain", coilBends(true));
   add("coil_nonorthogonality", coilBends(false));
   add("finite_coil",

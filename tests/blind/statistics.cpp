@@ -49,7 +49,8 @@ Interval wilson(std::size_t hits, std::size_t count) {
   const double z2 = kNormal975 * kNormal975;
   const double middle = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
   const double half = kNormal975 / (1.0 + z2 / n) * std::sqrt(share * (1.0 - share) / n + z2 / (4.0 * n * n));
-  return {share, std::max(0.0, middle - half), std::min(1.0, middle + half), count};
+  // None and all are ends of the scale themselves; the formula meets them only up to rounding.
+  return {share, hits == 0 ? 0.0 : middle - half, hits == count ? 1.0 : middle + half, count};
 }
 
 double quantileOf(std::span<const double> values, double share) {

@@ -1,0 +1,184 @@
+#include <QTemporaryDir>
+#include <QTest>
+#include <filesystem>
+#include <set>
+
+#include "tests/blind/judgement.h"
+#include "tests/blind/sealed_folder.h"
+#include "tests/blind/sha256.h"
+#include "tests/blind/subprocess.h"
+
+using namespace blind;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string programFrom(const char* name) { return qEnvironmentVariable(name).toStdString(); }
+
+/// One set as a user makes it: generated, answered by the built fieldtrue-cli and scored by the built program.
+struct Round {
+  fs::path path;
+  Finished generated, answered, scored;
+
+  Round(const fs::path& folder, std::vector<std::string> words) : path(folder) {
+    const std::string blind = programFrom("FIELDTRUE_BLIND"), cli = programFrom("FIELDTRUE_CLI");
+    std::vector<std::string> all = {blind, "generate", "--out", path.string(), "--cli", cli, "--max-rows", "80"};
+    all.insert(all.end(), words.begin(), words.end());
+    generated = runProgram(all);
+    answered = runProgram({blind, "answer", "--in", path.string(), "--cli", cli, "--jobs", "2", "--limit", "60"});
+    scored = runProgram({blind, "score", "--in", path.string(), "--json", (path / "score.json").string()});
+  }
+  std::vector<Session> sessions() const { return sessionsOf(openSealed(path), path); }
+};
+
+/// What a report lacks of the contract; empty when it is whole.
+std::string faultOf(const json& report) {
+  if (report.value("schema", "") != "fieldtrue.gap/1") return "schema";
+  for (const char* key : {"software", "input", "alignment", "verdict", "text", "smallest_detectable", "gap", "where",
+                          "findings", "candidates", "selected", "remaining", "isolability", "next_measurement"})
+    if (!report.contains(key)) return std::string("no ") + key;
+  for (const char* key : {"position_rms_mm", "floor_position_mm", "ratio_to_floor", "p_value"})
+    if (!report["gap"].contains(key)) return std::string("no gap.") + key;
+  double probability = 0;
+  std::set<std::string> named;
+  for (const json& candidate : report["candidates"]) {
+    const std::string id = candidate.value("effect", "");
+    if (!named.insert(id).second) return "candidate twice: " + id;
+    for (const char* key : {"class", "probability", "bic_gain", "parameters", "location_m", "material", "shrinkage"})
+      if (!candidate.contains(key)) return id + " has no " + key;
+    const double share = candidate["probability"].get<double>();
+    if (!(share >= 0 && share <= 1)) return "probability of " + id;
+    probability += share;
+    for (const auto& [name, parameter] : candidate["parameters"].items()) {
+      if (!parameter.contains("low90") || !parameter.contains("high90")) return id + "." + name + " has no interval";
+      if (parameter["low90"].is_number() && parameter["high90"].is_number() &&
+          parameter["low90"].get<double>() > parameter["high90"].get<double>())
+        return "interval of " + id + "." + name;
+    }
+  }
+  if (named.count("none") == 0) return "none is no candidate";
+  if (std::abs(probability - 1) > 1e-6) return "probabilities sum to " + std::to_string(probability);
+  const bool is_explained = report["verdict"] == "explained" || report["verdict"] == "partly_explained";
+  if (is_explained && report["selected"].empty()) return "explained by nothing";
+  return "";
+}
+
+}  // namespace
+
+/// Slow for a test, quick for what it runs: about half a minute on two cores.
+class BlindSmallSetTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void initTestCase();
+  void theSealMatches();
+  void everySessionIsAnswered();
+  void everyAnswerIsAValidReport();
+  void theScoreboardIsPrinted();
+  void strongEffectsAreNamed();
+  void tamperedTruthIsFound();
+  void helpTellsEveryCommand_data();
+  void helpTellsEveryCommand();
+
+ private:
+  QTemporaryDir holder_;
+  std::unique_ptr<Round> mixed_;
+  std::unique_ptr<Round> strong_;
+};
+
+void BlindSmallSetTest::initTestCase() {
+  for (const char* name : {"FIELDTRUE_BLIND", "FIELDTRUE_CLI"})
+    if (!fs::exists(programFrom(name))) QSKIP("run by ctest, which names the two programs in FIELDTRUE_BLIND and _CLI");
+  const fs::path folder = holder_.path().toStdString();
+  mixed_ = std::make_unique<Round>(folder / "mixed", std::vector<std::string>{"--seed", "21", "--sessions", "16"});
+  strong_ = std::make_unique<Round>(
+      folder / "strong",
+      std::vector<std::string>{"--seed", "22", "--sessions", "8", "--shelf", "single", "--strength", "2.8"});
+}
+
+void BlindSmallSetTest::theSealMatches() {
+  for (const Round* round : {mixed_.get(), strong_.get()}) {
+    QCOMPARE(round->generated.exit_status, 0);
+    const std::string hash = sha256Hex(textOf(round->path / "truth.json"));
+    QCOMPARE(documentOf(round->path / "seal.json")["truth_sha256"].get<std::string>(), hash);
+    // Published before anything is answered.
+    QVERIFY(round->generated.output.find(hash) != std::string::npos);
+    QCOMPARE(openSealed(round->path)["classes_from"].get<std::string>(), std::string("plan-check"));
+  }
+}
+
+void BlindSmallSetTest::everySessionIsAnswered() {
+  for (const Round* round : {mixed_.get(), strong_.get()}) {
+    QCOMPARE(round->answered.exit_status, 0);
+    for (const Session& session : round->sessions())
+      QVERIFY2(session.answer.is_answered, (session.file + ": " + session.answer.trouble).c_str());
+    for (const json& record : documentOf(round->path / "answers.json")["sessions"])
+      QVERIFY2(record["exit_status"] == 0, record.dump().c_str());
+  }
+}
+
+void BlindSmallSetTest::everyAnswerIsAValidReport() {
+  for (const Round* round : {mixed_.get(), strong_.get()})
+    for (const Session& session : round->sessions()) {
+      const std::string fault = faultOf(documentOf(round->path / (session.file + ".gap.json")));
+      QVERIFY2(fault.empty(), (session.file + ": " + fault).c_str());
+    }
+}
+
+void BlindSmallSetTest::theScoreboardIsPrinted() {
+  QCOMPARE(mixed_->scored.exit_status, 0);
+  for (const char* title : {"16 sessions, 0 without an answer", "Top-1", "Detection", "Outside the catalogue",
+                            "Shrinkage", "Probability", "Sets of effects", "Time", "Confusion"})
+    QVERIFY2(mixed_->scored.output.find(title) != std::string::npos, title);
+  const json board = documentOf(mixed_->path / "score.json");
+  QVERIFY(!board["figures"].empty());
+  for (const json& figure : board["figures"]) {
+    QVERIFY2(figure["low95"].is_number() && figure["high95"].is_number(), figure.dump().c_str());
+    QVERIFY2(figure["low95"] <= figure["value"] && figure["value"] <= figure["high95"], figure.dump().c_str());
+  }
+}
+
+void BlindSmallSetTest::strongEffectsAreNamed() {
+  int named = 0;
+  for (const Session& session : strong_->sessions()) {
+    const bool is_right = isRight(session, firstNamed(session));
+    if (!is_right)
+      qInfo("%s: %s, named %s", session.file.c_str(), session.effects[0].id.c_str(), firstNamed(session).c_str());
+    named += is_right ? 1 : 0;
+  }
+  // Guessing among a dozen effects names fewer than one of eight.
+  QVERIFY2(named >= 6, std::to_string(named).c_str());
+}
+
+void BlindSmallSetTest::tamperedTruthIsFound() {
+  const fs::path folder = fs::path(holder_.path().toStdString()) / "tampered";
+  fs::copy(mixed_->path, folder, fs::copy_options::recursive);
+  std::string truth = textOf(folder / "truth.json");
+  const std::size_t at = truth.find("\"shelf\": \"none\"");
+  QVERIFY(at != std::string::npos);
+  truth.replace(at, 15, "\"shelf\": \"off!\"");
+  replaceFile(folder / "truth.json", truth);
+  const std::string blind = programFrom("FIELDTRUE_BLIND");
+  QCOMPARE(runProgram({blind, "score", "--in", folder.string()}).exit_status, 1);
+  QCOMPARE(runProgram({blind, "answer", "--in", folder.string(), "--again", "--cli", "/bin/true"}).exit_status, 1);
+  QCOMPARE(runProgram({blind, "score", "--in", mixed_->path.string()}).exit_status, 0);
+}
+
+void BlindSmallSetTest::helpTellsEveryCommand_data() {
+  QTest::addColumn<QString>("command");
+  for (const char* command : {"generate", "answer", "score", "controls"}) QTest::newRow(command) << command;
+}
+
+void BlindSmallSetTest::helpTellsEveryCommand() {
+  QFETCH(QString, command);
+  const std::string blind = programFrom("FIELDTRUE_BLIND"), name = command.toStdString();
+  QVERIFY(runProgram({blind, "--help"}).output.find("\n  " + name + " ") != std::string::npos);
+  const Finished help = runProgram({blind, name, "--help"});
+  QCOMPARE(help.exit_status, 0);
+  QVERIFY(help.output.find("Example: fieldtrue-blind " + name) != std::string::npos);
+  QCOMPARE(runProgram({blind, name, "--loud"}).exit_status, 2);
+  QCOMPARE(runProgram({blind, "sing"}).exit_status, 2);
+}
+
+QTEST_GUILESS_MAIN(BlindSmallSetTest)
+#include "blind_small_set_test.moc"
