@@ -128,6 +128,15 @@ void RecordingTest::fillsTheMetadata() {
   QCOMPARE(known.alignment_tolerance_m.value(), 0.003);
   QVERIFY(!known.alignment_tolerance_rad.has_value());
 
+  scene.rig = {"wooden stand", 0.001, 0.003, false, 0.0, 0.0};
+  std::ostringstream text;
+  writeNodeTable(text, simulate(scene, lineOfPlaces(1, 1, 1.0, 0.1), {})->table);
+  std::istringstream in(text.str());
+  const auto stated = readNodeTable(in, "simulated");
+  FT_VERIFY_OK(stated);
+  QCOMPARE(stated->table.metadata.jig_tolerance_m.value(), 0.001);
+  QCOMPARE(stated->table.metadata.jig_tolerance_rad.value(), 0.003);
+
   Scene pulsed;
   pulsed.tracker.excitation = "pulsed_dc";
   const Simulation plain = simulate(pulsed, lineOfPlaces(1, 1, 1.0, 0.1), {}).value();
