@@ -27,6 +27,7 @@
 #include "calib/correctors/none.h"
 #include "calib/correctors/orientation_none.h"
 #include "calib/correctors/orientation_rigid.h"
+#include "calib/correctors/physics_residual.h"
 #include "calib/correctors/polynomial.h"
 #include "calib/correctors/polynomial_euler.h"
 #include "calib/correctors/polynomial_quaternion.h"
@@ -71,6 +72,7 @@ std::span<const PositionMethod> positionMethods() {
                                                       gaussianProcessPosition(),
                                                       bsplinePosition(),
                                                       harmonicFieldPosition(),
+                                                      physicsResidualPosition(),
                                                       automaticPosition()};
   return methods;
 }

@@ -71,6 +71,7 @@ const std::map<std::string, Recovery> kPositionRecoveries = {
     {"gaussian_process", {affine_m}},
     {"bspline", {affine_m}},
     {"harmonic_field", {rigid_m}},
+    {"physics_residual", {rigid_m}},
     {"auto", {cubic_m}},
 };
 
