@@ -55,30 +55,28 @@ struct Session {
   double share(double time_s) const { return (time_s - start_s) / length_s; }
 };
 
-const FitParameter kGain{"gain", "", -kPlausibleGain, kPlausibleGain};
-
-/// A polynomial of the share of the session that has passed; its coefficients are gains.
+/// A polynomial of the share of the session that has passed, without a constant: a gain that was wrong from the start
+/// on is another effect.
 std::unique_ptr<EffectFit> polynomialWay(const std::string& name, const Session& session, bool is_curved) {
-  std::vector<FitParameter> linear{kGain, {"drift_over_session", "", -kPlausibleDrift, kPlausibleDrift}};
+  std::vector<FitParameter> linear{{"drift_over_session", "", -kPlausibleDrift, kPlausibleDrift}};
   if (is_curved) linear.push_back({"curvature_over_session", "", -2.0 * kPlausibleDrift, 2.0 * kPlausibleDrift});
   const auto respond = [session](const SensorSetting& setting, std::span<EffectResponse> responses) {
-    double power = 1.0;
+    double power = session.share(setting.time_s);
     for (EffectResponse& response : responses) {
       response.field_per_m3 = power * dipoleField(setting.tracker_from_sensor.position_m, 1.0);
       power *= session.share(setting.time_s);
     }
   };
-  return linearFit({name, std::move(linear), respond, [session, is_curved](const Eigen::VectorXd& g) {
-                      nlohmann::json parameters{{"gain", g[0]},
-                                                {"amplitude", 0.0},
-                                                {"start_s", session.start_s},
-                                                {"slope_per_s", g[1] / session.length_s}};
-                      if (is_curved) parameters["curvature_per_s2"] = g[2] / (session.length_s * session.length_s);
-                      return parameters;
-                    }});
+  return linearFit(
+      {name, std::move(linear), respond, [session, is_curved](const Eigen::VectorXd& g) {
+         nlohmann::json parameters{
+             {"gain", 0.0}, {"amplitude", 0.0}, {"start_s", session.start_s}, {"slope_per_s", g[0] / session.length_s}};
+         if (is_curved) parameters["curvature_per_s2"] = g[1] / (session.length_s * session.length_s);
+         return parameters;
+       }});
 }
 
-/// A constant and an exponential of searched time constant.
+/// Warming up from the start of the session on, with a searched time constant.
 class ExponentialFit final : public EffectFit {
  public:
   explicit ExponentialFit(const Session& session) : session_(session) {}
@@ -87,9 +85,7 @@ class ExponentialFit final : public EffectFit {
   std::vector<FitParameter> searched() const override {
     return {{"time_constant_s", "s", kShortest * session_.length_s, kLongest * session_.length_s}};
   }
-  std::vector<FitParameter> linear() const override {
-    return {kGain, {"amplitude", "", -kPlausibleDrift, kPlausibleDrift}};
-  }
+  std::vector<FitParameter> linear() const override { return {{"amplitude", "", -kPlausibleDrift, kPlausibleDrift}}; }
   std::vector<Eigen::VectorXd> starts() const override {
     std::vector<Eigen::VectorXd> starts;
     for (int i = 0; i < kStarts; ++i) {
@@ -104,18 +100,17 @@ class ExponentialFit final : public EffectFit {
   }
   void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
                std::span<EffectResponse> responses) const override {
-    FT_CHECK(responses.size() == 2 * at.size());
+    FT_CHECK(responses.size() == at.size());
     for (std::size_t i = 0; i < at.size(); ++i) {
-      const Eigen::Matrix3d G = dipoleField(at[i].tracker_from_sensor.position_m, 1.0);
-      responses[2 * i] = responses[2 * i + 1] = EffectResponse{};
-      responses[2 * i].field_per_m3 = G;
-      responses[2 * i + 1].field_per_m3 = std::exp(-(at[i].time_s - session_.start_s) / searched[0]) * G;
+      const double warmed = std::expm1(-(at[i].time_s - session_.start_s) / searched[0]);
+      responses[i] = EffectResponse{};
+      responses[i].field_per_m3 = warmed * dipoleField(at[i].tracker_from_sensor.position_m, 1.0);
     }
   }
   FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {
     FittedEffect fitted = described(this->linear(), linear,
-                                    {{"gain", linear[0]},
-                                     {"amplitude", linear[1]},
+                                    {{"gain", -linear[0]},
+                                     {"amplitude", linear[0]},
                                      {"start_s", session_.start_s},
                                      {"time_constant_s", searched[0]}});
     fitted.values.push_back({"time_constant_s", "s", searched[0]});

@@ -10,6 +10,7 @@
 #include "calib/gap/gap_isolability.h"
 #include "calib/gap/gap_next.h"
 #include "calib/gap/gap_search.h"
+#include "calib/gap/gap_traces.h"
 #include "calib/gap/gap_where.h"
 #include "calib/gap/sample_findings.h"
 
@@ -47,28 +48,40 @@ struct Evidence {
   bool has_effect = false;      ///< One of the catalogue was selected.
   bool has_structure = false;   ///< Before any effect.
   bool is_above_floor = false;  ///< Clearly larger than a stated floor, structured or not.
-  bool left_is_sure = false;    ///< What the effects leave is beyond chance.
-  double fraction = 1.0;        ///< Left over before, amplitude, where sure; else 0.
+  double fraction = 1.0;        ///< What is surely left over what there was before, amplitude.
 };
 
-Evidence weigh(const GapSearch& search, const Selection& selection, const HeldOutGap& held_out, const Structure& left,
-               const GapRows& stated, const GapReport& report) {
+/// What a selection leaves: all that smooth physics could make, and single traces of what no catalogue holds.
+struct LeftOver {
+  Structure structure;
+  std::vector<Trace> traces;
+};
+
+LeftOver leftBy(const GapSearch& search, const GapModel& model, const GapRows& rows) {
+  const Linearized at(search.physics(), model, search.whitening(), search.spaceBlocks());
+  return {findStructure(at, rows, false), findTraces(at, rows)};
+}
+
+constexpr double kSureTrace = 1e-5;
+
+Evidence weigh(const GapSearch& search, const Selection& selection, const HeldOutGap& held_out, const LeftOver& left,
+               const GapRows& stated) {
   constexpr double kSure = 1e-4;
   constexpr double kSureOfNothingNamed = 1e-6;  // F tests of many columns are a little too sure.
   constexpr double kClearlyAbove = 1.6;         // A floor stated 20 % too low is no gap, nor is one stated by guess.
+  const bool has_trace = left.traces.front().p_value < kSureTrace;
   Evidence evidence;
   evidence.has_effect = !selection.ways.empty();
-  evidence.has_structure = search.structureOfNone().p_value < kSureOfNothingNamed;
+  evidence.has_structure = search.structureOfNone().p_value < kSureOfNothingNamed || has_trace;
   const double placed_mm = stated.placing_sd_m ? 1e3 * *stated.placing_sd_m : 0.0;
   evidence.is_above_floor = placed_mm > 0.0 && 1e3 * search.placingSd_m() > kClearlyAbove * placed_mm;
-  evidence.left_is_sure = left.p_value < kSure;
-  const double sure_left = std::max(0.0, held_out.left - 1.645 * held_out.left_sd);
-  const double before = std::max(held_out.before, 1e-12);
-  if (evidence.left_is_sure)
-    evidence.fraction = std::sqrt(std::min(1.0, sure_left / before));
-  else
-    evidence.fraction = evidence.has_effect ? 0.0 : 1.0;
-  (void)report;
+  if (!evidence.has_effect) return evidence;
+  const GapRows& rows = search.physics().rows();
+  const double count = static_cast<double>(rows.rows.size()) * rows.channels();
+  double sure_left = 0.0;
+  if (left.structure.p_value < kSure) sure_left = std::max(0.0, held_out.left - 1.645 * held_out.left_sd);
+  if (has_trace) sure_left = std::max(sure_left, left.traces.front().explained / count);
+  evidence.fraction = std::sqrt(std::min(1.0, sure_left / std::max(held_out.before, 1e-12)));
   return evidence;
 }
 
@@ -148,6 +161,12 @@ void addRemaining(const HeldOutGap& held_out, const GapReport& before, GapReport
   }
 }
 
+void addTraces(const std::vector<Trace>& traces, GapReport& report) {
+  for (const Trace& trace : traces)
+    if (trace.p_value < kSureTrace)
+      report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
+}
+
 /// Effects that single readings show stand beside those that the poses show.
 void selectSignalFindings(GapReport& report) {
   for (const GapFinding& finding : report.findings) {
@@ -200,9 +219,8 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   const Selection selection = selectEffects(search, selecting, partOf(control, 0.1, 0.7));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.7);
-  const Structure left = findStructure(
-      Linearized(search.physics(), selection.model.model, search.whitening(), search.spaceBlocks()), *rows, false);
-  const HeldOutGap held_out = holdOut(search, selection, left, partOf(control, 0.7, 0.9));
+  const LeftOver left = leftBy(search, selection.model.model, *rows);
+  const HeldOutGap held_out = holdOut(search, selection, left.structure, partOf(control, 0.7, 0.9));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.9);
 
@@ -213,7 +231,8 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   report.origin = search.structureOfNone().origin;
   report.candidates = describeCandidates(search, selection, held_out, report.floor_position_mm);
   report.selected = describeSelected(search, selection, held_out, report.candidates, report.floor_position_mm);
-  report.verdict = verdictOf(weigh(search, selection, held_out, left, *rows, report));
+  report.verdict = verdictOf(weigh(search, selection, held_out, left, *rows));
+  addTraces(left.traces, report);
   addSequence(held_out, report.floor_position_mm, report);
   addRemaining(held_out, report, report);
   report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);

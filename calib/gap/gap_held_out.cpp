@@ -31,7 +31,7 @@ class FoldFitter {
       const auto held_out = static_cast<std::size_t>(block);
       RunControl quiet;
       quiet.stop = control.stop;
-      const ScanResult scanned = scan(at, *way.fit, 1, quiet);
+      const ScanResult scanned = scan(at, *way.fit, way.fit->starts(), 1, quiet);
       if (scanned.without_block.size() <= held_out) return;
       const LocalFit local = refineLocally(at, *way.fit, scanned.without_block[held_out].searched, held_out);
       model.terms.push_back({way.effect, way.fit, local.searched, local.linear});

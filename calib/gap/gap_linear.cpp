@@ -175,7 +175,8 @@ void Linearized::addAlignment(const GapRows& rows, const GapAlignment& alignment
   if (n_prior_ == 0) return;
   const Vector6d deviation = alignmentDeviation(alignment, rows, center_m);
   for (Eigen::Index k = 0; k < 6; ++k) {
-    const double tolerance = std::max(kLeastTolerance, k < 3 ? rows.alignment_tolerance_m : rows.alignment_tolerance_rad);
+    const double tolerance =
+        std::max(kLeastTolerance, k < 3 ? rows.alignment_tolerance_m : rows.alignment_tolerance_rad);
     nuisance_(residual_.size() - 6 + k, k) = 1.0 / tolerance;
     residual_[residual_.size() - 6 + k] = -deviation[k] / tolerance;
   }

@@ -130,8 +130,8 @@ class Scanner {
 
 }  // namespace
 
-ScanResult scan(const Linearized& at, const EffectFit& fit, std::size_t kept, const RunControl& control) {
-  std::vector<Eigen::VectorXd> starts = fit.starts();
+ScanResult scan(const Linearized& at, const EffectFit& fit, std::vector<Eigen::VectorXd> starts, std::size_t kept,
+                const RunControl& control) {
   std::erase_if(starts, [&](const Eigen::VectorXd& start) { return !fit.allows(start); });
   const Scanner scanner(at);
   const LinearPrior prior = priorOf(fit);

@@ -19,8 +19,9 @@ struct ScanResult {
   std::vector<double> held_out_gain;  ///< Fall of the held-out sum of squares of each block, at that start.
 };
 
-/// Tries every start of a fit, its linear parameters and those of `at` refitted, on all rows and with each block held
-/// out: the cross products of each block are summed once, so a hold-out costs no pass over the rows.
-ScanResult scan(const Linearized& at, const EffectFit& fit, std::size_t kept, const RunControl& control);
+/// Tries starts of a fit, its linear parameters and those of `at` refitted, on all rows and with each block held out:
+/// the cross products of each block are summed once, so a hold-out costs no pass over the rows.
+ScanResult scan(const Linearized& at, const EffectFit& fit, std::vector<Eigen::VectorXd> starts, std::size_t kept,
+                const RunControl& control);
 
 }  // namespace fieldtrue

@@ -13,6 +13,9 @@ namespace {
 constexpr double kGuessedPlacing_m = 1e-3;
 constexpr double kGuessedPlacing_rad = 3e-3;
 constexpr double kImplausibleCost = 12.0;  // In BIC units.
+/// A body that is there for part of the time only is also freer to fit what a standing one leaves over; it has to win
+/// by this share of what it explains.
+constexpr double kShareForMoved = 0.06;
 
 bool isOfTime(const std::string& effect) { return effect == "gain_drift" || effect == "metal_moved"; }
 
@@ -118,30 +121,117 @@ std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& 
   const Linearized& at = chosen.needs_time ? in_time : in_space;
   TriedEffect tried;
   tried.way = way;
-  tried.scan = scan(at, *chosen.fit, kStarts, control);
+  tried.bic_gain = -std::numeric_limits<double>::infinity();
+  tried.scan = scan(at, *chosen.fit, chosen.fit->starts(), kStarts, control);
   if (tried.scan.best.empty()) return std::nullopt;
-  std::optional<LocalFit> best;
-  for (const ScanResult::Start& start : tried.scan.best) {
-    LocalFit local = refineLocally(at, *chosen.fit, start.searched);
-    if (!best || local.gain > best->gain) best = std::move(local);
-  }
-  tried.model = base.model;
-  tried.model.terms.push_back({chosen.effect, chosen.fit, best->searched, best->linear});
-  const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
-  const double sum = at.residual().squaredNorm();
-  const double left = std::max(1e-9 * sum, sum - best->gain);
-  tried.bic_gain = count * std::log(sum / left) - parametersOf(tried.model.terms.back()) * std::log(count);
+  refineFrom(tried.scan.best, at, base, tried);
   tried.held_out_gain = std::accumulate(tried.scan.held_out_gain.begin(), tried.scan.held_out_gain.end(), 0.0);
   return tried;
 }
 
-void GapSearch::finish(TriedEffect& tried, const RefinedModel& base, double base_bic) const {
+void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const RefinedModel& base,
+                           TriedEffect& tried) const {
+  const EffectWay& chosen = ways_[tried.way];
+  std::optional<LocalFit> best;
+  for (const ScanResult::Start& start : starts) {
+    LocalFit local = refineLocally(at, *chosen.fit, start.searched);
+    if (!best || local.gain > best->gain) best = std::move(local);
+  }
+  if (!best) return;
+  GapTerm term{chosen.effect, chosen.fit, best->searched, best->linear};
+  const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
+  const double sum = at.residual().squaredNorm();
+  const double left = std::max(1e-9 * sum, sum - best->gain);
+  const double gain = count * std::log(sum / left) - parametersOf(term) * std::log(count);
+  if (gain <= tried.bic_gain) return;
+  tried.bic_gain = gain;
+  tried.model = base.model;
+  tried.model.terms.push_back(std::move(term));
+}
+
+namespace {
+
+bool hasCenter(const EffectFit& fit) {
+  const std::vector<FitParameter> searched = fit.searched();
+  return searched.size() >= 3 && searched.front().name == "center_x_m";
+}
+
+/// The starts of a fit moved to the given centres, one for each of its other coarse values.
+std::vector<Eigen::VectorXd> startsAt(const EffectFit& fit, std::span<const Eigen::Vector3d> centers_m) {
+  std::vector<Eigen::VectorXd> others;
+  for (const Eigen::VectorXd& start : fit.starts()) {
+    const Eigen::VectorXd other = start.tail(start.size() - 3);
+    const bool is_new =
+        std::none_of(others.begin(), others.end(), [&](const Eigen::VectorXd& o) { return o.isApprox(other, 1e-9); });
+    if (is_new) others.push_back(other);
+    if (other.size() == 0) break;
+  }
+  std::vector<Eigen::VectorXd> starts;
+  for (const Eigen::Vector3d& center_m : centers_m) {
+    for (const Eigen::VectorXd& other : others) {
+      Eigen::VectorXd start(3 + other.size());
+      start << center_m, other;
+      starts.push_back(std::move(start));
+    }
+  }
+  return starts;
+}
+
+}  // namespace
+
+void GapSearch::shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                             const RefinedModel& base, const RunControl& control) const {
+  constexpr std::size_t kCenters = 4;
+  constexpr std::size_t kStarts = 2;
+  constexpr double kApart_m = 0.1;
+  std::vector<Eigen::Vector3d> centers_m;
+  for (const TriedEffect& one : tried) {
+    if (centers_m.size() >= kCenters) break;
+    const GapTerm& term = one.model.terms.back();
+    if (!hasCenter(*term.fit)) continue;
+    const Eigen::Vector3d center_m = term.searched.head<3>();
+    const auto is_near = [&](const Eigen::Vector3d& other_m) { return (other_m - center_m).norm() < kApart_m; };
+    if (std::none_of(centers_m.begin(), centers_m.end(), is_near)) centers_m.push_back(center_m);
+  }
+  for (TriedEffect& one : tried) {
+    const EffectWay& way = ways_[one.way];
+    if (!hasCenter(*way.fit) || control.stop.stop_requested()) continue;
+    const Linearized& at = way.needs_time ? in_time : in_space;
+    const ScanResult again = scan(at, *way.fit, startsAt(*way.fit, centers_m), kStarts, control);
+    refineFrom(again.best, at, base, one);
+    const double held_out = std::accumulate(again.held_out_gain.begin(), again.held_out_gain.end(), 0.0);
+    one.held_out_gain = std::max(one.held_out_gain, held_out);
+  }
+}
+
+void GapSearch::finish(TriedEffect& tried, double base_bic) const {
   tried.refined = refined(tried.model);
   tried.model = tried.refined.model;
   const GapTerm& term = tried.model.terms.back();
   tried.fitted = term.fit->describe(term.searched, term.linear);
   tried.bic_gain = base_bic - bicOf(tried.model) - (tried.fitted.is_plausible ? 0.0 : kImplausibleCost);
-  (void)base;
+  if (term.effect->id == "metal_moved") tried.bic_gain -= kShareForMoved * std::max(0.0, tried.bic_gain);
+}
+
+/// The linearised gain of a strong effect can be a fifth off, and flatters: whatever is near the best of those fitted
+/// exactly is fitted exactly too.
+void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const {
+  constexpr double kNear = 60.0;
+  constexpr double kNearShare = 0.2;
+  const double base_bic = bicOf(base.model);
+  double best = tried.empty() ? 0.0 : tried.front().bic_gain;
+  double margin = std::max(kNear, kNearShare * best);
+  for (;;) {
+    std::vector<std::size_t> due;
+    for (std::size_t i = 0; i < tried.size(); ++i)
+      if (tried[i].refined.model.terms.empty() && tried[i].bic_gain >= best - margin) due.push_back(i);
+    if (due.empty() || control.stop.stop_requested()) return;
+    control.parallel_for(due.size(), [&](std::size_t k) { finish(tried[due[k]], base_bic); });
+    best = 0.0;
+    for (const TriedEffect& one : tried)
+      if (!one.refined.model.terms.empty()) best = std::max(best, one.bic_gain);
+    margin = kNear;
+  }
 }
 
 std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunControl& control) const {
@@ -154,22 +244,14 @@ std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunCont
   }
   const auto better = [](const TriedEffect& a, const TriedEffect& b) { return a.bic_gain > b.bic_gain; };
   std::stable_sort(tried.begin(), tried.end(), better);
-  // The linearised gain of a strong effect can be a fifth off.
-  constexpr double kNear = 60.0;
-  constexpr double kNearShare = 0.35;
-  const double best = tried.empty() ? 0.0 : tried.front().bic_gain;
-  const double base_bic = bicOf(base.model);
-  std::vector<char> is_finished(tried.size(), 0);
-  control.parallel_for(tried.size(), [&](std::size_t i) {
-    if (tried[i].bic_gain < best - std::max(kNear, kNearShare * best)) return;
-    finish(tried[i], base, base_bic);
-    is_finished[i] = 1;
-  });
-  for (std::size_t i = 0; i < tried.size(); ++i) {
-    if (is_finished[i] != 0) continue;
-    const GapTerm& term = tried[i].model.terms.back();
-    tried[i].fitted = term.fit->describe(term.searched, term.linear);
-    if (!tried[i].fitted.is_plausible) tried[i].bic_gain -= kImplausibleCost;
+  shareCenters(tried, in_space, in_time, base, control);
+  std::stable_sort(tried.begin(), tried.end(), better);
+  finishBest(tried, base, control);
+  for (TriedEffect& one : tried) {
+    if (!one.refined.model.terms.empty()) continue;
+    const GapTerm& term = one.model.terms.back();
+    one.fitted = term.fit->describe(term.searched, term.linear);
+    if (!one.fitted.is_plausible) one.bic_gain -= kImplausibleCost;
   }
   std::stable_sort(tried.begin(), tried.end(), better);
   std::vector<TriedEffect> of_each;
@@ -190,26 +272,17 @@ class Selector {
       : search_(search), options_(options), control_(control) {}
 
   Selection run() {
-    Selection selection;
-    selection.model = search_.none();
-    none_bic_ = search_.bicOf(selection.model.model);
-    selection.first = search_.rank(selection.model, control_);
-    selection.alternatives = selection.first;
-    const TriedEffect* next = firstWorth(selection.first, options_.least_gain_first);
-    while (next != nullptr && !control_.stop.stop_requested()) {
-      add(*next, selection);
-      if (selection.ways.size() > 1) {
-        exchange(selection);
-        prune(selection);
-      }
-      if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
-      following_ = search_.rank(selection.model, control_);
-      next = firstWorth(following_, options_.least_gain_more);
+    none_bic_ = search_.bicOf(search_.none().model);
+    const std::vector<TriedEffect> first = search_.rank(search_.none(), control_);
+    const TriedEffect* best = firstWorth(first, options_.least_gain_first);
+    if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);
+    Selection selection = grown(*best);
+    const TriedEffect* other = firstOfOtherKind(first, *best);
+    if (other != nullptr && !control_.stop.stop_requested()) {
+      Selection second = grown(*other);
+      if (second.bic_gain > selection.bic_gain) selection = std::move(second);
     }
-    if (selection.ways.size() > 1) findLeading(selection);
-    if (selection.ways.size() == 1) takeOver(selection);
-    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
-    return selection;
+    return finished(std::move(selection), first);
   }
 
  private:
@@ -220,6 +293,47 @@ class Selector {
       if (one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
     }
     return nullptr;
+  }
+
+  /// Starts with one effect and adds others while they are worth it.
+  Selection grown(const TriedEffect& first) {
+    Selection selection;
+    const TriedEffect* next = &first;
+    std::vector<TriedEffect> following;
+    while (next != nullptr && !control_.stop.stop_requested()) {
+      add(*next, selection);
+      if (selection.ways.size() > 1) {
+        exchange(selection);
+        prune(selection);
+      }
+      if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
+      following = search_.rank(selection.model, control_);
+      next = firstWorth(following, options_.least_gain_more);
+    }
+    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
+    return selection;
+  }
+
+  /// One flexible thing in the room can pass for two errors of the instrument, and the other way round: the best of the
+  /// other kind is worth a start of its own where it explains a good part.
+  const TriedEffect* firstOfOtherKind(const std::vector<TriedEffect>& tried, const TriedEffect& best) const {
+    constexpr double kGoodPart = 0.3;
+    const auto is_in_room = [&](const TriedEffect& one) { return one.fitted.location_m.has_value(); };
+    for (const TriedEffect& one : tried) {
+      if (one.bic_gain < std::max(options_.least_gain_first, kGoodPart * best.bic_gain)) break;
+      if (is_in_room(one) != is_in_room(best) && one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
+    }
+    return nullptr;
+  }
+
+  Selection finished(Selection selection, const std::vector<TriedEffect>& first) {
+    if (selection.ways.empty()) selection.model = search_.none();
+    selection.first = first;
+    selection.alternatives = first;
+    if (selection.ways.size() > 1) findLeading(selection);
+    if (selection.ways.size() == 1) takeOver(selection);
+    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
+    return selection;
   }
 
   static void add(const TriedEffect& tried, Selection& selection) {
@@ -248,20 +362,29 @@ class Selector {
     }
   }
 
-  /// Drops every effect whose removal costs less than it is worth.
+  /// Drops effects whose removal costs less than they are worth, the cheapest first.
   void prune(Selection& selection) {
-    for (std::size_t term = 0; term < selection.ways.size() && selection.ways.size() > 1;) {
-      const RefinedModel rest = without(selection, term);
-      if (search_.bicOf(rest.model) - search_.bicOf(selection.model.model) < options_.least_gain_more) {
-        selection.model = rest;
-        selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
-      } else {
-        ++term;
+    while (selection.ways.size() > 1) {
+      const double bic = search_.bicOf(selection.model.model);
+      double least = options_.least_gain_more;
+      std::optional<std::size_t> cheapest;
+      RefinedModel best_rest;
+      for (std::size_t term = 0; term < selection.ways.size(); ++term) {
+        RefinedModel rest = without(selection, term);
+        const double cost = search_.bicOf(rest.model) - bic;
+        if (cost >= least) continue;
+        least = cost;
+        cheapest = term;
+        best_rest = std::move(rest);
       }
+      if (!cheapest) return;
+      selection.model = std::move(best_rest);
+      selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(*cheapest));
     }
   }
 
-  /// A single effect that exchanging and dropping ended at may be fitted better than when it was first tried.
+  /// A single effect that exchanging and dropping ended at may be fitted better than when it was first tried, or worse
+  /// than another alone.
   void takeOver(Selection& selection) const {
     const double gain = none_bic_ - search_.bicOf(selection.model.model);
     const Effect* effect = search_.ways()[selection.ways.front()].effect;
@@ -272,6 +395,10 @@ class Selector {
       tried.model = selection.model.model;
       tried.bic_gain = gain;
     }
+    const TriedEffect* best = firstWorth(selection.alternatives, gain + 2.0);
+    if (best == nullptr || search_.ways()[best->way].effect == effect) return;
+    selection.ways.clear();
+    add(*best, selection);
   }
 
   /// The effect whose absence costs most leads; the candidates are its alternatives with the others present.
@@ -288,13 +415,18 @@ class Selector {
       }
     }
     selection.alternatives = search_.rank(rest, control_);
+    const double bic = search_.bicOf(selection.model.model);
+    const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
+    if (best == nullptr || search_.bicOf(best->model) > bic - 2.0) return;
+    selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+    add(*best, selection);
+    selection.leading = selection.ways.size() - 1;
   }
 
   const GapSearch& search_;
   const SelectionOptions& options_;
   const RunControl& control_;
   double none_bic_ = 0.0;
-  std::vector<TriedEffect> following_;
 };
 
 }  // namespace

@@ -69,7 +69,14 @@ class GapSearch {
   void settleWays();
   std::optional<TriedEffect> tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
                                     const RefinedModel& base, const RunControl& control) const;
-  void finish(TriedEffect& tried, const RefinedModel& base, double base_bic) const;
+  /// Keeps the best of what local refinement makes of the starts, where it beats what `tried` has.
+  void refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const RefinedModel& base,
+                  TriedEffect& tried) const;
+  /// Where one thing in the room fits well, others may fit too: each is tried at the places of the best.
+  void shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                    const RefinedModel& base, const RunControl& control) const;
+  void finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const;
+  void finish(TriedEffect& tried, double base_bic) const;
 
   const GapRows& rows_;
   GapPhysics physics_;

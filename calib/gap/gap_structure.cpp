@@ -6,9 +6,9 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "calib/field/coupling.h"
+#include "calib/gap/gap_traces.h"
 
 namespace fieldtrue {
 namespace {
@@ -261,33 +261,6 @@ GapOrigin originOf(const Normal& normal, const Basis& basis, Eigen::Index q, dou
   const double sum = share[0] + share[1] + share[2] + share[3];
   if (!(sum > 0.0)) return {};
   return {share[0] / sum, share[1] / sum, share[2] / sum, share[3] / sum};
-}
-
-/// Square roots of robust weights (t, 5 degrees of freedom) of each residual by its row's and kind's distance.
-Eigen::VectorXd robustWeights(const Eigen::VectorXd& left, Eigen::Index n_rows, int channels) {
-  Eigen::VectorXd weight = Eigen::VectorXd::Ones(left.size());
-  for (int part = 0; part < channels / 3; ++part) {
-    std::vector<double> d2;
-    for (Eigen::Index i = 0; i < n_rows; ++i) d2.push_back(left.segment<3>(i * channels + 3 * part).squaredNorm());
-    std::vector<double> sorted = d2;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    const double s2 = std::max(1e-12, sorted[sorted.size() / 2] / 2.366);  // Median of chi-square with three.
-    for (Eigen::Index i = 0; i < n_rows; ++i) {
-      const double ratio = d2[static_cast<std::size_t>(i)] / s2;
-      weight.segment<3>(i * channels + 3 * part).setConstant(std::sqrt(std::min(1.0, 12.0 / std::max(ratio, 1e-9))));
-    }
-  }
-  return weight;
-}
-
-/// Upper tail of F with d1, d2 degrees of freedom. @source Paulson 1942, Ann. Math. Statist. 13 233
-double tailOfF(double f, double d1, double d2) {
-  if (!(f > 0.0) || d1 < 1.0 || d2 < 3.0) return 1.0;
-  const double a = 2.0 / (9.0 * d1);
-  const double b = 2.0 / (9.0 * d2);
-  const double root = std::cbrt(f);
-  const double z = ((1.0 - b) * root - (1.0 - a)) / std::sqrt(b * root * root + a);
-  return 0.5 * std::erfc(z / std::numbers::sqrt2);
 }
 
 void setScales(const Eigen::VectorXd& left, const Linearized& at, double inflate, bool both, Structure& structure) {
