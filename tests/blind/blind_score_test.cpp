@@ -9,6 +9,7 @@
 #include "tests/blind/answer.h"
 #include "tests/blind/controls.h"
 #include "tests/blind/figures.h"
+#include "tests/blind/judgement.h"
 #include "tests/blind/score.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/session_table.h"
@@ -112,7 +113,7 @@ std::vector<Case> handMade() {
       {"s15", "single", json::array({gain}), 1.4, 0.0, report("unexplained", "compact_metal", 0.5, {}, 0.9), false,
        "shuffled"},
       {"s16", "none", json::array(), 0.0, 0.0, report("explained", "range_noise", 0.5, {"range_noise"}, 0.1), false,
-       "jig_tolerance_-20%"},
+       "floor_-20%"},
       {"s17", "single", json::array({gain}), 1.4, 0.0,
        report("explained", "compact_metal", 0.9, {"compact_metal"}, 0.1), false, "mirrored"},
       {"s18", "single", json::array({gain}), 1.4, 0.8, nullptr},
@@ -191,12 +192,13 @@ struct Unanswered {
 
 constexpr const char* kNodes =
     "# frame: jig\n# jig_tolerance_m: 0.001\n# jig_tolerance_rad: 0.002\n"
-    "node,visit,t_start_s,t_end_s,x_true_m,y_true_m,z_true_m,x_m,y_m,z_m,qw,qx,qy,qz\n"
-    "0,0,0,1,0.1,0.2,0.3,0.11,0.21,0.31,0.9,0.1,0.2,0.3\n"
-    "1,0,2,3,0.4,0.2,0.3,0.41,0.21,0.31,0.9,0.1,-0.2,0.3\n"
-    "2,0,4,5,0.7,0.2,0.3,0.71,0.21,0.31,1,0,0,0\n"
-    "2,1,6,7,0.7,0.2,0.3,0.72,0.21,0.31,1,0,0,0\n"
-    "3,0,8,9,0.9,0.2,0.3,0.91,0.21,0.31,1,0,0,0\n";
+    "node,visit,t_start_s,t_end_s,x_true_m,y_true_m,z_true_m,x_m,y_m,z_m,qw,qx,qy,qz,sd_x_m,sd_y_m,sd_z_m,"
+    "cov_xy_m2,cov_xz_m2,cov_yz_m2\n"
+    "0,0,0,1,0.1,0.2,0.3,0.11,0.21,0.31,0.9,0.1,0.2,0.3,0.1,0.2,0.3,0.01,0.005,0.02\n"
+    "1,0,2,3,0.4,0.2,0.3,0.41,0.21,0.31,0.9,0.1,-0.2,0.3,0.1,0.2,0.3,0.01,0.005,0.02\n"
+    "2,0,4,5,0.7,0.2,0.3,0.71,0.21,0.31,1,0,0,0,0.1,0.2,0.3,0.01,0.005,0.02\n"
+    "2,1,6,7,0.7,0.2,0.3,0.72,0.21,0.31,1,0,0,0,0.1,0.2,0.3,0.01,0.005,0.02\n"
+    "3,0,8,9,0.9,0.2,0.3,0.91,0.21,0.31,1,0,0,0,0.1,0.2,0.3,0.01,0.005,0.02\n";
 
 }  // namespace
 
@@ -206,6 +208,8 @@ class BlindScoreTest : public QObject {
   void wilsonMatchesPublishedIntervals_data();
   void wilsonMatchesPublishedIntervals();
   void bootstrapOfTheMedianMatchesOrderStatistics();
+  void pooledSharesVaryBySession();
+  void probabilityOfAClassIsThatOfItsMembers();
   void quantilesInterpolate();
   void countsByHand_data();
   void countsByHand();
@@ -258,6 +262,34 @@ void BlindScoreTest::bootstrapOfTheMedianMatchesOrderStatistics() {
   QVERIFY(std::abs(interval.high - 60.5) <= 2.0);
   const Interval again = bootstrap(values, median);
   QCOMPARE(again.low, interval.low);
+}
+
+void BlindScoreTest::pooledSharesVaryBySession() {
+  // 300 hits of 400 in all: four alike of each session are one draw of 100, not 400 draws.
+  std::vector<Tally> sessions(75, Tally{4, 4});
+  sessions.resize(100, Tally{0, 4});
+  sessions.push_back({0, 0});
+  const Interval interval = pooledShare(sessions);
+  QCOMPARE(interval.value, 0.75);
+  QCOMPARE(interval.count, std::size_t(400));
+  // Standard error sqrt(0.75 * 0.25 / 100) = 0.0433, 95 % within 1.96 of it.
+  QVERIFY(std::abs(interval.high - interval.low - 2 * 1.96 * 0.0433) < 0.02);
+}
+
+void BlindScoreTest::probabilityOfAClassIsThatOfItsMembers() {
+  Session session;
+  session.classes = {{"global_gain", "grid_scale"}, {"coil_gain"}};
+  session.answer.is_answered = true;
+  for (const auto& [id, probability] :
+       {std::pair("grid_scale", 0.45), std::pair("global_gain", 0.4), std::pair("coil_gain", 0.15)}) {
+    NamedCause cause;
+    cause.effect = id;
+    cause.probability = probability;
+    session.answer.candidates.push_back(cause);
+  }
+  QCOMPARE(firstProbability(session), 0.85);
+  session.classes.clear();
+  QCOMPARE(firstProbability(session), 0.45);
 }
 
 void BlindScoreTest::quantilesInterpolate() {
@@ -497,8 +529,11 @@ void BlindScoreTest::controlsChangeWhatTheySay() {
   for (const json& session : truth["sessions"])
     made[session["control"]] = readTable(out / (session["file"].get<std::string>() + ".nodes.csv"));
   QCOMPARE(made.size(), std::size_t(5));
-  QCOMPARE(made["jig_tolerance_+20%"].metadata[1], std::string("# jig_tolerance_m: " + exactText(1.2 * 0.001)));
-  QCOMPARE(made["jig_tolerance_-20%"].metadata[2], std::string("# jig_tolerance_rad: " + exactText(0.8 * 0.002)));
+  QCOMPARE(made["floor_+20%"].metadata[1], std::string("# jig_tolerance_m: " + exactText(1.2 * 0.001)));
+  QCOMPARE(made["floor_-20%"].metadata[2], std::string("# jig_tolerance_rad: " + exactText(0.8 * 0.002)));
+  const std::vector<double> scatter = {0.12, 0.24, 0.36, 0.0144, 0.0072, 0.0288};
+  for (std::size_t at = 0; at < scatter.size(); ++at)
+    QVERIFY(std::abs(numberIn(made["floor_+20%"].rows[0][at + 14]) - scatter[at]) < 1e-12);
   const SessionTable& mirrored = made["mirrored"];
   const std::vector<double> expected = {0.1, 0.2, 0.3, -0.11, 0.21, 0.31, 0.9, 0.1, -0.2, -0.3};
   for (std::size_t at = 0; at < expected.size(); ++at) QCOMPARE(numberIn(mirrored.rows[0][at + 4]), expected[at]);

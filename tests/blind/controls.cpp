@@ -35,9 +35,16 @@ bool shuffle(Tables& tables, std::uint64_t seed) {
   return true;
 }
 
-bool raiseTolerance(Tables& tables, std::uint64_t) { return scaleJigTolerance(tables.nodes, 1.2); }
+/// The whole floor, seating and scatter of readings; samples would tell the scatter again and are left out.
+bool scaleFloor(Tables& tables, double factor) {
+  scaleScatter(tables.nodes, factor);
+  tables.samples.reset();
+  return scaleJigTolerance(tables.nodes, factor);
+}
 
-bool lowerTolerance(Tables& tables, std::uint64_t) { return scaleJigTolerance(tables.nodes, 0.8); }
+bool raiseFloor(Tables& tables, std::uint64_t) { return scaleFloor(tables, 1.2); }
+
+bool lowerFloor(Tables& tables, std::uint64_t) { return scaleFloor(tables, 0.8); }
 
 bool mirror(Tables& tables, std::uint64_t) {
   mirrorTracked(tables.nodes);
@@ -53,8 +60,8 @@ bool reverse(Tables& tables, std::uint64_t) {
 }
 
 constexpr Control kControls[] = {{"shuffled", "single", shuffle},
-                                 {"jig_tolerance_+20%", "none", raiseTolerance},
-                                 {"jig_tolerance_-20%", "none", lowerTolerance},
+                                 {"floor_+20%", "none", raiseFloor},
+                                 {"floor_-20%", "none", lowerFloor},
                                  {"mirrored", "single", mirror},
                                  {"time_reversed", "none", reverse}};
 

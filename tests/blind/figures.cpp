@@ -98,6 +98,12 @@ void addTopOne(std::vector<Figure>& figures, const Sessions& single) {
   section.addShares("positions only, random order", part(true, true), isFirstRight, positions);
   section.addShares("poses, serpentine order", part(false, false), isFirstRight);
   section.addShares("positions only, serpentine order", part(true, false), isFirstRight);
+  section.addShares("poses, random order, classes by the generator's physics", random_poses,
+                    [](const Session& session) {
+                      Session other = session;
+                      if (!session.own_classes.empty()) other.classes = session.own_classes;
+                      return isFirstRight(other);
+                    });
   section.add("the class stated with the right name holds the truth itself", "all", "share",
               shareOf(where(single, isFirstRight), [](const Session& session) {
                 const std::vector<std::string>& stated = session.answer.candidates.front().equivalents;
@@ -136,6 +142,13 @@ void addAbstention(std::vector<Figure>& figures, const Sessions& single, const S
   const auto is_strong = [](const Session& session) { return session.rho >= 1.4 - 1e-6; };
   section.add("called unexplained or partly explained", "rho 1.4 and more", "share",
               shareOf(where(off, is_strong), isAbstention), atLeast(0.90));
+  std::set<std::string> ids;
+  for (const Session* session : off) ids.insert(session->effects.front().id);
+  for (const std::string& id : ids) {
+    const Sessions of_kind = where(
+        off, [&](const Session& session) { return session.effects.front().id == id && session.rho >= 1.4 - 1e-6; });
+    section.add("so called from rho 1.4 up, by kind", id, "share", shareOf(of_kind, isAbstention));
+  }
   section.addShares("in the catalogue, but so called", single, isAbstention, {}, atMost(0.05, kAllowance));
 }
 
@@ -166,7 +179,7 @@ void addLocation(std::vector<Figure>& figures, const Sessions& single) {
   }
 }
 
-void addShrinkage(std::vector<Figure>& figures, const Sessions& single) {
+void addShrinkage(std::vector<Figure>& figures, const Sessions& single, const Sessions& pairs) {
   Section section(figures, "Shrinkage by the selected effects over the oracle's, median");
   const auto median = [](const Sessions& some) {
     std::vector<double> ratios;
@@ -177,19 +190,19 @@ void addShrinkage(std::vector<Figure>& figures, const Sessions& single) {
   const LevelTargets targets = {atLeast(0.9), atLeast(0.9), atLeast(0.9), atLeast(0.9)};
   section.addByStrength("one effect of the catalogue", "", single, median, targets, atLeast(0.9));
   section.addByStrength("where named right", "", where(single, isFirstRight), median);
+  section.add("two or three at once", "all", "", median(pairs));
 }
 
 void addCoverage(std::vector<Figure>& figures, const Sessions& single) {
   Section section(figures, "Coverage of 90 % intervals, where the class was named right");
   const auto add = [&](const std::string& name, const auto& coverage) {
-    std::size_t held = 0;
-    std::size_t stated = 0;
+    std::vector<Tally> tallies;
     for (const Session* session : single) {
       const std::vector<bool> covered = coverage(*session);
-      held += static_cast<std::size_t>(std::count(covered.begin(), covered.end(), true));
-      stated += covered.size();
+      tallies.push_back(
+          {static_cast<double>(std::count(covered.begin(), covered.end(), true)), static_cast<double>(covered.size())});
     }
-    section.add(name, "all", "share", wilson(held, stated), coverageTarget());
+    section.add(name, "all", "share", pooledShare(tallies), coverageTarget());
   };
   add("components of the location", locationCoverage);
   add("amplitude", amplitudeCoverage);
@@ -201,8 +214,7 @@ void addProbability(std::vector<Figure>& figures, const Sessions& judged) {
   std::size_t sets_right = 0;
   for (const Session* session : judged) {
     if (!session->answer.is_answered || session->answer.candidates.empty()) continue;
-    const NamedCause& first = session->answer.candidates.front();
-    forecasts.push_back({first.probability, isRight(*session, first.effect)});
+    forecasts.push_back({firstProbability(*session), isRight(*session, session->answer.candidates.front().effect)});
     if (session->shelf != "single" || session->rho < 0.7 - 1e-6) continue;
     const CredibleSet set = *credibleSet(*session);
     set_sizes.push_back(static_cast<double>(set.size));
@@ -218,9 +230,8 @@ void addProbability(std::vector<Figure>& figures, const Sessions& judged) {
 
 /// Effects of several sessions, by how often they were called for and how often called.
 struct SetCounts {
-  std::size_t shared = 0;
-  std::size_t is_true = 0;
-  std::size_t is_selected = 0;
+  std::vector<Tally> recalled;
+  std::vector<Tally> precise;
   std::size_t exact = 0;
 };
 
@@ -229,9 +240,10 @@ SetCounts countSets(const Sessions& sessions) {
   for (const Session* session : sessions) {
     const std::set<std::string> truth = trueClasses(*session);
     const std::set<std::string> selected = selectedClasses(*session);
-    for (const std::string& label : selected) counts.shared += truth.count(label);
-    counts.is_true += truth.size();
-    counts.is_selected += selected.size();
+    double shared = 0.0;
+    for (const std::string& label : selected) shared += static_cast<double>(truth.count(label));
+    counts.recalled.push_back({shared, static_cast<double>(truth.size())});
+    counts.precise.push_back({shared, static_cast<double>(selected.size())});
     counts.exact += session->answer.is_answered && truth == selected ? 1 : 0;
   }
   return counts;
@@ -242,9 +254,8 @@ void addSets(std::vector<Figure>& figures, const Sessions& pairs, const Sessions
   const auto add = [&](const std::string& group, const Sessions& some, bool has_target) {
     const SetCounts counts = countSets(some);
     const auto target = [&](double value) { return has_target ? std::optional(atLeast(value)) : std::nullopt; };
-    section.add("true effects selected (recall)", group, "share", wilson(counts.shared, counts.is_true), target(0.95));
-    section.add("selected effects true (precision)", group, "share", wilson(counts.shared, counts.is_selected),
-                target(0.95));
+    section.add("true effects selected (recall)", group, "share", pooledShare(counts.recalled), target(0.95));
+    section.add("selected effects true (precision)", group, "share", pooledShare(counts.precise), target(0.95));
     section.add("set exact", group, "share", wilson(counts.exact, some.size()), target(0.85));
   };
   add("two or three at once", pairs, true);
@@ -364,10 +375,11 @@ Scoreboard scoreboardOf(std::span<const Session> sessions) {
   addDetection(board.figures, none, single);
   addAbstention(board.figures, single, off);
   addLocation(board.figures, single);
-  addShrinkage(board.figures, single);
+  const Sessions pairs = onShelf(answered_for, "pairs");
+  addShrinkage(board.figures, single, pairs);
   addCoverage(board.figures, single);
   addProbability(board.figures, single_or_none);
-  addSets(board.figures, onShelf(answered_for, "pairs"), single);
+  addSets(board.figures, pairs, single);
   addSignals(board.figures, onShelf(answered_for, "signals"));
   addControls(board.figures, controls);
   addTimes(board.figures, answered_for.empty() ? controls : answered_for);

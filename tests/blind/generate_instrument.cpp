@@ -52,7 +52,7 @@ Drawn drawCoilGain(const Setup&, Random& random) {
   const std::string side = transmitter ? "transmitter" : "receiver";
   Eigen::Index axis = 0;
   pattern.cwiseAbs().maxCoeff(&axis);
-  return sized("coil_gain", side + " coils", 2e-4, 0.2, apply, side + "_gain_" + "xyz" [axis], pattern[axis], {
+  return sized("coil_gain", side + " coils", 2e-4, 0.1, apply, side + "_gain_" + "xyz" [axis], pattern[axis], {
     { "pattern", listed(pattern) }
   });
 }
@@ -66,13 +66,12 @@ Drawn drawNonorthogonality(const Setup&, Random& random) {
     change(0, 1) = size * lean.x(), change(0, 2) = size * lean.y(), change(1, 2) = size * lean.z();
     (transmitter ? world.transmitter : world.receiver) *= change;
   };
-  Drawn drawn = sized("coil_nonorthogonality", transmitter ? "transmitter coils" : "receiver coils", 3e-4, 0.2, apply,
-                      "", 1, {{"lean", listed(lean)}});
-  drawn.describe = [lean](double size, json& effect) {
-    effect["amplitude"] = nullptr;
-    effect["parameters"]["lean_rad"] = listed(size * lean);
-  };
-  return drawn;
+  constexpr const char* kPairs[] = {"_xy_rad", "_xz_rad", "_yz_rad"};
+  Eigen::Index pair = 0;
+  lean.cwiseAbs().maxCoeff(&pair);
+  const std::string side = transmitter ? "transmitter" : "receiver";
+  return sized("coil_nonorthogonality", side + " coils", 3e-4, 0.1, apply, side + kPairs[pair], 0.5 * lean[pair],
+               {{"lean", listed(lean)}});
 }
 
 Drawn drawFiniteCoil(const Setup&, Random& random) {
@@ -80,10 +79,11 @@ Drawn drawFiniteCoil(const Setup&, Random& random) {
   const auto apply = [=](World& world, double size) {
     (transmitter ? world.transmitter_half_m : world.receiver_half_m) = size;
   };
-  Drawn drawn = sized("finite_coil", transmitter ? "square transmitter coils" : "square receiver coils", 0.01, 0.25,
+  Drawn drawn = sized("finite_coil", transmitter ? "square transmitter coils" : "square receiver coils", 0.01, 0.15,
                       apply, "", 1);
   drawn.describe = [](double size, json& effect) {
-    effect["amplitude"] = nullptr;
+    // On the axis a square of half side h falls below the dipole by 2 h^2 / z^2, a ring of radius a by 3/2 a^2 / z^2.
+    effect["amplitude"] = {{"name", "radius_squared_m2"}, {"value", 4.0 / 3.0 * size * size}};
     effect["parameters"]["half_side_m"] = size;
   };
   return drawn;
@@ -109,7 +109,7 @@ Drawn drawGridScale(const Setup& setup, Random& random) {
   };
   Eigen::Index axis = 0;
   pattern.cwiseAbs().maxCoeff(&axis);
-  return sized("grid_scale", isotropic ? "all axes alike" : "by axis", 2e-4, 0.2, apply,
+  return sized("grid_scale", isotropic ? "all axes alike" : "by axis", 2e-4, 0.1, apply,
                std::string("scale_") + "xyz" [axis], pattern[axis], {
                  {"pattern", listed(pattern)}, { "isotropic", isotropic }
                });
@@ -126,7 +126,7 @@ Drawn drawLayerOffset(const Setup& setup, Random& random) {
       place_m.z() += size * offset[static_cast<std::size_t>(row.k)];
     });
   };
-  Drawn drawn = sized("jig_layer_offset", "layer at the wrong height", 3e-4, 0.08, apply, "", 1,
+  Drawn drawn = sized("jig_layer_offset", "layer at the wrong height", 3e-4, 0.03, apply, "", 1,
                       {{"layer", wrong}, {"pattern", offset}});
   const double factor = offset[static_cast<std::size_t>(wrong)];
   drawn.describe = [=](double size, json& effect) {
@@ -147,8 +147,8 @@ Drawn drawJigTilt(const Setup& setup, Random& random) {
       if (turns_sensor) attitude = turned(size * Vector3d::UnitZ().cross(lean), attitude);
     });
   };
-  const char* name = std::abs(lean.x()) > std::abs(lean.y()) ? "shear_xz" : "shear_yz";
-  return sized("jig_tilt", turns_sensor ? "posts lean with the sensor" : "posts lean", 4e-4, 0.2, apply, name,
+  const char* name = std::abs(lean.x()) > std::abs(lean.y()) ? "shear_xz_rad" : "shear_yz_rad";
+  return sized("jig_tilt", turns_sensor ? "posts lean with the sensor" : "posts lean", 4e-4, 0.1, apply, name,
                std::abs(lean.x()) > std::abs(lean.y()) ? lean.x() : lean.y(), {{"lean", listed(lean)}});
 }
 
@@ -160,7 +160,7 @@ Drawn drawGainDrift(const Setup& setup, Random& random) {
       couplings *= 1 + s * size * course(row.start_s);
     });
   };
-  Drawn drawn = sized("gain_drift", "warming up, with a random walk", 3e-4, 0.3, apply, "", 1);
+  Drawn drawn = sized("gain_drift", "warming up, with a random walk", 3e-4, 0.1, apply, "", 1);
   drawn.describe = [s](double size, json& effect) {
     effect["amplitude"] = nullptr;
     effect["parameters"]["gain_at_end"] = s * size;
@@ -176,7 +176,9 @@ Drawn drawSensorOffset(const Setup&, Random& random) {
   };
   Drawn drawn = sized("sensor_offset", "sensor not where it should sit", 5e-4, 0.1, apply, "", 1);
   drawn.describe = [to](double size, json& effect) {
-    effect["amplitude"] = nullptr;
+    Eigen::Index axis = 0;
+    to.cwiseAbs().maxCoeff(&axis);
+    effect["amplitude"] = {{"name", std::string("offset_") + "xyz"[axis] + "_m"}, {"value", size * to[axis]}};
     effect["parameters"]["offset_m"] = listed(size * to);
   };
   return drawn;

@@ -131,6 +131,7 @@ Drawn drawMetalPlane(const Setup& setup, Random& random) {
   return shareOf("metal_plane", kind, std::move(metal),
                  {{"location_m", listed(distance_m * toward)},
                   {"material", ferromagnetic ? "ferromagnetic" : "conductive"},
+                  {"amplitude", {{"name", "distance_m"}, {"value", distance_m}}},
                   {"parameters", {{"distance_m", distance_m}, {"toward", listed(toward)}, {"side_m", side_m}}}});
 }
 

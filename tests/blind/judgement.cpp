@@ -92,6 +92,14 @@ bool isFound(const Session& session) {
                      [&](const NamedCause& cause) { return is_right(cause.effect); });
 }
 
+double firstProbability(const Session& session) {
+  double probability = 0.0;
+  for (const NamedCause& candidate : session.answer.candidates)
+    if (areAlike(session, candidate.effect, session.answer.candidates.front().effect))
+      probability += candidate.probability;
+  return std::min(1.0, probability);
+}
+
 std::optional<double> locationError(const Session& session) {
   const NamedCause* named = rightCandidate(session);
   if (named == nullptr || !named->location_m) return std::nullopt;

@@ -33,6 +33,9 @@ std::set<std::string> selectedClasses(const Session& session);
 /// Whether a true effect is selected or stands among the findings.
 bool isFound(const Session& session);
 
+/// Probability stated of the first candidate and of all that the design cannot tell from it.
+double firstProbability(const Session& session);
+
 /// Distance of the first candidate's place from the true one.
 /// @return metres; nothing unless a right candidate and the truth both have a place
 std::optional<double> locationError(const Session& session);

@@ -76,8 +76,8 @@ Example: fieldtrue-blind score --in set --controls set_controls --markdown score
 )";
 
 constexpr const char* kControlsHelp =
-    R"(Makes negative controls of a sealed set, sealed themselves: places shuffled among the nodes, stated tolerances 20 % too
-large or too small, mirrored readings, time reversed. None of them may be given a cause.
+    R"(Makes negative controls of a sealed set, sealed themselves: places shuffled among the nodes, stated noise and
+tolerances 20 % too large or too small, mirrored readings, time reversed. None of them may be given a cause.
 
   --in DIR         sealed set
   --out DIR        folder to write; must not hold a set already

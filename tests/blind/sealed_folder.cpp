@@ -152,6 +152,7 @@ Session sessionOf(const json& object, std::size_t index) {
   session.is_position_only = position_only != nullptr && position_only->is_boolean() && position_only->get<bool>();
   session.order = wordAt(object, "order");
   for (const json& ids : listAt(object, "classes")) session.classes.push_back(wordsOf(ids));
+  for (const json& ids : listAt(object, "own_classes")) session.own_classes.push_back(wordsOf(ids));
   if (const json* oracle = member(object, "oracle")) session.oracle_fraction = numberAt(*oracle, "fraction");
   return session;
 }

@@ -78,7 +78,8 @@ struct Session {
   std::optional<double> rho_level;
   bool is_position_only = false;
   std::string order;
-  std::vector<std::vector<std::string>> classes;
+  std::vector<std::vector<std::string>> classes;      ///< As plan-check declared them before answering.
+  std::vector<std::vector<std::string>> own_classes;  ///< By the physics of the generator; empty when not stated.
   std::optional<double> oracle_fraction;
   Answer answer;
 };

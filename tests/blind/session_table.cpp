@@ -31,11 +31,11 @@ std::string joined(const std::vector<std::string>& fields) {
   return line;
 }
 
-void negate(SessionTable& table, const std::string& name) {
+void scale(SessionTable& table, const std::string& name, double factor) {
   const std::optional<std::size_t> at = table.column(name);
   if (!at) return;
   for (std::vector<std::string>& row : table.rows)
-    if (!row[*at].empty()) row[*at] = exactText(-numberIn(row[*at]));
+    if (!row[*at].empty()) row[*at] = exactText(factor * numberIn(row[*at]));
 }
 
 }  // namespace
@@ -135,10 +135,15 @@ bool scaleJigTolerance(SessionTable& nodes, double factor) {
   return is_stated;
 }
 
+void scaleScatter(SessionTable& nodes, double factor) {
+  for (const char* name : {"sd_x_m", "sd_y_m", "sd_z_m", "sd_rot_rad"}) scale(nodes, name, factor);
+  for (const char* name : {"cov_xy_m2", "cov_xz_m2", "cov_yz_m2"}) scale(nodes, name, factor * factor);
+}
+
 void mirrorTracked(SessionTable& table) {
   table.neededColumn("x_m");
   // M R M turns by the same angle about (x, -y, -z).
-  for (const char* name : {"x_m", "qy", "qz", "cov_xy_m2", "cov_xz_m2"}) negate(table, name);
+  for (const char* name : {"x_m", "qy", "qz", "cov_xy_m2", "cov_xz_m2"}) scale(table, name, -1.0);
 }
 
 bool reverseTime(SessionTable& table, double end_s) {

@@ -33,6 +33,8 @@ void shufflePlaces(SessionTable& nodes, std::uint64_t seed);
 /// Multiplies the stated jig tolerances.
 /// @return false when none is stated
 bool scaleJigTolerance(SessionTable& nodes, double factor);
+/// Multiplies the stated scatter of the readings: SDs by the factor, covariances by its square.
+void scaleScatter(SessionTable& nodes, double factor);
 /// Reflects what was tracked in the plane x = 0: p -> M p, R -> M R M with M = diag(-1, 1, 1).
 void mirrorTracked(SessionTable& table);
 /// Replaces every time t by `end_s` - t, start and end of a node exchanged, and puts the rows in reverse order.

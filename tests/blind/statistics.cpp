@@ -72,6 +72,24 @@ double meanOf(std::span<const double> values) {
 
 Interval bootstrap(std::span<const double> values, const Statistic& statistic) { return resampled(values, statistic); }
 
+Interval pooledShare(std::span<const Tally> sessions) {
+  const auto share = [](std::span<const Tally> some) {
+    Tally sum;
+    for (const Tally& one : some) sum = {sum.hits + one.hits, sum.count + one.count};
+    return sum.hits / sum.count;
+  };
+  std::vector<Tally> counted;
+  double count = 0.0;
+  for (const Tally& one : sessions) {
+    if (one.count <= 0.0) continue;
+    counted.push_back(one);
+    count += one.count;
+  }
+  Interval interval = resampled(std::span<const Tally>(counted), share);
+  interval.count = static_cast<std::size_t>(count);
+  return interval;
+}
+
 Interval brierScore(std::span<const Forecast> forecasts) { return resampled(forecasts, brierOf); }
 
 double expectedCalibrationError(std::span<const Forecast> forecasts) {

@@ -37,6 +37,16 @@ double meanOf(std::span<const double> values);
 /// @source Efron and Tibshirani 1993, An Introduction to the Bootstrap, chapter 13, percentile interval
 Interval bootstrap(std::span<const double> values, const Statistic& statistic);
 
+/// How many of several things of one session hold, which is one draw: they do not vary independently.
+struct Tally {
+  double hits = 0.0;
+  double count = 0.0;
+};
+
+/// Share of hits over all sessions, bootstrapped by session.
+/// @return count is that of things, not of sessions
+Interval pooledShare(std::span<const Tally> sessions);
+
 /// Mean squared difference between the stated probability and what happened (Brier 1950), bootstrapped.
 Interval brierScore(std::span<const Forecast> forecasts);
 
