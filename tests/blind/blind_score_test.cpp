@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <numeric>
-#include <set>
 
 #include "tests/blind/answer.h"
 #include "tests/blind/controls.h"
@@ -12,7 +11,6 @@
 #include "tests/blind/judgement.h"
 #include "tests/blind/score.h"
 #include "tests/blind/sealed_folder.h"
-#include "tests/blind/session_table.h"
 #include "tests/blind/statistics.h"
 
 using namespace blind;
@@ -162,44 +160,6 @@ json scored(const fs::path& folder) {
   return runScore(words) == 0 ? documentOf(out) : json();
 }
 
-/// A folder with two sessions and a stand-in for the diagnosis that notes its arguments.
-struct Unanswered {
-  QTemporaryDir holder;
-  fs::path path = holder.path().toStdString();
-  fs::path cli = path / "stand_in";
-
-  Unanswered() {
-    std::vector<Case> cases = handMade();
-    cases.resize(2);
-    sealTruth(path, truthOf(cases));
-    for (const Case& one : cases) replaceFile(path / (one.file + ".nodes.csv"), "node\n1\n");
-    replaceFile(path / "s02.samples.csv", "node\n1\n");
-    replaceFile(cli,
-                "#!/bin/sh\n"
-                "echo \"$@\": $(ls) >> \"$(dirname \"$0\")/calls\"\n"
-                "[ -e \"$(dirname \"$0\")/broken\" ] && exit 3\n"
-                "while [ \"$1\" != --out ]; do shift; done\n"
-                "echo '{\"verdict\": \"no_gap\", \"candidates\": [], \"selected\": []}' > \"$2\"\n");
-    fs::permissions(cli, fs::perms::owner_all);
-  }
-
-  int answer(std::vector<std::string> more = {}) const {
-    more.insert(more.end(), {"--in", path.string(), "--cli", cli.string(), "--jobs", "2"});
-    return runAnswer(more);
-  }
-  std::string calls() const { return fs::exists(path / "calls") ? textOf(path / "calls") : ""; }
-};
-
-constexpr const char* kNodes =
-    "# frame: jig\n# jig_tolerance_m: 0.001\n# jig_tolerance_rad: 0.002\n"
-    "node,visit,t_start_s,t_end_s,x_true_m,y_true_m,z_true_m,x_m,y_m,z_m,qw,qx,qy,qz,sd_x_m,sd_y_m,sd_z_m,"
-    "cov_xy_m2,cov_xz_m2,cov_yz_m2\n"
-    "0,0,0,1,0.1,0.2,0.3,0.11,0.21,0.31,0.9,0.1,0.2,0.3,0.1,0.2,0.3,0.01,0.005,0.02\n"
-    "1,0,2,3,0.4,0.2,0.3,0.41,0.21,0.31,0.9,0.1,-0.2,0.3,0.1,0.2,0.3,0.01,0.005,0.02\n"
-    "2,0,4,5,0.7,0.2,0.3,0.71,0.21,0.31,1,0,0,0,0.1,0.2,0.3,0.01,0.005,0.02\n"
-    "2,1,6,7,0.7,0.2,0.3,0.72,0.21,0.31,1,0,0,0,0.1,0.2,0.3,0.01,0.005,0.02\n"
-    "3,0,8,9,0.9,0.2,0.3,0.91,0.21,0.31,1,0,0,0,0.1,0.2,0.3,0.01,0.005,0.02\n";
-
 }  // namespace
 
 class BlindScoreTest : public QObject {
@@ -218,17 +178,8 @@ class BlindScoreTest : public QObject {
   void targetsAllowForTheInterval_data();
   void targetsAllowForTheInterval();
   void changedTruthIsRefused();
-  void changedAnswerIsRefused();
-  void answersAreWrittenOnce();
-  void theDiagnosisSeesNoLabel();
-  void failuresAreRecorded();
-  void aStoppedRunGoesOnWhereItStopped();
-  void aDiagnosisThatTakesTooLongIsWrong();
-  void onlyTheAskedSessionsAreAnswered();
   void wrongUsageIsTold_data();
   void wrongUsageIsTold();
-  void controlsChangeWhatTheySay();
-  void placesAreShuffledWhole();
 };
 
 void BlindScoreTest::wilsonMatchesPublishedIntervals_data() {
@@ -417,86 +368,6 @@ void BlindScoreTest::changedTruthIsRefused() {
   QCOMPARE(runAnswer(std::vector<std::string>{"--in", folder.path.string(), "--cli", "/bin/true", "--again"}), 1);
 }
 
-void BlindScoreTest::changedAnswerIsRefused() {
-  const Unanswered folder;
-  QCOMPARE(folder.answer(), 0);
-  const std::vector<std::string> words = {"--in", folder.path.string()};
-  QCOMPARE(runScore(words), 0);
-  replaceFile(folder.path / "s01.gap.json", R"({"verdict": "explained", "candidates": [], "selected": []})");
-  QCOMPARE(runScore(words), 1);
-}
-
-void BlindScoreTest::answersAreWrittenOnce() {
-  const Unanswered folder;
-  QCOMPARE(folder.answer(), 0);
-  const std::string first_calls = folder.calls();
-  const std::string records = textOf(folder.path / "answers.json");
-  QCOMPARE(folder.answer(), 0);
-  QCOMPARE(folder.calls(), first_calls);
-  QCOMPARE(textOf(folder.path / "answers.json"), records);
-  QCOMPARE(folder.answer({"--again"}), 0);
-  QCOMPARE(folder.calls().size(), 2 * first_calls.size());
-  QCOMPARE(documentOf(folder.path / "answers.json")["sessions"].size(), std::size_t(2));
-}
-
-void BlindScoreTest::theDiagnosisSeesNoLabel() {
-  const Unanswered folder;
-  QCOMPARE(folder.answer(), 0);
-  // What it is told, and all that lies in the folder it works in.
-  const std::string calls = folder.calls();
-  QVERIFY(calls.find("diagnose --nodes nodes.csv --out report.gap.json --threads 1: nodes.csv\n") != std::string::npos);
-  QVERIFY(calls.find("diagnose --nodes nodes.csv --samples samples.csv --out report.gap.json --threads 1: nodes.csv "
-                     "samples.csv\n") != std::string::npos);
-}
-
-void BlindScoreTest::failuresAreRecorded() {
-  const Unanswered folder;
-  replaceFile(folder.path / "broken", "");
-  QCOMPARE(folder.answer(), 0);
-  const json records = documentOf(folder.path / "answers.json")["sessions"];
-  QCOMPARE(records.size(), std::size_t(2));
-  for (const json& record : records) QVERIFY(record["exit_status"] == 3);
-  const std::string calls = folder.calls();
-  QCOMPARE(folder.answer(), 0);
-  QCOMPARE(folder.calls(), calls);
-  QCOMPARE(runScore(std::vector<std::string>{"--in", folder.path.string()}), 1);
-}
-
-void BlindScoreTest::aStoppedRunGoesOnWhereItStopped() {
-  const Unanswered folder;
-  QCOMPARE(folder.answer({"--to", "1"}), 0);
-  const std::string first = textOf(folder.path / "s01.gap.json");
-  // The second was stopped after its report was written, before it was recorded.
-  replaceFile(folder.path / "s02.gap.json", "half a rep");
-  QCOMPARE(folder.answer(), 0);
-  QCOMPARE(textOf(folder.path / "s01.gap.json"), first);
-  QCOMPARE(documentOf(folder.path / "s02.gap.json")["verdict"].get<std::string>(), std::string("no_gap"));
-  const std::string calls = folder.calls();
-  QCOMPARE(std::count(calls.begin(), calls.end(), '\n'), 2);
-}
-
-void BlindScoreTest::aDiagnosisThatTakesTooLongIsWrong() {
-  const Unanswered folder;
-  replaceFile(folder.cli, "#!/bin/sh\necho '{\"verdict\": \"no_gap\"}' > report.gap.json\nexec sleep 20\n");
-  fs::permissions(folder.cli, fs::perms::owner_all);
-  QCOMPARE(folder.answer({"--limit", "0.3"}), 0);
-  for (const json& record : documentOf(folder.path / "answers.json")["sessions"]) {
-    QVERIFY(record["exit_status"] == 124);
-    QVERIFY(record["seconds"].get<double>() < 10.0);
-  }
-  QVERIFY(!fs::exists(folder.path / "s01.gap.json"));
-}
-
-void BlindScoreTest::onlyTheAskedSessionsAreAnswered() {
-  const Unanswered folder;
-  QCOMPARE(folder.answer({"--from", "2", "--to", "2"}), 0);
-  QVERIFY(!fs::exists(folder.path / "s01.gap.json"));
-  QVERIFY(fs::exists(folder.path / "s02.gap.json"));
-  QCOMPARE(folder.answer({"--from", "1", "--to", "1"}), 0);
-  QCOMPARE(documentOf(folder.path / "answers.json")["sessions"].size(), std::size_t(2));
-  QCOMPARE(folder.answer({"--from", "3"}), 1);
-}
-
 void BlindScoreTest::wrongUsageIsTold_data() {
   QTest::addColumn<QStringList>("words");
   QTest::newRow("no folder") << QStringList{};
@@ -511,56 +382,6 @@ void BlindScoreTest::wrongUsageIsTold() {
   QCOMPARE(runScore(plain), 2);
   QCOMPARE(runAnswer(plain), 2);
   QCOMPARE(runControls(plain), 2);
-}
-
-void BlindScoreTest::controlsChangeWhatTheySay() {
-  const QTemporaryDir holder;
-  const fs::path in = holder.path().toStdString();
-  const fs::path out = in / "controls";
-  std::vector<Case> cases = handMade();
-  cases = {cases[0], cases[3]};
-  sealTruth(in, truthOf(cases));
-  for (const Case& one : cases) replaceFile(in / (one.file + ".nodes.csv"), kNodes);
-  const std::vector<std::string> words = {"--in", in.string(), "--out", out.string(), "--count", "3"};
-  QCOMPARE(runControls(words), 0);
-  QCOMPARE(runControls(words), 1);
-  std::map<std::string, SessionTable> made;
-  const json truth = openSealed(out);
-  for (const json& session : truth["sessions"])
-    made[session["control"]] = readTable(out / (session["file"].get<std::string>() + ".nodes.csv"));
-  QCOMPARE(made.size(), std::size_t(5));
-  QCOMPARE(made["floor_+20%"].metadata[1], std::string("# jig_tolerance_m: " + exactText(1.2 * 0.001)));
-  QCOMPARE(made["floor_-20%"].metadata[2], std::string("# jig_tolerance_rad: " + exactText(0.8 * 0.002)));
-  const std::vector<double> scatter = {0.12, 0.24, 0.36, 0.0144, 0.0072, 0.0288};
-  for (std::size_t at = 0; at < scatter.size(); ++at)
-    QVERIFY(std::abs(numberIn(made["floor_+20%"].rows[0][at + 14]) - scatter[at]) < 1e-12);
-  const SessionTable& mirrored = made["mirrored"];
-  const std::vector<double> expected = {0.1, 0.2, 0.3, -0.11, 0.21, 0.31, 0.9, 0.1, -0.2, -0.3};
-  for (std::size_t at = 0; at < expected.size(); ++at) QCOMPARE(numberIn(mirrored.rows[0][at + 4]), expected[at]);
-  const SessionTable& reversed = made["time_reversed"];
-  QCOMPARE(reversed.rows[0][0], std::string("3"));
-  QCOMPARE(numberIn(reversed.rows[0][2]), 0.0);
-  QCOMPARE(numberIn(reversed.rows[4][3]), 9.0);
-  QCOMPARE(numberIn(reversed.rows[4][2]), 8.0);
-}
-
-void BlindScoreTest::placesAreShuffledWhole() {
-  const QTemporaryDir holder;
-  const fs::path path = fs::path(holder.path().toStdString()) / "n.csv";
-  replaceFile(path, kNodes);
-  const SessionTable before = readTable(path);
-  SessionTable after = before;
-  shufflePlaces(after, 7);
-  QVERIFY(after.rows != before.rows);
-  QCOMPARE(after.rows[2][4], after.rows[3][4]);
-  std::multiset<std::string> places_before;
-  std::multiset<std::string> places_after;
-  for (std::size_t row : {0, 1, 2, 4}) {
-    places_before.insert(before.rows[row][4]);
-    places_after.insert(after.rows[row][4]);
-    for (std::size_t column : {0, 7, 8, 9, 10, 13}) QCOMPARE(after.rows[row][column], before.rows[row][column]);
-  }
-  QCOMPARE(places_after, places_before);
 }
 
 QTEST_GUILESS_MAIN(BlindScoreTest)
