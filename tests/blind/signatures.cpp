@@ -69,69 +69,86 @@ Bend metalBend(const Scatterer& metal, double share) {
   return [=](World& world) { world.metal.emplace_back(share, metal); };
 }
 
+using Bends = std::map<std::string, std::vector<Bend>>;
+
+void addRoom(const Setup& setup, const Vector3d& body_m, const Vector3d& normal, Bends& bends) {
+  const Vector3d down = setup.tracker_from_jig * Vector3d(0, 0, -1);
+  double lowest = 0;
+  for (const Row& row : setup.rows) lowest = std::max(lowest, down.dot(setup.expected(row).position_m));
+  const Quaterniond flat = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), down);
+  const Quaterniond facing = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal);
+  const MeshedSheet floor(12, 12, 0.5, 1e-4, setup.carrier_hz), plate(6, 6, 0.1, 1e-4, setup.carrier_hz);
+  const Polygon loop = roundLoop(body_m, normal, 0.25, 24);
+  bends["compact_metal"] = tensorBends(body_m);
+  bends["metal_plane"] = {metalBend(floor.solve((lowest + 0.9) * down, flat), 0.02)};
+  bends["finite_plate"] = {metalBend(plate.solve(body_m, facing), 0.02)};
+  bends["closed_loop"] = {metalBend(solveClosedLoop(loop, 0.01, 1.5e-6, setup.carrier_hz), 0.02)};
+}
+
+void addCoils(Bends& bends) {
+  bends["coil_gain"] = coilBends(true);
+  bends["coil_nonorthogonality"] = coilBends(false);
+  bends["finite_coil"] = {[](World& world) { world.transmitter_half_m = 0.02; },
+                          [](World& world) { world.receiver_half_m = 0.02; }};
+  bends["global_gain"] = {[](World& world) { world.receiver *= 1 + 1e-4; }};
+}
+
+void addRig(const Setup& setup, Bends& bends) {
+  const Vector3d middle_m = setup.middle_m;
+  for (int axis = 0; axis < 3; ++axis)
+    bends["grid_scale"].push_back(
+        rigBend([=](const Row& row) { return Vector3d((row.place_m - middle_m)[axis] * Vector3d::Unit(axis)); }));
+  std::vector<Bend>& layers = bends["jig_layer_offset"];
+  for (int layer = 0; !setup.scattered && layer < setup.counts.z(); ++layer)
+    layers.push_back(rigBend([=](const Row& row) { return Vector3d(0, 0, row.k == layer ? 1 : 0); }));
+  for (int axis = 0; axis < 2; ++axis)
+    bends["jig_tilt"].push_back(
+        rigBend([=](const Row& row) { return Vector3d((row.place_m - middle_m).z() * Vector3d::Unit(axis)); }));
+}
+
+void addMounting(Bends& bends) {
+  const auto mounted = [](std::function<void(SolvedPose&)> change) -> Bend {
+    return [change = std::move(change)](World& world) {
+      world.mounting.emplace_back([change](const Row&, SolvedPose& sensor) { change(sensor); });
+    };
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3d e = 1e-4 * Vector3d::Unit(axis);
+    bends["sensor_offset"].push_back(mounted([=](SolvedPose& s) { s.position_m += s.orientation * e; }));
+    bends["transmitter_misalignment"].push_back(mounted([=](SolvedPose& s) { s.position_m += e; }));
+    bends["transmitter_misalignment"].push_back(mounted([=](SolvedPose& s) {
+      s.position_m = turned(e, Quaterniond::Identity()) * s.position_m;
+      s.orientation = turned(e, s.orientation);
+    }));
+  }
+}
+
+void addTime(const Setup& setup, const Vector3d& body_m, Bends& bends) {
+  const double end_s = setup.duration_s();
+  bends["gain_drift"] = {[=](World& world) {
+    world.signal.emplace_back([=](const Row& row, const SolvedPose&, Matrix3d& couplings) {
+      couplings *= 1 + 1e-4 * (1 - std::exp(-2.5 * row.start_s / end_s));
+    });
+  }};
+  for (const Bend& metal : tensorBends(body_m))
+    bends["metal_moved"].emplace_back([metal, end_s](World& world) {
+      metal(world);
+      world.metal.back().second.from_s = 0.5 * end_s;
+    });
+}
+
 }  // namespace
 
 Signatures catalogueSignatures(const Setup& setup, const Alignment& alignment, const Vector3d& body_m,
                                const Vector3d& normal) {
+  Bends bends;
+  addRoom(setup, body_m, normal, bends);
+  addCoils(bends);
+  addRig(setup, bends);
+  addMounting(bends);
+  addTime(setup, body_m, bends);
   Signatures all;
-  const auto add = [&](const char* id, const std::vector<Bend>& bends) { all[id] = columnsOf(alignment, bends); };
-  const Vector3d down = setup.tracker_from_jig * Vector3d(0, 0, -1);
-  const Vector3d middle_m = setup.middle_m;
-  double lowest = 0;
-  for (const Row& row : setup.rows) lowest = std::max(lowest, down.dot(setup.expected(row).position_m));
-  const Quaterniond flat = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), down);
-  add("compact_metal", tensorBends(body_m));
-  add("metal_plane",
-      {metalBend(MeshedSheet(12, 12, 0.5, 1e-4, setup.carrier_hz).solve((lowest + 0.9) * down, flat), 0.02)});
-  const Quaterniond turned_plate = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal);
-  add("finite_plate", {metalBend(MeshedSheet(6, 6, 0.1, 1e-4, setup.carrier_hz).solve(body_m, turned_plate), 0.02)});
-  add("closed_loop",
-      {metalBend(solveClosedLoop(roundLoop(body_m, normal, 0.25, 24), 0.01, 1.5e-6, setup.carrier_hz), 0.02)});
-  add("coil_gain", coilBends(true));
-  add("coil_nonorthogonality", coilBends(false));
-  add("finite_coil",
-      {[](World& world) { world.transmitter_half_m = 0.02; }, [](World& world) { world.receiver_half_m = 0.02; }});
-  add("global_gain", {[](World& world) { world.receiver *= 1 + 1e-4; }});
-  std::vector<Bend> scales, layers;
-  for (int axis = 0; axis < 3; ++axis)
-    scales.push_back(
-        rigBend([=](const Row& row) { return Vector3d((row.place_m - middle_m)[axis] * Vector3d::Unit(axis)); }));
-  for (int layer = 0; !setup.scattered && layer < setup.counts.z(); ++layer)
-    layers.push_back(rigBend([=](const Row& row) { return Vector3d(0, 0, row.k == layer ? 1 : 0); }));
-  add("grid_scale", scales);
-  add("jig_layer_offset", layers);
-  add("jig_tilt", {rigBend([=](const Row& row) { return Vector3d(row.place_m.z() - middle_m.z(), 0, 0); }),
-                   rigBend([=](const Row& row) { return Vector3d(0, row.place_m.z() - middle_m.z(), 0); })});
-  std::vector<Bend> offsets, shifts;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vector3d e = 1e-4 * Vector3d::Unit(axis);
-    offsets.emplace_back([=](World& world) {
-      world.mounting.emplace_back([=](const Row&, SolvedPose& s) { s.position_m += s.orientation * e; });
-    });
-    shifts.emplace_back(
-        [=](World& world) { world.mounting.emplace_back([=](const Row&, SolvedPose& s) { s.position_m += e; }); });
-    shifts.emplace_back([=](World& world) {
-      world.mounting.emplace_back([=](const Row&, SolvedPose& s) {
-        s.position_m = turned(e, Quaterniond::Identity()) * s.position_m;
-        s.orientation = turned(e, s.orientation);
-      });
-    });
-  }
-  add("sensor_offset", offsets);
-  add("transmitter_misalignment", shifts);
-  const double end_s = setup.duration_s();
-  add("gain_drift", {[=](World& world) {
-        world.signal.emplace_back([=](const Row& row, const SolvedPose&, Matrix3d& couplings) {
-          couplings *= 1 + 1e-4 * (1 - std::exp(-2.5 * row.start_s / end_s));
-        });
-      }});
-  std::vector<Bend> moved = tensorBends(body_m);
-  for (Bend& bend : moved)
-    bend = [inner = bend, end_s](World& world) {
-      inner(world);
-      world.metal.back().second.from_s = 0.5 * end_s;
-    };
-  add("metal_moved", moved);
+  for (const auto& [id, some] : bends) all[id] = columnsOf(alignment, some);
   for (const std::string& id : signalIds()) all[id] = Eigen::MatrixXd();
   return all;
 }
