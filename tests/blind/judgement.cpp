@@ -110,7 +110,13 @@ std::optional<double> locationError(const Session& session) {
 std::optional<double> relativeShrinkage(const Session& session) {
   if (!session.oracle_fraction || *session.oracle_fraction <= 0.0) return std::nullopt;
   if (!session.answer.is_answered || isSilent(session)) return 0.0;
-  return (1.0 - session.answer.remaining_fraction.value_or(1.0)) / *session.oracle_fraction;
+  return std::min(1.0, (1.0 - session.answer.remaining_fraction.value_or(1.0)) / *session.oracle_fraction);
+}
+
+std::optional<double> shrinkage(const Session& session) {
+  if (!session.oracle_fraction) return std::nullopt;
+  if (!session.answer.is_answered || isSilent(session)) return 0.0;
+  return 1.0 - session.answer.remaining_fraction.value_or(1.0);
 }
 
 std::vector<bool> locationCoverage(const Session& session) {

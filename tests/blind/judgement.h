@@ -39,9 +39,13 @@ double firstProbability(const Session& session);
 /// Distance of the first candidate's place from the true one.
 /// @return metres; nothing unless a right candidate and the truth both have a place
 std::optional<double> locationError(const Session& session);
-/// Shrinkage by the selected effects over the shrinkage the true effect itself gives; 0 when there is no answer.
+/// Shrinkage by the selected effects over the shrinkage the true effect itself gives; 0 when there is no answer, at
+/// most 1: to do better than the truth is luck of the noise.
 /// @return nothing where the true effect shrinks nothing or the oracle is unknown
 std::optional<double> relativeShrinkage(const Session& session);
+/// Shrinkage by the selected effects as the answer states it; 0 when there is no answer.
+/// @return nothing where there is no effect to shrink
+std::optional<double> shrinkage(const Session& session);
 
 /// For each 90 % interval that has a true value beside it: whether it holds that value.
 std::vector<bool> locationCoverage(const Session& session);

@@ -1,5 +1,6 @@
-# cmake -DNM=nm -DPROGRAM=fieldtrue-blind -P shares_no_code.cmake
-# Fails when the program holds a symbol of calib, or no symbols at all, which would prove nothing.
+# cmake -DNM=nm -DPROGRAM=fieldtrue-blind [-DSOURCES=folder] -P shares_no_code.cmake
+# Fails when the program holds a symbol of calib, or no symbols at all, which would prove nothing; and when one of its
+# sources includes a header of another layer, whose functions may be inlined and leave no symbol.
 execute_process(COMMAND ${NM} -C ${PROGRAM} OUTPUT_VARIABLE symbols RESULT_VARIABLE status)
 if(NOT status EQUAL 0)
   message(FATAL_ERROR "${NM} cannot read ${PROGRAM}")
@@ -10,4 +11,13 @@ endif()
 if(symbols MATCHES "[^\n]*fieldtrue::[^\n]*")
   message(STATUS "${PROGRAM} holds code of calib: ${CMAKE_MATCH_0}")
   message(FATAL_ERROR "fieldtrue-blind must share no code with calib")
+endif()
+if(SOURCES)
+  file(GLOB sources ${SOURCES}/*.cpp ${SOURCES}/*.h)
+  foreach(source ${sources})
+    file(STRINGS ${source} borrowed REGEX "#include +[\"<](calib|acquisition|widgets|app)/")
+    if(borrowed)
+      message(FATAL_ERROR "${source} borrows: ${borrowed}")
+    endif()
+  endforeach()
 endif()
