@@ -15,6 +15,7 @@
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/gap_json.h"
+#include "widgets/report/gap_section.h"
 
 /// diagnose, plan-check, blind: the gap between the simulation and what was recorded.
 namespace fieldtrue::cli {
@@ -27,6 +28,7 @@ struct DiagnoseOptions {
   std::string samples;
   std::string scene;
   std::string out;
+  std::string html;
   std::string updated_scene;
 };
 
@@ -89,6 +91,10 @@ Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common)
   if (!report) return notPossible(report.error());
   if (const auto written = writeGapReport(options.out, *report); !written) return notPossible(written.error());
   Answer answer{gapText(*report) + "\nWritten to " + options.out + "\n", toJson(*report), input->notes};
+  if (!options.html.empty()) {
+    if (const auto written = writeGapHtml(*report, options.html); !written) return notPossible(written.error());
+    answer.text += "Page written to " + options.html + "\n";
+  }
   if (!options.updated_scene.empty()) {
     const Scene updated = updatedScene(input->scene.value_or(Scene{}), *report);
     if (const auto written = writeScene(options.updated_scene, updated); !written) return notPossible(written.error());
@@ -109,6 +115,7 @@ void addDiagnose(CommandLine& line) {
                    "What the simulator believes (*.scene.json); default an ideal tracker in free space")
       ->type_name("FILE");
   command->add_option("--out", options->out, "Report to write (*.gap.json)")->type_name("FILE")->required();
+  command->add_option("--html", options->html, "Page to write beside it")->type_name("FILE");
   command
       ->add_option("--updated-scene", options->updated_scene, "Scene to write with the effects that were found added")
       ->type_name("FILE");

@@ -4,6 +4,7 @@
 #include "calib/simulation/scene.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
+#include "tests/support/xml_tree.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -36,7 +37,8 @@ class CliGapTest : public QObject {
 
   void metalIsFoundAddedAndGone() {
     FT_VERIFY_STATUS(simulated("metal.scene.json", "metal", 1), 0);
-    const CliRun first = diagnosed("metal", "clean.scene.json", {"--updated-scene", at("updated.scene.json")});
+    const CliRun first = diagnosed("metal", "clean.scene.json",
+                                   {"--updated-scene", at("updated.scene.json"), "--html", at("metal.html")});
     FT_VERIFY_STATUS(first, 0);
     const json report = json::parse(readWhole(at("metal.gap.json")).toStdString());
     for (const char* key :
@@ -59,6 +61,10 @@ class CliGapTest : public QObject {
     }
     FT_VERIFY_MATCH(near(probability, 1.0, 1e-9));
     QVERIFY(has_none);
+    QString error;
+    const auto page = parseXml(readWhole(at("metal.html")), error);
+    QVERIFY2(error.isEmpty(), qPrintable(error));
+    QVERIFY(page->text.contains(QString::fromStdString(report["text"].get<std::string>())));
     QVERIFY(first.out.startsWith("explained: "));
     QVERIFY(first.out.contains("compact_metal"));
 

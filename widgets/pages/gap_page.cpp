@@ -1,0 +1,392 @@
+#include "widgets/pages/gap_page.h"
+
+#include <Eigen/Eigenvalues>
+#include <QCheckBox>
+#include <QFileDialog>
+#include <QHBoxLayout>
+#include <QLabel>
+#include <QProgressBar>
+#include <QPushButton>
+#include <QScrollArea>
+#include <QSplitter>
+#include <QStackedWidget>
+#include <QStyle>
+#include <QThreadPool>
+#include <QVBoxLayout>
+#include <algorithm>
+#include <cmath>
+
+#include "calib/core/file_io.h"
+#include "calib/gap/diagnosis.h"
+#include "calib/gap/gap_json.h"
+#include "widgets/pages/background.h"
+#include "widgets/pages/empty_page.h"
+#include "widgets/report/gap_section.h"
+#include "widgets/report/thread_pool.h"
+#include "widgets/views/field_scale.h"
+#include "widgets/views/field_view.h"
+#include "widgets/views/gap_bar_view.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr std::size_t kFewestRows = 12;
+constexpr int kInspectorWidth = 432;
+/// A 90 % ball about a normally distributed point in space: sqrt of chi-square with 3 degrees of freedom at 0.9.
+constexpr double kBall90 = 2.500;
+
+void restyle(QWidget* widget) {
+  widget->style()->unpolish(widget);
+  widget->style()->polish(widget);
+}
+
+Result<GapReport> diagnoseWithCalib(const CalibrationTable& table, const SampleTable* samples, const Scene* scene,
+                                    const RunControl& control) {
+  return diagnose(table, samples, scene, {}, control);
+}
+
+/// Where metal is believed to be, as balls as large as the largest axis of the 90 % region.
+std::vector<SceneCell> believedPlaces(const GapReport& report) {
+  std::vector<SceneCell> cells;
+  for (const SelectedEffect& effect : report.selected) {
+    if (!effect.location_m || !effect.location_covariance_m2) continue;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(*effect.location_covariance_m2);
+    const double radius_m = kBall90 * std::sqrt(std::max(0.0, axes.eigenvalues().maxCoeff()));
+    if (radius_m > 0.0) cells.push_back({*effect.location_m, radius_m});
+  }
+  return cells;
+}
+
+}  // namespace
+
+GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
+    : QWidget(parent), workbench_(workbench), diagnose_(diagnose ? std::move(diagnose) : diagnoseWithCalib) {
+  auto* content = new QWidget(this);
+  auto* rows = new QVBoxLayout(content);
+  rows->setContentsMargins(0, 0, 0, 0);
+  rows->setSpacing(0);
+  rows->addWidget(makeHeader());
+  auto* splitter = new QSplitter(content);
+  splitter->addWidget(makeFieldSide());
+  splitter->addWidget(makeInspector());
+  splitter->setStretchFactor(0, 1);
+  splitter->setSizes({880, kInspectorWidth});
+  splitter->setCollapsible(0, false);
+  rows->addWidget(splitter, 1);
+  stack_ = new QStackedWidget(this);
+  stack_->addWidget(new EmptyPage(
+      tr("Nothing to diagnose yet."),
+      tr("At least %1 places must be taken; then the recording is held against the simulation.").arg(kFewestRows),
+      {{tr("Acquire"), [this] { workbench_.goToStep(Step::kAcquire); }},
+       {tr("Run the demonstration"), [this] { workbench_.startDemonstration(); }}},
+      this));
+  stack_->addWidget(content);
+  auto* layout = new QVBoxLayout(this);
+  layout->setContentsMargins(0, 0, 0, 0);
+  layout->addWidget(stack_);
+  connect(&workbench_, &Workbench::tableChanged, this,
+          [this] { setRecording(workbench_.table(), workbench_.samples()); });
+  connect(&workbench_, &Workbench::closing, this, &GapPage::stop);
+  setRecording(workbench_.table(), workbench_.samples());
+}
+
+GapPage::~GapPage() {
+  stop_.request_stop();
+  QThreadPool::globalInstance()->waitForDone();
+}
+
+QWidget* GapPage::makeHeader() {
+  header_ = new QWidget(this);
+  header_->setObjectName(QStringLiteral("verdictBar"));
+  header_->setAttribute(Qt::WA_StyledBackground);
+  auto* layout = new QHBoxLayout(header_);
+  layout->setContentsMargins(20, 8, 20, 8);
+  layout->setSpacing(20);
+  auto* texts = new QVBoxLayout;
+  texts->setSpacing(2);
+  const auto add = [&](const char* name, const char* role) {
+    auto* label = new QLabel(header_);
+    label->setObjectName(QLatin1String(name));
+    label->setProperty("role", role);
+    label->setWordWrap(true);
+    label->setTextInteractionFlags(Qt::TextSelectableByMouse);
+    texts->addWidget(label);
+    return label;
+  };
+  headline_ = add("headline", "headline");
+  sentence_ = add("gapSentence", "title");
+  next_ = add("gapNext", "heading");
+  believed_ = add("gapBelieved", "muted");
+  layout->addLayout(texts, 1);
+  layout->addWidget(makeButtons(header_), 0, Qt::AlignTop);
+  return header_;
+}
+
+QPushButton* GapPage::addButton(QWidget* parent, const QString& words, const char* name, void (GapPage::*slot)()) {
+  auto* button = new QPushButton(words, parent);
+  button->setObjectName(QLatin1String(name));
+  connect(button, &QPushButton::clicked, this, slot);
+  return button;
+}
+
+QWidget* GapPage::makeButtons(QWidget* header) {
+  auto* buttons = new QWidget(header);
+  auto* grid = new QGridLayout(buttons);
+  grid->setContentsMargins(0, 4, 0, 0);
+  run_ = addButton(buttons, tr("&Diagnose"), "diagnose", &GapPage::runOrStop);
+  choose_ = addButton(buttons, tr("&Believed scene..."), "chooseScene", &GapPage::chooseScene);
+  add_ = addButton(buttons, tr("&Add to the simulation"), "addToSimulation", &GapPage::addToSimulation);
+  undo_ = addButton(buttons, tr("&Undo"), "undoAdd", &GapPage::undo);
+  save_report_ = addButton(buttons, tr("Save &report..."), "saveGapReport", &GapPage::chooseReportFile);
+  save_scene_ = addButton(buttons, tr("Save s&cene..."), "saveGapScene", &GapPage::chooseSceneFile);
+  progress_ = new QProgressBar(buttons);
+  progress_->setObjectName(QStringLiteral("gapProgress"));
+  progress_->setRange(0, 1000);
+  progress_->setAccessibleName(tr("Diagnosis"));
+  QPushButton* order[] = {run_, choose_, add_, undo_, save_report_, save_scene_};
+  for (int i = 0; i < 6; ++i) grid->addWidget(order[i], i / 2, i % 2);
+  grid->addWidget(progress_, 3, 0, 1, 2);
+  return buttons;
+}
+
+QWidget* GapPage::makeFieldSide() {
+  auto* side = new QWidget(this);
+  auto* layout = new QVBoxLayout(side);
+  layout->setContentsMargins(0, 0, 0, 0);
+  layout->setSpacing(0);
+  after_ = new QCheckBox(tr("Show what is &left with the causes added"), side);
+  after_->setObjectName(QStringLiteral("showAfter"));
+  after_->setContentsMargins(12, 8, 12, 8);
+  connect(after_, &QCheckBox::toggled, this, &GapPage::showField);
+  field_ = new FieldView(side);
+  field_->setObjectName(QStringLiteral("gapField"));
+  layout->addWidget(after_);
+  layout->addWidget(field_, 1);
+  return side;
+}
+
+QWidget* GapPage::makeInspector() {
+  auto* inspector = new QScrollArea(this);
+  inspector->setObjectName(QStringLiteral("inspector"));
+  inspector->setWidgetResizable(true);
+  inspector->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  inspector->setMinimumWidth(320);
+  charts_ = new QWidget(inspector);
+  charts_layout_ = new QVBoxLayout(charts_);
+  charts_layout_->setContentsMargins(12, 12, 12, 12);
+  charts_layout_->setSpacing(16);
+  inspector->setWidget(charts_);
+  return inspector;
+}
+
+void GapPage::setRecording(const CalibrationTable& table, const SampleTable& samples) {
+  stop();
+  table_ = table;
+  samples_ = samples;
+  report_.reset();
+  const auto usable = std::count_if(table_.nodes.begin(), table_.nodes.end(),
+                                    [](const Node& node) { return node.role != NodeRole::kSkipped; });
+  stack_->setCurrentIndex(static_cast<std::size_t>(usable) >= kFewestRows ? 1 : 0);
+  showReport();
+}
+
+void GapPage::setScene(const std::optional<Scene>& scene) {
+  stop();
+  scene_ = scene;
+  earlier_scenes_.clear();
+  report_.reset();
+  showReport();
+}
+
+void GapPage::runOrStop() {
+  if (diagnosing_) {
+    stop();
+    showReport();
+  } else {
+    run();
+  }
+}
+
+void GapPage::run() {
+  stop();
+  stop_ = std::stop_source();
+  diagnosing_ = true;
+  const int run = ++run_count_;
+  RunControl control;
+  control.parallel_for = threadedFor(0);
+  control.stop = stop_.get_token();
+  control.progress = [this, run](double fraction) {
+    QMetaObject::invokeMethod(
+        this,
+        [this, run, fraction] {
+          if (run == run_count_) progress_->setValue(static_cast<int>(fraction * 1000.0));
+        },
+        Qt::QueuedConnection);
+  };
+  progress_->setValue(0);
+  showReport();
+  runInBackground(
+      this,
+      [diagnose = diagnose_, table = table_, samples = samples_, scene = scene_, control] {
+        return diagnose(table, samples.rows.empty() ? nullptr : &samples, scene ? &*scene : nullptr, control);
+      },
+      [this, run](Result<GapReport> result) { onResult(run, std::move(result)); });
+}
+
+void GapPage::stop() {
+  if (!diagnosing_) return;
+  stop_.request_stop();
+  ++run_count_;
+  diagnosing_ = false;
+  emit diagnosed();
+}
+
+void GapPage::onResult(int run, Result<GapReport> result) {
+  if (run != run_count_) return;
+  diagnosing_ = false;
+  if (result) {
+    report_ = std::move(*result);
+  } else {
+    report_.reset();
+    if (result.error().code != ErrorCode::kCancelled)
+      workbench_.showMessage({QString::fromStdString(result.error().message), Severity::kAttention, {}, {}});
+  }
+  showReport();
+  emit diagnosed();
+}
+
+void GapPage::addToSimulation() {
+  if (!report_ || report_->selected.empty()) return;
+  earlier_scenes_.push_back(scene_);
+  scene_ = updatedScene(scene_.value_or(Scene{}), *report_);
+  run();
+}
+
+void GapPage::undo() {
+  if (earlier_scenes_.empty()) return;
+  scene_ = earlier_scenes_.back();
+  earlier_scenes_.pop_back();
+  run();
+}
+
+void GapPage::chooseScene() {
+  const QString path =
+      QFileDialog::getOpenFileName(this, tr("Scene the simulator believes"), {}, tr("Scenes (*.scene.json)"));
+  if (path.isEmpty()) return;
+  auto scene = readScene(path.toStdString());
+  if (!scene) {
+    workbench_.showMessage({QString::fromStdString(scene.error().message), Severity::kAttention, {}, {}});
+    return;
+  }
+  setScene(*scene);
+}
+
+void GapPage::chooseReportFile() {
+  const QString path = QFileDialog::getSaveFileName(this, tr("Save the diagnosis"), QStringLiteral("room.gap.json"),
+                                                    tr("Gap reports (*.gap.json)"));
+  if (!path.isEmpty()) tell(saveReport(path), path);
+}
+
+void GapPage::chooseSceneFile() {
+  const QString path = QFileDialog::getSaveFileName(this, tr("Save the scene"), QStringLiteral("room.scene.json"),
+                                                    tr("Scenes (*.scene.json)"));
+  if (!path.isEmpty()) tell(saveScene(path), path);
+}
+
+void GapPage::tell(const Result<void>& written, const QString& path) {
+  workbench_.showMessage(written ? Message{tr("Written to %1.").arg(path), Severity::kInfo, {}, {}}
+                                 : Message{QString::fromStdString(written.error().message), Severity::kDanger, {}, {}});
+}
+
+Result<void> GapPage::saveReport(const QString& path) const {
+  if (!report_) return fail(ErrorCode::kBadInput, "There is no diagnosis to save yet; press Diagnose first");
+  if (const auto written = writeGapReport(path.toStdString(), *report_); !written) return written;
+  return writeGapHtml(*report_, (path + QStringLiteral(".html")).toStdString());
+}
+
+Result<void> GapPage::saveScene(const QString& path) const {
+  const Scene scene = scene_.value_or(Scene{});
+  return writeFileAtomically(path.toStdString(), [&](std::ostream& out) { out << toJson(scene).dump(2) << '\n'; });
+}
+
+void GapPage::showReport() {
+  showWords();
+  showField();
+  showCharts();
+  showButtons();
+}
+
+void GapPage::showWords() {
+  believed_->setText(scene_
+                         ? tr("The simulation holds %n effect(s).", nullptr, static_cast<int>(scene_->effects.size()))
+                         : tr("The simulation is an ideal tracker in free space."));
+  const bool matches =
+      report_ && (report_->verdict == GapVerdict::kNoGap || report_->verdict == GapVerdict::kExplained);
+  header_->setProperty("state", !report_ ? "" : matches ? "apply" : "leave");
+  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(widget);
+  QString next;
+  if (report_) {
+    headline_->setText(QString::fromStdString(gapHeadline(*report_)));
+    sentence_->setText(QString::fromStdString(report_->text));
+    next = QString::fromStdString(report_->next_measurement);
+    if (!next.isEmpty()) next = tr("Next measurement: %1").arg(next);
+    const QString prediction = QString::fromStdString(predictionText(*report_));
+    if (!prediction.isEmpty()) next += (next.isEmpty() ? QString() : QStringLiteral("\n")) + prediction;
+  } else {
+    headline_->setText(diagnosing_ ? tr("Diagnosing...") : tr("Not diagnosed yet"));
+    sentence_->setText(diagnosing_ ? tr("Trying every known cause on places it has not seen.")
+                                   : tr("Press Diagnose to see where simulation and recording differ, and why."));
+  }
+  next_->setText(next);
+  next_->setVisible(!next.isEmpty());
+}
+
+void GapPage::showField() {
+  if (!report_) {
+    field_->setField({});
+    field_->setHoles({});
+    return;
+  }
+  const FieldScale scale = fieldScale(gapField(*report_, false));
+  field_->setField(gapField(*report_, after_->isChecked()));
+  field_->setScaleMax_mm(scale.max_mm);
+  field_->setMagnification(scale.magnification);
+  field_->setHoles(believedPlaces(*report_));
+}
+
+void GapPage::showCharts() {
+  while (QLayoutItem* item = charts_layout_->takeAt(0)) {
+    delete item->widget();
+    delete item;
+  }
+  if (!report_) return;
+  for (const GapBarChart& chart : gapCharts(*report_)) {
+    auto* view = new GapBarView(charts_);
+    view->setChart(chart);
+    charts_layout_->addWidget(view);
+  }
+  for (const GapFinding& finding : report_->findings) {
+    auto* words = new QLabel(QString::fromStdString(finding.text), charts_);
+    words->setObjectName(QStringLiteral("gapFinding"));
+    words->setWordWrap(true);
+    charts_layout_->addWidget(words);
+  }
+  charts_layout_->addStretch(1);
+}
+
+void GapPage::showButtons() {
+  run_->setText(diagnosing_ ? tr("&Stop") : report_ ? tr("&Diagnose again") : tr("&Diagnose"));
+  run_->setProperty("primary", !report_);
+  const bool can_add = !diagnosing_ && report_ && !report_->selected.empty();
+  add_->setProperty("primary", can_add);
+  for (QWidget* button : {run_, add_}) restyle(button);
+  add_->setEnabled(can_add);
+  undo_->setEnabled(!diagnosing_ && !earlier_scenes_.empty());
+  choose_->setEnabled(!diagnosing_);
+  save_report_->setEnabled(!diagnosing_ && report_.has_value());
+  save_scene_->setEnabled(!diagnosing_);
+  after_->setEnabled(report_.has_value());
+  progress_->setVisible(diagnosing_);
+}
+
+}  // namespace fieldtrue

@@ -1,0 +1,157 @@
+#include "widgets/report/gap_section.h"
+
+#include <algorithm>
+
+#include "calib/core/file_io.h"
+#include "widgets/report/html_writer.h"
+#include "widgets/report/numbers.h"
+#include "widgets/report/report_style.h"
+#include "widgets/views/field_scale.h"
+#include "widgets/views/gap_bars.h"
+#include "widgets/views/picture.h"
+
+namespace fieldtrue {
+namespace {
+
+constexpr QSize kFieldSize(900, 700);
+constexpr int kChartWidth = 560;
+constexpr int kRowHeight = 48;
+
+std::string dataUrl(const QImage& image) { return "data:image/png;base64," + pngBytes(image).toBase64().toStdString(); }
+
+void writeField(HtmlWriter& html, const GapReport& report, bool after, const FieldScale& scale) {
+  const ErrorField field = gapField(report, after);
+  QString why;
+  const auto draw = [&](bool dark) {
+    return renderFieldPicture(field, scale.max_mm, scale.magnification, kFieldSize, dark, &why);
+  };
+  const QImage light = draw(false);
+  const QImage dark = light.isNull() ? QImage() : draw(true);
+  if (light.isNull() || dark.isNull()) {
+    html.element("p", "Picture could not be drawn: " + why.toStdString() + ".", {{"class", "notice"}});
+    return;
+  }
+  const std::string caption = field.title.toStdString() + "; colours to " + significantText(scale.max_mm) +
+                              " mm, arrows x" + significantText(scale.magnification, 2);
+  html.open("figure", {{"id", after ? "gap-after" : "gap-before"}});
+  html.open("picture");
+  html.emptyElement("source", {{"media", "screen and (prefers-color-scheme: dark)"}, {"srcset", dataUrl(dark)}});
+  html.emptyElement("img", {{"src", dataUrl(light)}, {"alt", caption}});
+  html.close();
+  html.element("figcaption", caption);
+  html.close();
+}
+
+void writeLine(HtmlWriter& html, double x1, double x2, double y1, double y2) {
+  html.element("line", "",
+               {{"x1", decimalText(x1, 1)},
+                {"x2", decimalText(x2, 1)},
+                {"y1", decimalText(y1, 1)},
+                {"y2", decimalText(y2, 1)},
+                {"stroke", "currentColor"},
+                {"stroke-width", "1.5"}});
+}
+
+void writeBar(HtmlWriter& html, const GapBar& bar, double scale, double top) {
+  const std::string color = bar.muted ? "var(--muted)" : "var(--text)";
+  html.element("text", bar.name, {{"x", "0"}, {"y", decimalText(top + 14, 1)}, {"fill", color}});
+  html.element(
+      "text", bar.text,
+      {{"x", std::to_string(kChartWidth)}, {"y", decimalText(top + 14, 1)}, {"fill", color}, {"text-anchor", "end"}});
+  html.element("rect", "",
+               {{"x", "0"},
+                {"y", decimalText(top + 20, 1)},
+                {"width", decimalText(scale * bar.value, 1)},
+                {"height", "10"},
+                {"fill", bar.muted ? "var(--line)" : "var(--accent)"}});
+  if (bar.low90 && bar.high90)
+    writeLine(html, scale * std::max(0.0, *bar.low90), scale * *bar.high90, top + 25, top + 25);
+  if (bar.floor) writeLine(html, scale * *bar.floor, scale * *bar.floor, top + 17, top + 33);
+  if (!bar.note.empty())
+    html.element("text", bar.note,
+                 {{"x", "0"}, {"y", decimalText(top + 43, 1)}, {"fill", "var(--muted)"}, {"font-size", "11"}});
+}
+
+void writeChart(HtmlWriter& html, const GapBarChart& chart) {
+  const auto height = static_cast<int>(chart.bars.size()) * kRowHeight;
+  html.open("figure", {{"id", "gap-" + chart.id}});
+  html.open("svg", {{"xmlns", "http://www.w3.org/2000/svg"},
+                    {"viewBox", "0 0 " + std::to_string(kChartWidth) + " " + std::to_string(height)},
+                    {"role", "img"},
+                    {"aria-label", chart.title},
+                    {"font-size", "14"}});
+  const double scale = kChartWidth / chart.maximum();
+  double top = 0.0;
+  for (const GapBar& bar : chart.bars) {
+    writeBar(html, bar, scale, top);
+    top += kRowHeight;
+  }
+  html.close();
+  html.element("figcaption", chart.title);
+  html.close();
+}
+
+void writeFindings(HtmlWriter& html, const GapReport& report) {
+  if (report.findings.empty()) return;
+  html.element("h3", "What the readings themselves showed");
+  html.open("ul");
+  for (const GapFinding& finding : report.findings) html.element("li", finding.text);
+  html.close();
+}
+
+void writeFields(HtmlWriter& html, const GapReport& report, bool with_pictures) {
+  if (!with_pictures) {
+    html.element("p", "Pictures could not be drawn: they were not asked for.", {{"class", "notice"}});
+    return;
+  }
+  const FieldScale scale = fieldScale(gapField(report, false));
+  html.open("div", {{"class", "pictures"}});
+  writeField(html, report, false, scale);
+  writeField(html, report, true, scale);
+  html.close();
+}
+
+}  // namespace
+
+ErrorField gapField(const GapReport& report, bool after) {
+  ErrorField field;
+  field.title = after ? QStringLiteral("Gap with the causes added") : QStringLiteral("Gap as simulated now");
+  for (const GapNode& node : report.nodes) {
+    FieldArrow arrow;
+    arrow.from_m = node.place_m;
+    arrow.error_m = after ? node.after_m : node.before_m;
+    arrow.node = node.node;
+    arrow.validation = node.is_flagged;
+    arrow.name =
+        QStringLiteral("place %1%2").arg(node.node).arg(node.is_flagged ? QStringLiteral(", beyond noise") : QString());
+    field.arrows.push_back(std::move(arrow));
+  }
+  return field;
+}
+
+void writeGapSection(HtmlWriter& html, const GapReport& report, bool with_pictures) {
+  html.element("h2", "Simulation and reality");
+  html.element("p", gapHeadline(report), {{"class", "verdict"}});
+  html.element("p", report.text, {{"class", "lead"}});
+  if (!report.next_measurement.empty()) html.element("p", "Next measurement: " + report.next_measurement);
+  const std::string prediction = predictionText(report);
+  if (!prediction.empty()) html.element("p", "To be checked: " + prediction);
+  writeFields(html, report, with_pictures);
+  html.open("div", {{"class", "pictures"}});
+  for (const GapBarChart& chart : gapCharts(report)) writeChart(html, chart);
+  html.close();
+  writeFindings(html, report);
+}
+
+std::string gapHtml(const GapReport& report, bool with_pictures) {
+  HtmlWriter html("Simulation and reality", kReportStyle);
+  writeGapSection(html, report, with_pictures);
+  return html.finish().toStdString();
+}
+
+Result<void> writeGapHtml(const GapReport& report, const std::filesystem::path& path) {
+  const std::string page = gapHtml(report);
+  return writeFileAtomically(path, [&](std::ostream& out) { out << page; });
+}
+
+}  // namespace fieldtrue

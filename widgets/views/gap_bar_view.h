@@ -1,0 +1,28 @@
+#pragma once
+
+#include <QWidget>
+
+#include "widgets/views/gap_bars.h"
+
+namespace fieldtrue {
+
+/// Horizontal bars with their names, values, whiskers and notes.
+class GapBarView : public QWidget {
+  Q_OBJECT
+ public:
+  explicit GapBarView(QWidget* parent = nullptr);
+  void setChart(const GapBarChart& chart);
+  const GapBarChart& chart() const { return chart_; }
+  QSize sizeHint() const override;
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+
+ private:
+  int rowHeight(const GapBar& bar) const;
+  void drawBar(QPainter& painter, const GapBar& bar, int top) const;
+
+  GapBarChart chart_;
+};
+
+}  // namespace fieldtrue
