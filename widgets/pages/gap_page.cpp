@@ -1,6 +1,5 @@
 #include "widgets/pages/gap_page.h"
 
-#include <Eigen/Eigenvalues>
 #include <QCheckBox>
 #include <QFileDialog>
 #include <QHBoxLayout>
@@ -11,10 +10,9 @@
 #include <QSplitter>
 #include <QStackedWidget>
 #include <QStyle>
-#include <QThreadPool>
 #include <QVBoxLayout>
 #include <algorithm>
-#include <cmath>
+#include <mutex>
 
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
@@ -31,9 +29,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr std::size_t kFewestRows = 12;
-constexpr int kInspectorWidth = 432;
-/// A 90 % ball about a normally distributed point in space: sqrt of chi-square with 3 degrees of freedom at 0.9.
-constexpr double kBall90 = 2.500;
+constexpr int kInspectorWidth = 400;
 
 void restyle(QWidget* widget) {
   widget->style()->unpolish(widget);
@@ -45,22 +41,19 @@ Result<GapReport> diagnoseWithCalib(const CalibrationTable& table, const SampleT
   return diagnose(table, samples, scene, {}, control);
 }
 
-/// Where metal is believed to be, as balls as large as the largest axis of the 90 % region.
-std::vector<SceneCell> believedPlaces(const GapReport& report) {
-  std::vector<SceneCell> cells;
-  for (const SelectedEffect& effect : report.selected) {
-    if (!effect.location_m || !effect.location_covariance_m2) continue;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(*effect.location_covariance_m2);
-    const double radius_m = kBall90 * std::sqrt(std::max(0.0, axes.eigenvalues().maxCoeff()));
-    if (radius_m > 0.0) cells.push_back({*effect.location_m, radius_m});
-  }
-  return cells;
-}
-
 }  // namespace
 
+struct GapPage::ProgressBox {
+  std::mutex mutex;
+  GapPage* page = nullptr;  ///< Null once it is gone.
+};
+
 GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
-    : QWidget(parent), workbench_(workbench), diagnose_(diagnose ? std::move(diagnose) : diagnoseWithCalib) {
+    : QWidget(parent),
+      workbench_(workbench),
+      diagnose_(diagnose ? std::move(diagnose) : diagnoseWithCalib),
+      progress_box_(std::make_shared<ProgressBox>()) {
+  progress_box_->page = this;
   auto* content = new QWidget(this);
   auto* rows = new QVBoxLayout(content);
   rows->setContentsMargins(0, 0, 0, 0);
@@ -92,7 +85,8 @@ GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
 
 GapPage::~GapPage() {
   stop_.request_stop();
-  QThreadPool::globalInstance()->waitForDone();
+  const std::lock_guard lock(progress_box_->mutex);
+  progress_box_->page = nullptr;
 }
 
 QWidget* GapPage::makeHeader() {
@@ -184,6 +178,7 @@ void GapPage::setRecording(const CalibrationTable& table, const SampleTable& sam
   table_ = table;
   samples_ = samples;
   report_.reset();
+  for (Earlier& earlier : earlier_) earlier.report.reset();
   const auto usable = std::count_if(table_.nodes.begin(), table_.nodes.end(),
                                     [](const Node& node) { return node.role != NodeRole::kSkipped; });
   stack_->setCurrentIndex(static_cast<std::size_t>(usable) >= kFewestRows ? 1 : 0);
@@ -193,7 +188,7 @@ void GapPage::setRecording(const CalibrationTable& table, const SampleTable& sam
 void GapPage::setScene(const std::optional<Scene>& scene) {
   stop();
   scene_ = scene;
-  earlier_scenes_.clear();
+  earlier_.clear();
   report_.reset();
   showReport();
 }
@@ -207,27 +202,34 @@ void GapPage::runOrStop() {
   }
 }
 
+RunControl GapPage::controlOf(int run) {
+  RunControl control;
+  control.parallel_for = threadedFor(0);
+  control.stop = stop_.get_token();
+  control.progress = [box = progress_box_, run](double fraction) {
+    const std::lock_guard lock(box->mutex);
+    GapPage* const page = box->page;
+    if (page == nullptr) return;
+    QMetaObject::invokeMethod(
+        page,
+        [page, run, fraction] {
+          if (run == page->run_count_) page->progress_->setValue(static_cast<int>(fraction * 1000.0));
+        },
+        Qt::QueuedConnection);
+  };
+  return control;
+}
+
 void GapPage::run() {
   stop();
   stop_ = std::stop_source();
   diagnosing_ = true;
   const int run = ++run_count_;
-  RunControl control;
-  control.parallel_for = threadedFor(0);
-  control.stop = stop_.get_token();
-  control.progress = [this, run](double fraction) {
-    QMetaObject::invokeMethod(
-        this,
-        [this, run, fraction] {
-          if (run == run_count_) progress_->setValue(static_cast<int>(fraction * 1000.0));
-        },
-        Qt::QueuedConnection);
-  };
   progress_->setValue(0);
   showReport();
   runInBackground(
       this,
-      [diagnose = diagnose_, table = table_, samples = samples_, scene = scene_, control] {
+      [diagnose = diagnose_, table = table_, samples = samples_, scene = scene_, control = controlOf(run)] {
         return diagnose(table, samples.rows.empty() ? nullptr : &samples, scene ? &*scene : nullptr, control);
       },
       [this, run](Result<GapReport> result) { onResult(run, std::move(result)); });
@@ -238,7 +240,6 @@ void GapPage::stop() {
   stop_.request_stop();
   ++run_count_;
   diagnosing_ = false;
-  emit diagnosed();
 }
 
 void GapPage::onResult(int run, Result<GapReport> result) {
@@ -252,21 +253,24 @@ void GapPage::onResult(int run, Result<GapReport> result) {
       workbench_.showMessage({QString::fromStdString(result.error().message), Severity::kAttention, {}, {}});
   }
   showReport();
-  emit diagnosed();
 }
 
 void GapPage::addToSimulation() {
   if (!report_ || report_->selected.empty()) return;
-  earlier_scenes_.push_back(scene_);
-  scene_ = updatedScene(scene_.value_or(Scene{}), *report_);
+  Scene updated = updatedScene(scene_.value_or(Scene{}), *report_);
+  earlier_.push_back({std::move(scene_), std::move(report_)});
+  scene_ = std::move(updated);
+  report_.reset();
   run();
 }
 
 void GapPage::undo() {
-  if (earlier_scenes_.empty()) return;
-  scene_ = earlier_scenes_.back();
-  earlier_scenes_.pop_back();
-  run();
+  if (earlier_.empty()) return;
+  stop();
+  scene_ = std::move(earlier_.back().scene);
+  report_ = std::move(earlier_.back().report);
+  earlier_.pop_back();
+  showReport();
 }
 
 void GapPage::chooseScene() {
@@ -314,6 +318,7 @@ void GapPage::showReport() {
   showField();
   showCharts();
   showButtons();
+  emit changed();
 }
 
 void GapPage::showWords() {
@@ -344,14 +349,12 @@ void GapPage::showWords() {
 void GapPage::showField() {
   if (!report_) {
     field_->setField({});
-    field_->setHoles({});
     return;
   }
   const FieldScale scale = fieldScale(gapField(*report_, false));
   field_->setField(gapField(*report_, after_->isChecked()));
   field_->setScaleMax_mm(scale.max_mm);
   field_->setMagnification(scale.magnification);
-  field_->setHoles(believedPlaces(*report_));
 }
 
 void GapPage::showCharts() {
@@ -381,7 +384,7 @@ void GapPage::showButtons() {
   add_->setProperty("primary", can_add);
   for (QWidget* button : {run_, add_}) restyle(button);
   add_->setEnabled(can_add);
-  undo_->setEnabled(!diagnosing_ && !earlier_scenes_.empty());
+  undo_->setEnabled(!earlier_.empty());
   choose_->setEnabled(!diagnosing_);
   save_report_->setEnabled(!diagnosing_ && report_.has_value());
   save_scene_->setEnabled(!diagnosing_);

@@ -2,6 +2,7 @@
 
 #include <QWidget>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <vector>
@@ -46,9 +47,17 @@ class GapPage : public QWidget {
   Result<void> saveScene(const QString& path) const;
 
  signals:
-  void diagnosed();  ///< A diagnosis ended, failed or was stopped.
+  void changed();  ///< A diagnosis began, ended or was dropped.
 
  private:
+  /// What undo goes back to.
+  struct Earlier {
+    std::optional<Scene> scene;
+    std::optional<GapReport> report;
+  };
+  /// Where a run that may outlive the page leaves its progress.
+  struct ProgressBox;
+
   QWidget* makeHeader();
   QWidget* makeButtons(QWidget* header);
   QWidget* makeFieldSide();
@@ -56,6 +65,7 @@ class GapPage : public QWidget {
   QPushButton* addButton(QWidget* parent, const QString& words, const char* name, void (GapPage::*slot)());
   void run();
   void stop();
+  RunControl controlOf(int run);
   void onResult(int run, Result<GapReport> result);
   void runOrStop();
   void addToSimulation();
@@ -75,9 +85,10 @@ class GapPage : public QWidget {
   CalibrationTable table_;
   SampleTable samples_;
   std::optional<Scene> scene_;
-  std::vector<std::optional<Scene>> earlier_scenes_;
+  std::vector<Earlier> earlier_;
   std::optional<GapReport> report_;
   std::stop_source stop_;
+  std::shared_ptr<ProgressBox> progress_box_;
   int run_count_ = 0;
   bool diagnosing_ = false;
 

@@ -12,6 +12,7 @@
 #include "widgets/pages/connect_page.h"
 #include "widgets/pages/device_strip.h"
 #include "widgets/pages/export_page.h"
+#include "widgets/pages/gap_page.h"
 #include "widgets/pages/message_line.h"
 #include "widgets/pages/plan_page.h"
 #include "widgets/pages/start_page.h"
@@ -45,6 +46,8 @@ MainWindow::MainWindow(QWidget* parent) : QMainWindow(parent), workbench_(new Wo
   addPage(Step::kPlan, new PlanPage(*workbench_, this));
   addPage(Step::kAcquire, new AcquirePage(*workbench_, this));
   addPage(Step::kCompare, new ComparePage(*workbench_, this));
+  gap_ = new GapPage(*workbench_, {}, this);
+  addPage(Step::kGap, gap_);
   addPage(Step::kExport, new ExportPage(*workbench_, this));
 
   connect(rail_, &StepRail::stepClicked, workbench_, &Workbench::goToStep);
@@ -54,6 +57,7 @@ MainWindow::MainWindow(QWidget* parent) : QMainWindow(parent), workbench_(new Wo
   connect(workbench_, &Workbench::statusChanged, this, &MainWindow::showStates);
   connect(workbench_, &Workbench::comparisonChanged, this, &MainWindow::showStates);
   connect(workbench_, &Workbench::correctorChanged, this, &MainWindow::showStates);
+  connect(gap_, &GapPage::changed, this, &MainWindow::showStates);
   connect(workbench_, &Workbench::sessionChanged, this, [this] {
     setWindowTitle(tr("%1 - Fieldtrue").arg(QFileInfo(workbench_->sessionPath()).completeBaseName()));
   });
@@ -101,6 +105,11 @@ void MainWindow::showStates() {
                   : handled > 0            ? StepState::kReady
                                            : StepState::kNotYet,
                   workbench_->comparison() ? tr("compared") : tr("not compared yet"));
+  rail_->setState(Step::kGap,
+                  gap_->report() ? StepState::kDone
+                  : handled > 0  ? StepState::kReady
+                                 : StepState::kNotYet,
+                  gap_->report() ? tr("diagnosed") : tr("not diagnosed yet"));
   rail_->setState(Step::kExport, workbench_->corrector() ? StepState::kReady : StepState::kNotYet,
                   workbench_->corrector() ? tr("a calibration is ready") : tr("no calibration yet"));
 }

@@ -10,6 +10,7 @@ class QStackedWidget;
 namespace fieldtrue {
 
 class DeviceStrip;
+class GapPage;
 class MessageLine;
 class StepRail;
 
@@ -35,6 +36,7 @@ class MainWindow : public QMainWindow {
   QStackedWidget* pages_;
   MessageLine* messages_;
   DeviceStrip* strip_;
+  GapPage* gap_;
   std::map<Step, QWidget*> page_of_;
 };
 

@@ -16,11 +16,12 @@ struct StepText {
   const char* icon;
   const char* label;
 };
-constexpr std::array<StepText, 6> kSteps{{{Step::kStart, "home", QT_TRANSLATE_NOOP("StepRail", "Start")},
+constexpr std::array<StepText, 7> kSteps{{{Step::kStart, "home", QT_TRANSLATE_NOOP("StepRail", "Start")},
                                           {Step::kConnect, "connect", QT_TRANSLATE_NOOP("StepRail", "Connect")},
                                           {Step::kPlan, "plan", QT_TRANSLATE_NOOP("StepRail", "Plan")},
                                           {Step::kAcquire, "acquire", QT_TRANSLATE_NOOP("StepRail", "Acquire")},
                                           {Step::kCompare, "compare", QT_TRANSLATE_NOOP("StepRail", "Compare")},
+                                          {Step::kGap, "gap", QT_TRANSLATE_NOOP("StepRail", "Gap")},
                                           {Step::kExport, "export", QT_TRANSLATE_NOOP("StepRail", "Export")}}};
 constexpr int kIconSize = 28;
 

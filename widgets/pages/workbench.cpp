@@ -20,11 +20,12 @@ struct StepName {
   Step step;
   const char* id;
 };
-constexpr std::array<StepName, 6> kStepNames{{{Step::kStart, "start"},
+constexpr std::array<StepName, 7> kStepNames{{{Step::kStart, "start"},
                                               {Step::kConnect, "connect"},
                                               {Step::kPlan, "plan"},
                                               {Step::kAcquire, "acquire"},
                                               {Step::kCompare, "compare"},
+                                              {Step::kGap, "gap"},
                                               {Step::kExport, "export"}}};
 
 constexpr int kRecentSessions = 6;

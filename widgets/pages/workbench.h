@@ -15,7 +15,7 @@
 namespace fieldtrue {
 
 /// The steps of the work, in the order of the rail.
-enum class Step { kStart, kConnect, kPlan, kAcquire, kCompare, kExport };
+enum class Step { kStart, kConnect, kPlan, kAcquire, kCompare, kGap, kExport };
 QString stepId(Step step);  ///< "acquire"; kept in the session so that it opens where it was.
 std::optional<Step> stepFromId(const QString& id);
 

@@ -8,6 +8,7 @@
 #include "widgets/report/report_style.h"
 #include "widgets/views/field_scale.h"
 #include "widgets/views/gap_bars.h"
+#include "widgets/views/gap_bodies.h"
 #include "widgets/views/picture.h"
 
 namespace fieldtrue {
@@ -114,16 +115,17 @@ void writeFields(HtmlWriter& html, const GapReport& report, bool with_pictures) 
 }  // namespace
 
 ErrorField gapField(const GapReport& report, bool after) {
+  const Pose reference_from_tracker = inverse(report.tracker_from_reference);
   ErrorField field;
   field.title = after ? QStringLiteral("Gap with the causes added") : QStringLiteral("Gap as simulated now");
+  field.reference_from_tracker = reference_from_tracker;
+  field.bodies = believedBodies(report);
   for (const GapNode& node : report.nodes) {
     FieldArrow arrow;
-    arrow.from_m = node.place_m;
-    arrow.error_m = after ? node.after_m : node.before_m;
+    arrow.from_m = reference_from_tracker * node.place_m;
+    arrow.error_m = reference_from_tracker.orientation * (after ? node.after_m : node.before_m);
     arrow.node = node.node;
-    arrow.validation = node.is_flagged;
-    arrow.name =
-        QStringLiteral("place %1%2").arg(node.node).arg(node.is_flagged ? QStringLiteral(", beyond noise") : QString());
+    arrow.flagged = node.is_flagged;
     field.arrows.push_back(std::move(arrow));
   }
   return field;

@@ -11,7 +11,8 @@ namespace fieldtrue {
 
 class HtmlWriter;
 
-/// The gap at every place as arrows in the tracker frame. @param after with the selected effects in the simulation
+/// The gap at every place as arrows in the rig's frame, with the bodies it is put down to. @param after with the
+/// selected effects in the simulation
 ErrorField gapField(const GapReport& report, bool after);
 
 /// The part of a page that tells a diagnosis: what was found, the field before and after, charts, findings.

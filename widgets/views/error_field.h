@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/core/pose.h"
+#include "widgets/views/believed_body.h"
 
 namespace fieldtrue {
 
@@ -16,6 +17,7 @@ struct FieldArrow {
   int node = 0;
   std::optional<double> angle_deg;  ///< Orientation error.
   bool validation = false;
+  bool flagged = false;                  ///< Beyond what noise explains.
   std::optional<double> uncertainty_mm;  ///< SD of the corrected position, when the method knows it.
   std::optional<double> better_mm;       ///< Differences only: error of A less that of B; negative = A is better.
   std::optional<Eigen::Vector3d>
@@ -37,6 +39,7 @@ struct ErrorField {
   QString title;
   std::vector<FieldArrow> arrows;
   Pose reference_from_tracker;
+  std::vector<BelievedBody> bodies;
 };
 
 }  // namespace fieldtrue

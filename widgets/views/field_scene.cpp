@@ -42,6 +42,7 @@ FieldScene::FieldScene(vtkRenderer* renderer)
       transmitter_part_(renderer),
       places_(renderer, Symbol::kDot),
       validation_(renderer, Symbol::kSquare),
+      flagged_(renderer, Symbol::kDiamond),
       halo_(renderer, Symbol::kThickCircle),
       arrows_(renderer),
       arcs_(addFlatActor(renderer)),
@@ -49,6 +50,7 @@ FieldScene::FieldScene(vtkRenderer* renderer)
       slice_part_(renderer),
       iso_part_(renderer),
       folds_part_(renderer),
+      bodies_part_(renderer),
       overlay_(addOverlay(renderer)) {}
 
 void FieldScene::setField(const ErrorField& field) {
@@ -57,7 +59,7 @@ void FieldScene::setField(const ErrorField& field) {
   std::vector<Eigen::Vector3d> points;
   points.reserve(field.arrows.size());
   for (const FieldArrow& arrow : field.arrows) points.push_back(arrow.from_m);
-  space_ = spaceAround(points, field.reference_from_tracker);
+  space_ = withBodies(spaceAround(points, field.reference_from_tracker), field.bodies);
   changed_ = true;
 }
 
@@ -163,6 +165,7 @@ void FieldScene::update() {
     transmitter_part_.build(field_.reference_from_tracker, space_, *theme_);
     updateMarks();
     updateArrows();
+    bodies_part_.build(field_.bodies, space_, *theme_, ratio_);
     arcs_changed_ = true;
   }
   if (changed_ || volume_changed_) updateVolume();
@@ -197,9 +200,9 @@ void FieldScene::updateArrows() {
 }
 
 void FieldScene::updateMarks() {
-  std::vector<Eigen::Vector3d> fitted, validation, selected;
+  std::vector<Eigen::Vector3d> fitted, validation, flagged, selected;
   for (const FieldArrow& arrow : field_.arrows) {
-    (arrow.validation ? validation : fitted).push_back(arrow.from_m);
+    (arrow.flagged ? flagged : arrow.validation ? validation : fitted).push_back(arrow.from_m);
     if (selected_ == arrow.node) selected.push_back(arrow.from_m);
   }
   const double pitch = space_.pitch_m.minCoeff();
@@ -209,6 +212,9 @@ void FieldScene::updateMarks() {
   validation_.setColor(theme_->text);
   validation_.setRadius(1.9 * kPlaceRadius * pitch);
   validation_.setPoints(validation);
+  flagged_.setColor(theme_->attention);
+  flagged_.setRadius(2.4 * kPlaceRadius * pitch);
+  flagged_.setPoints(flagged);
   halo_.setColor(theme_->accent);
   halo_.setRadius(0.16 * pitch);
   halo_.setPoints(selected);
@@ -237,7 +243,7 @@ void FieldScene::updateArcs(const Eigen::Matrix3d& world_from_view) {
 
 void FieldScene::faceCamera() {
   const Eigen::Matrix3d world_from_view = worldFromView(renderer_);
-  for (MarkLayer* layer : {&places_, &validation_, &halo_}) layer->face(world_from_view);
+  for (MarkLayer* layer : {&places_, &validation_, &flagged_, &halo_}) layer->face(world_from_view);
   if (!arcs_changed_ && (!show_orientation_ || world_from_view == arcs_view_)) return;
   updateArcs(world_from_view);
   arcs_view_ = world_from_view;
@@ -252,6 +258,7 @@ void FieldScene::updateOverlay() {
   content.axes = space_;
   content.labels = transmitter_part_.labels();
   for (const SceneLabel& label : folds_part_.labels()) content.labels.push_back(label);
+  for (const SceneLabel& label : bodies_part_.labels()) content.labels.push_back(label);
   const auto exceeds = [this](const FieldArrow& arrow) { return length_mm(arrow) > scale_max_mm_ * (1.0 + 1e-9); };
   const bool exceeded = std::any_of(field_.arrows.begin(), field_.arrows.end(), exceeds);
   const std::string times = "\xC3\x97" + shortNumber(magnification_);
@@ -267,6 +274,9 @@ void FieldScene::updateOverlay() {
   content.symbols.clear();
   if (std::any_of(field_.arrows.begin(), field_.arrows.end(), [](const FieldArrow& arrow) { return arrow.validation; }))
     content.symbols = {{Symbol::kDot, theme_->text_muted, "fit"}, {Symbol::kSquare, theme_->text, "validation"}};
+  if (std::any_of(field_.arrows.begin(), field_.arrows.end(), [](const FieldArrow& arrow) { return arrow.flagged; }))
+    content.symbols = {{Symbol::kDot, theme_->text_muted, "within noise"},
+                       {Symbol::kDiamond, theme_->attention, "beyond noise"}};
   content.bubble.clear();
   if (!hovered_) return;
   content.bubble = describe(static_cast<std::size_t>(*hovered_));
@@ -277,7 +287,9 @@ std::vector<std::string> FieldScene::describe(std::size_t index) const {
   const FieldArrow& arrow = field_.arrows.at(index);
   const QString name = arrow.name.isEmpty() ? QStringLiteral("place %1").arg(arrow.node) : arrow.name;
   const auto millimetres = [](double metres) { return formatLength(metres, LengthUnit::kMillimetre).toStdString(); };
-  std::vector<std::string> lines = {name.toStdString() + (arrow.validation ? " (validation)" : ""),
+  std::vector<std::string> lines = {name.toStdString() + (arrow.validation ? " (validation)"
+                                                          : arrow.flagged  ? " (beyond noise)"
+                                                                           : ""),
                                     (arrow.better_mm ? "difference " : "error ") + millimetres(arrow.error_m.norm())};
   if (arrow.error_m.allFinite())
     lines.push_back("x " + millimetres(arrow.error_m.x()) + "   y " + millimetres(arrow.error_m.y()) + "   z " +

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "widgets/views/body_part.h"
 #include "widgets/views/error_field.h"
 #include "widgets/views/room_parts.h"
 #include "widgets/views/volume_parts.h"
@@ -59,13 +60,14 @@ class FieldScene {
   vtkRenderer* renderer_;
   RoomBox box_;
   TransmitterPart transmitter_part_;
-  MarkLayer places_, validation_, halo_;
+  MarkLayer places_, validation_, flagged_, halo_;
   ArrowLayer arrows_;
   vtkSmartPointer<vtkActor> arcs_;
   HolePart holes_part_;
   SlicePart slice_part_;
   IsoPart iso_part_;
   FoldPart folds_part_;
+  BodyPart bodies_part_;
   vtkSmartPointer<Overlay> overlay_;
 
   ErrorField field_;

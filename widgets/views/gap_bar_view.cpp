@@ -10,10 +10,21 @@ namespace {
 
 constexpr int kBarHeight = 12;
 constexpr int kGap = 8;
+constexpr int kUsualWidth = 320;
+constexpr int kWrapped = Qt::AlignLeft | Qt::AlignTop | Qt::TextWordWrap;
+
+QFont boldOf(QFont font) {
+  font.setBold(true);
+  return font;
+}
 
 }  // namespace
 
-GapBarView::GapBarView(QWidget* parent) : QWidget(parent) { setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Fixed); }
+GapBarView::GapBarView(QWidget* parent) : QWidget(parent) {
+  QSizePolicy policy(QSizePolicy::Expanding, QSizePolicy::Minimum);
+  policy.setHeightForWidth(true);
+  setSizePolicy(policy);
+}
 
 void GapBarView::setChart(const GapBarChart& chart) {
   chart_ = chart;
@@ -25,16 +36,27 @@ void GapBarView::setChart(const GapBarChart& chart) {
   update();
 }
 
-int GapBarView::rowHeight(const GapBar& bar) const {
-  const int line = fontMetrics().height();
-  return line + kBarHeight + kGap + (bar.note.empty() ? 0 : line);
+int GapBarView::noteHeight(const GapBar& bar, int width) const {
+  if (bar.note.empty()) return 0;
+  return fontMetrics().boundingRect(QRect(0, 0, width, 1000), kWrapped, QString::fromStdString(bar.note)).height();
 }
 
-QSize GapBarView::sizeHint() const {
-  int height = fontMetrics().height() + kGap;
-  for (const GapBar& bar : chart_.bars) height += rowHeight(bar);
-  return {320, height + kGap};
+int GapBarView::rowHeight(const GapBar& bar, int width) const {
+  return fontMetrics().height() + kBarHeight + kGap + noteHeight(bar, width);
 }
+
+int GapBarView::titleHeight(int width) const {
+  const QFontMetrics metrics(boldOf(font()));
+  return metrics.boundingRect(QRect(0, 0, width, 1000), kWrapped, QString::fromStdString(chart_.title)).height();
+}
+
+int GapBarView::heightForWidth(int width) const {
+  int height = titleHeight(width) + kGap;
+  for (const GapBar& bar : chart_.bars) height += rowHeight(bar, width);
+  return height;
+}
+
+QSize GapBarView::sizeHint() const { return {kUsualWidth, heightForWidth(std::max(width(), kUsualWidth))}; }
 
 void GapBarView::drawBar(QPainter& painter, const GapBar& bar, int top) const {
   const Theme& colors = theme();
@@ -61,24 +83,22 @@ void GapBarView::drawBar(QPainter& painter, const GapBar& bar, int top) const {
     painter.drawLine(QPointF(scale * *bar.floor, track.top() - 2), QPointF(scale * *bar.floor, track.bottom() + 2));
   if (bar.note.empty()) return;
   painter.setPen(colors.text_muted);
-  painter.drawText(QRect(0, top + line + kBarHeight, width(), line), Qt::AlignLeft,
-                   fontMetrics().elidedText(QString::fromStdString(bar.note), Qt::ElideRight, width()));
+  painter.drawText(QRect(0, top + line + kBarHeight, width(), noteHeight(bar, width())), kWrapped,
+                   QString::fromStdString(bar.note));
 }
 
 void GapBarView::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   painter.setRenderHint(QPainter::Antialiasing);
-  QFont bold = font();
-  bold.setBold(true);
-  painter.setFont(bold);
+  const int title_height = titleHeight(width());
+  painter.setFont(boldOf(font()));
   painter.setPen(theme().text);
-  painter.drawText(QRect(0, 0, width(), fontMetrics().height()), Qt::AlignLeft,
-                   QFontMetrics(bold).elidedText(QString::fromStdString(chart_.title), Qt::ElideRight, width()));
+  painter.drawText(QRect(0, 0, width(), title_height), kWrapped, QString::fromStdString(chart_.title));
   painter.setFont(font());
-  int top = fontMetrics().height() + kGap;
+  int top = title_height + kGap;
   for (const GapBar& bar : chart_.bars) {
     drawBar(painter, bar, top);
-    top += rowHeight(bar);
+    top += rowHeight(bar, width());
   }
 }
 

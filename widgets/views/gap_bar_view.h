@@ -14,12 +14,16 @@ class GapBarView : public QWidget {
   void setChart(const GapBarChart& chart);
   const GapBarChart& chart() const { return chart_; }
   QSize sizeHint() const override;
+  bool hasHeightForWidth() const override { return true; }
+  int heightForWidth(int width) const override;
 
  protected:
   void paintEvent(QPaintEvent* event) override;
 
  private:
-  int rowHeight(const GapBar& bar) const;
+  int noteHeight(const GapBar& bar, int width) const;
+  int rowHeight(const GapBar& bar, int width) const;
+  int titleHeight(int width) const;
   void drawBar(QPainter& painter, const GapBar& bar, int top) const;
 
   GapBarChart chart_;

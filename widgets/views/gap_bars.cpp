@@ -69,8 +69,7 @@ GapBarChart waterfallChart(const GapReport& report) {
   if (chart.bars.empty()) return chart;
   GapBar floor;
   floor.name = "Noise floor";
-  floor.value = report.floor_position_mm;
-  floor.text = shortNumber(report.floor_position_mm) + " mm";
+  floor.text = "0 mm (noise itself: " + shortNumber(report.floor_position_mm) + " mm)";
   floor.muted = true;
   chart.bars.push_back(std::move(floor));
   return chart;
