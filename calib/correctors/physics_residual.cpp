@@ -202,8 +202,8 @@ std::map<int, int> foldsOf(const Places& places) {
 Result<PhysicsFit> findScene(const FitData& data, const Places& places, const Settings& settings,
                              const RunControl& control) {
   PhysicsFit none;
-  none.why_none = "it is sought in a volume only";
-  if (data.dimension < 3 || pointSpread(data.p_tracked_m).dimension < 3) return none;
+  none.why_none = "the places span no plane";
+  if (data.dimension < 2 || pointSpread(data.p_tracked_m).dimension < 2) return none;
   const auto most_places = static_cast<std::size_t>(integerSetting(settings, kSearchPlaces));
   const std::vector<std::size_t> rows = searchedRows(places, most_places);
   PhysicsFitOptions options;
