@@ -1,6 +1,7 @@
 #include "widgets/report/gap_section.h"
 
 #include <algorithm>
+#include <sstream>
 
 #include "calib/core/file_io.h"
 #include "widgets/report/html_writer.h"
@@ -16,7 +17,9 @@ namespace {
 
 constexpr QSize kFieldSize(900, 700);
 constexpr int kChartWidth = 560;
-constexpr int kRowHeight = 48;
+constexpr int kRowHeight = 38;
+constexpr int kNoteLine = 15;
+constexpr std::size_t kNoteLetters = 92;
 
 std::string dataUrl(const QImage& image) { return "data:image/png;base64," + pngBytes(image).toBase64().toStdString(); }
 
@@ -53,6 +56,21 @@ void writeLine(HtmlWriter& html, double x1, double x2, double y1, double y2) {
                 {"stroke-width", "1.5"}});
 }
 
+/// A note in lines that fit under a bar; SVG does not wrap text.
+std::vector<std::string> noteLines(const GapBar& bar) {
+  std::vector<std::string> lines;
+  std::istringstream words(bar.note);
+  for (std::string word; words >> word;) {
+    if (lines.empty() || lines.back().size() + 1 + word.size() > kNoteLetters)
+      lines.push_back(word);
+    else
+      lines.back() += " " + word;
+  }
+  return lines;
+}
+
+int rowHeight(const GapBar& bar) { return kRowHeight + kNoteLine * static_cast<int>(noteLines(bar).size()); }
+
 void writeBar(HtmlWriter& html, const GapBar& bar, double scale, double top) {
   const std::string color = bar.muted ? "var(--muted)" : "var(--text)";
   html.element("text", bar.name, {{"x", "0"}, {"y", decimalText(top + 14, 1)}, {"fill", color}});
@@ -68,13 +86,17 @@ void writeBar(HtmlWriter& html, const GapBar& bar, double scale, double top) {
   if (bar.low90 && bar.high90)
     writeLine(html, scale * std::max(0.0, *bar.low90), scale * *bar.high90, top + 25, top + 25);
   if (bar.floor) writeLine(html, scale * *bar.floor, scale * *bar.floor, top + 17, top + 33);
-  if (!bar.note.empty())
-    html.element("text", bar.note,
-                 {{"x", "0"}, {"y", decimalText(top + 43, 1)}, {"fill", "var(--muted)"}, {"font-size", "11"}});
+  double line_at = top + 43;
+  for (const std::string& line : noteLines(bar)) {
+    html.element("text", line,
+                 {{"x", "0"}, {"y", decimalText(line_at, 1)}, {"fill", "var(--muted)"}, {"font-size", "11"}});
+    line_at += kNoteLine;
+  }
 }
 
 void writeChart(HtmlWriter& html, const GapBarChart& chart) {
-  const auto height = static_cast<int>(chart.bars.size()) * kRowHeight;
+  int height = 0;
+  for (const GapBar& bar : chart.bars) height += rowHeight(bar);
   html.open("figure", {{"id", "gap-" + chart.id}});
   html.open("svg", {{"xmlns", "http://www.w3.org/2000/svg"},
                     {"viewBox", "0 0 " + std::to_string(kChartWidth) + " " + std::to_string(height)},
@@ -85,7 +107,7 @@ void writeChart(HtmlWriter& html, const GapBarChart& chart) {
   double top = 0.0;
   for (const GapBar& bar : chart.bars) {
     writeBar(html, bar, scale, top);
-    top += kRowHeight;
+    top += rowHeight(bar);
   }
   html.close();
   html.element("figcaption", chart.title);

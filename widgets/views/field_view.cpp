@@ -22,6 +22,8 @@ void FieldView::setField(const ErrorField& field) {
   setSpace(scene_->space());
 }
 
+const ErrorField& FieldView::field() const { return scene_->field(); }
+
 void FieldView::setScaleMax_mm(double scale_max_mm) {
   scene_->setScaleMax_mm(scale_max_mm);
   requestRender();

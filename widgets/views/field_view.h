@@ -21,6 +21,7 @@ class FieldView : public OrbitView {
   ~FieldView() override;
 
   void setField(const ErrorField& field);
+  const ErrorField& field() const;
   /// One colour scale for every view compared: its upper end [mm].
   void setScaleMax_mm(double scale_max_mm);
   /// Arrows (and arcs) are drawn this much larger than true; the legend says so.
