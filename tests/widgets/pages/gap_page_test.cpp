@@ -1,0 +1,314 @@
+#include "widgets/pages/gap_page.h"
+
+#include <QCheckBox>
+#include <QDir>
+#include <QElapsedTimer>
+#include <QLabel>
+#include <QProgressBar>
+#include <QPushButton>
+#include <QSignalSpy>
+#include <QTemporaryDir>
+#include <QTest>
+#include <QThreadPool>
+#include <atomic>
+#include <thread>
+
+#include "tests/support/matchers.h"
+#include "tests/widgets/gap_fixture.h"
+#include "widgets/pages/main_window.h"
+#include "widgets/views/field_view.h"
+#include "widgets/views/gap_bar_view.h"
+#include "widgets/views/gl_format.h"
+#include "widgets/views/theme.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+constexpr int kWaitMs = 120000;
+
+/// Runs until it is stopped, as a long diagnosis would.
+Result<GapReport> runUntilStopped(const CalibrationTable&, const SampleTable*, const Scene*,
+                                  const RunControl& control) {
+  while (!control.stop.stop_requested()) {
+    control.progress(0.4);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return fail(ErrorCode::kCancelled, "stopped");
+}
+
+template <class T>
+T* find(QWidget& page, const char* name) {
+  T* widget = page.findChild<T*>(QString::fromLatin1(name));
+  if (!widget) qFatal("no widget named %s", name);
+  return widget;
+}
+
+const GapBarChart& chart(GapPage& page, const char* id) {
+  return find<GapBarView>(page, (std::string("chart_") + id).c_str())->chart();
+}
+
+QString textOf(GapPage& page, const char* label) { return find<QLabel>(page, label)->text(); }
+
+}  // namespace
+
+class GapPageTest : public QObject {
+  Q_OBJECT
+
+ private slots:
+  void initTestCase();
+  void cleanup() { QThreadPool::globalInstance()->waitForDone(); }
+  void tooFewPlacesSayWhatIsMissing_data();
+  void tooFewPlacesSayWhatIsMissing();
+  void showsWhatTheReportSays();
+  void switchShowsWhatIsLeft();
+  void addAndUndoChangeTheScene();
+  void stopEndsTheRun();
+  void otherRowsDropTheReport();
+  void whyItFailedIsTold();
+  void goesWhileRunning();
+  void realDiagnosisStopsSoon();
+  void positionOnlyIsDiagnosed();
+  void windowFindsTheMetal();
+
+ private:
+  /// A page on the known room whose diagnosis answers at once.
+  std::unique_ptr<GapPage> pageThatAnswers(const GapReport& report);
+
+  QTemporaryDir folder_;
+  KnownRoom room_;
+  std::unique_ptr<Workbench> workbench_;
+  std::atomic<int> runs_ = 0;
+  std::vector<std::size_t> effects_believed_;  ///< Of the scene each run was given.
+};
+
+void GapPageTest::initTestCase() {
+  QVERIFY(folder_.isValid());
+  qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
+  qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+  applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
+  room_ = roomWithSteel();
+  workbench_ = std::make_unique<Workbench>();
+}
+
+std::unique_ptr<GapPage> GapPageTest::pageThatAnswers(const GapReport& report) {
+  runs_ = 0;
+  effects_believed_.clear();
+  const auto answer = [this, report](const CalibrationTable&, const SampleTable*, const Scene* scene,
+                                     const RunControl&) -> Result<GapReport> {
+    ++runs_;
+    effects_believed_.push_back(scene ? scene->effects.size() : 0);
+    return report;
+  };
+  auto page = std::make_unique<GapPage>(*workbench_, answer);
+  page->resize(1184, 740);
+  page->setRecording(room_.table, {});
+  find<QPushButton>(*page, "diagnose")->click();
+  if (!QTest::qWaitFor([&] { return !page->isDiagnosing(); }, kWaitMs)) qFatal("no answer");
+  return page;
+}
+
+void GapPageTest::tooFewPlacesSayWhatIsMissing_data() {
+  QTest::addColumn<int>("places");
+  QTest::newRow("none") << 0;
+  QTest::newRow("one") << 1;
+  QTest::newRow("eleven") << 11;
+}
+
+void GapPageTest::tooFewPlacesSayWhatIsMissing() {
+  QFETCH(int, places);
+  CalibrationTable table = room_.table;
+  table.nodes.resize(static_cast<std::size_t>(places));
+  GapPage page(*workbench_);
+  page.setRecording(table, {});
+  page.show();
+  QVERIFY(!find<QPushButton>(page, "diagnose")->isVisible());
+  page.setRecording(room_.table, {});
+  QVERIFY(find<QPushButton>(page, "diagnose")->isVisible());
+}
+
+void GapPageTest::showsWhatTheReportSays() {
+  const GapReport report = writtenReport();
+  const auto page = pageThatAnswers(report);
+  QCOMPARE(textOf(*page, "headline"),
+           QStringLiteral("Partly explained: ") + QString::fromStdString(effectLabel("compact_metal")));
+  QCOMPARE(textOf(*page, "gapSentence"), QString::fromStdString(report.text));
+  QVERIFY(textOf(*page, "gapNext").contains(QString::fromStdString(report.next_measurement)));
+  QVERIFY(textOf(*page, "gapNext").contains(QStringLiteral("Place 2 falls from 31 to 12 +- 4 mm")));
+
+  const GapBarChart& probability = chart(*page, "probability");
+  QCOMPARE(probability.bars.size(), std::size_t{3});
+  QCOMPARE(probability.bars[0].text, std::string("75 %"));
+  QCOMPARE(probability.bars[1].value, 0.2);
+  QVERIFY(probability.bars[0].note.find(effectLabel("finite_plate")) != std::string::npos);
+  QVERIFY(probability.bars[1].note.find("9 percent an hour") != std::string::npos);
+  const GapBarChart& shrinkage = chart(*page, "shrinkage");
+  QCOMPARE(shrinkage.bars.size(), std::size_t{2});
+  QCOMPARE(shrinkage.bars[0].value, 0.75);
+  QCOMPARE(*shrinkage.bars[0].low90, 0.6);
+  const GapBarChart& waterfall = chart(*page, "waterfall");
+  QCOMPARE(waterfall.bars.size(), std::size_t{3});
+  QCOMPARE(waterfall.bars[0].value, 4.0);
+  QCOMPARE(waterfall.bars[1].value, 1.0);
+  QCOMPARE(waterfall.bars[2].value, 0.0);
+  QVERIFY(waterfall.bars[2].text.find("1.5 mm") != std::string::npos);
+  QCOMPARE(chart(*page, "range").bars.size(), std::size_t{2});
+  QCOMPARE(*chart(*page, "range").bars[0].floor, 1.5);
+  QCOMPARE(chart(*page, "time").bars[0].value, 3.0);
+  QCOMPARE(chart(*page, "origin").bars[0].value, 0.8);
+  QCOMPARE(textOf(*page, "gapFinding"), QStringLiteral("Places 0 and 3 hold the same reading."));
+}
+
+void GapPageTest::switchShowsWhatIsLeft() {
+  const GapReport report = writtenReport();
+  const auto page = pageThatAnswers(report);
+  const ErrorField& field = find<FieldView>(*page, "gapField")->field();
+  QCOMPARE(field.arrows.size(), report.nodes.size());
+  for (std::size_t n = 0; n < report.nodes.size(); ++n) {
+    QCOMPARE(field.arrows[n].flagged, report.nodes[n].is_flagged);
+    QVERIFY((field.arrows[n].error_m - report.nodes[n].before_m).norm() < 1e-12);
+  }
+  QCOMPARE(field.bodies.size(), std::size_t{1});
+  QCOMPARE(field.bodies[0].radius_m, 0.1);
+  // Standard deviations of 2, 1 and 1 cm; a ball of 2.5 of them holds 90 %.
+  FT_VERIFY_MATCH(near(field.bodies[0].region_m.colwise().norm().maxCoeff(), 2.5 * 0.02, 1e-9));
+  find<QCheckBox>(*page, "showAfter")->setChecked(true);
+  QVERIFY((field.arrows[1].error_m - report.nodes[1].after_m).norm() < 1e-12);
+}
+
+void GapPageTest::addAndUndoChangeTheScene() {
+  const auto page = pageThatAnswers(writtenReport());
+  QVERIFY(!find<QPushButton>(*page, "undoAdd")->isEnabled());
+  find<QPushButton>(*page, "addToSimulation")->click();
+  QVERIFY(page->scene().has_value());
+  QCOMPARE(page->scene()->effects.size(), std::size_t{1});
+  QCOMPARE(page->scene()->effects[0].id, std::string("compact_metal"));
+  QTRY_VERIFY_WITH_TIMEOUT(!page->isDiagnosing(), kWaitMs);
+  QCOMPARE(effects_believed_, (std::vector<std::size_t>{0, 1}));
+  find<QPushButton>(*page, "undoAdd")->click();
+  QVERIFY(!page->scene().has_value());
+  QVERIFY(!page->isDiagnosing());
+  QVERIFY(page->report().has_value());
+  QCOMPARE(runs_.load(), 2);
+  QVERIFY(!find<QPushButton>(*page, "undoAdd")->isEnabled());
+}
+
+void GapPageTest::stopEndsTheRun() {
+  GapPage page(*workbench_, runUntilStopped);
+  page.setRecording(room_.table, {});
+  page.show();
+  auto* button = find<QPushButton>(page, "diagnose");
+  button->click();
+  QVERIFY(page.isDiagnosing());
+  QTRY_COMPARE_WITH_TIMEOUT(find<QProgressBar>(page, "gapProgress")->value(), 400, kWaitMs);
+  QVERIFY(find<QProgressBar>(page, "gapProgress")->isVisible());
+  QVERIFY(!find<QPushButton>(page, "addToSimulation")->isEnabled());
+  button->click();
+  QVERIFY(!page.isDiagnosing());
+  QVERIFY(!page.report().has_value());
+  QVERIFY(!find<QProgressBar>(page, "gapProgress")->isVisible());
+}
+
+void GapPageTest::otherRowsDropTheReport() {
+  const auto page = pageThatAnswers(writtenReport());
+  find<QPushButton>(*page, "addToSimulation")->click();
+  QTRY_VERIFY_WITH_TIMEOUT(page->report().has_value(), kWaitMs);
+  CalibrationTable fewer = room_.table;
+  fewer.nodes.pop_back();
+  page->setRecording(fewer, {});
+  QVERIFY(!page->report().has_value());
+  QVERIFY(find<FieldView>(*page, "gapField")->field().arrows.empty());
+  QVERIFY(!find<QPushButton>(*page, "saveGapReport")->isEnabled());
+  find<QPushButton>(*page, "undoAdd")->click();
+  QVERIFY(!page->report().has_value());
+  QCOMPARE(runs_.load(), 2);
+}
+
+void GapPageTest::whyItFailedIsTold() {
+  GapPage page(*workbench_, [](auto&&...) -> Result<GapReport> {
+    return fail(ErrorCode::kTooFewNodes, "Diagnosis needs 12 places, got 3");
+  });
+  page.setRecording(room_.table, {});
+  QSignalSpy messages(workbench_.get(), &Workbench::messageShown);
+  find<QPushButton>(page, "diagnose")->click();
+  QTRY_COMPARE_WITH_TIMEOUT(messages.size(), 1, kWaitMs);
+  QCOMPARE(messages[0][0].value<Message>().text, QStringLiteral("Diagnosis needs 12 places, got 3"));
+  QVERIFY(!page.isDiagnosing());
+}
+
+void GapPageTest::goesWhileRunning() {
+  auto page = std::make_unique<GapPage>(*workbench_, runUntilStopped);
+  page->setRecording(room_.table, {});
+  find<QPushButton>(*page, "diagnose")->click();
+  QTest::qWait(50);
+  QElapsedTimer timer;
+  timer.start();
+  page.reset();
+  QVERIFY(timer.elapsed() < 500);
+  QVERIFY(QThreadPool::globalInstance()->waitForDone(5000));
+  QCoreApplication::processEvents();
+}
+
+void GapPageTest::realDiagnosisStopsSoon() {
+  auto page = std::make_unique<GapPage>(*workbench_);
+  page->setRecording(room_.table, room_.samples);
+  find<QPushButton>(*page, "diagnose")->click();
+  QTest::qWait(300);
+  page.reset();
+  QVERIFY(QThreadPool::globalInstance()->waitForDone(5000));
+}
+
+void GapPageTest::positionOnlyIsDiagnosed() {
+  CalibrationTable table = room_.table;
+  for (Node& node : table.nodes) node.has_orientation = false;
+  GapPage page(*workbench_);
+  page.setRecording(table, {});
+  find<QPushButton>(page, "diagnose")->click();
+  QTRY_VERIFY_WITH_TIMEOUT(!page.isDiagnosing(), kWaitMs);
+  QVERIFY(page.report().has_value());
+  QVERIFY(page.report()->input.position_only);
+  QCOMPARE(textOf(page, "gapSentence"), QString::fromStdString(page.report()->text));
+}
+
+void GapPageTest::windowFindsTheMetal() {
+  MainWindow window;
+  window.resize(1280, 800);
+  window.show();
+  QVERIFY(QTest::qWaitForWindowExposed(&window));
+  QTest::mouseClick(find<QWidget>(window, "step_gap"), Qt::LeftButton);
+  auto* page = window.findChild<GapPage*>();
+  QVERIFY(page && page->isVisible());
+  page->setRecording(room_.table, room_.samples);
+  QTest::mouseClick(find<QWidget>(*page, "diagnose"), Qt::LeftButton);
+  QVERIFY(page->isDiagnosing());
+  QTRY_VERIFY_WITH_TIMEOUT(!page->isDiagnosing(), kWaitMs);
+  QVERIFY(page->report().has_value());
+  const ErrorField& field = find<FieldView>(*page, "gapField")->field();
+  QCOMPARE(field.arrows.size(), page->report()->nodes.size());
+  QVERIFY(!field.bodies.empty());
+  const double off_m = (field.bodies[0].center_m - room_.body_m).norm();
+  QVERIFY2(off_m < 0.1, qPrintable(QStringLiteral("%1 m from where the metal is").arg(off_m)));
+  const QString folder = qEnvironmentVariable("FIELDTRUE_ARTEFACTS");
+  if (folder.isEmpty()) return;
+  QVERIFY(QDir().mkpath(folder));
+  QTest::qWait(400);
+  QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap.png")));
+  find<QCheckBox>(*page, "showAfter")->setChecked(true);
+  QTest::qWait(400);
+  QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-after.png")));
+}
+
+int main(int argc, char** argv) {
+  if (qEnvironmentVariableIsEmpty("DISPLAY")) {
+    qInfo("skipped: there is no display; run it under xvfb-run");
+    return 0;
+  }
+  setDefaultGlFormat();
+  QApplication application(argc, argv);
+  QApplication::setApplicationName(QStringLiteral("fieldtrue-test"));
+  GapPageTest test;
+  return QTest::qExec(&test, argc, argv);
+}
+
+#include "gap_page_test.moc"
