@@ -21,7 +21,7 @@ const std::string kNoPlace = "the fitted scene has no place for some of the read
 constexpr const char* kMostEffects = "most_effects";
 constexpr const char* kSearchPlaces = "search_places";
 /// A second effect on fewer places than two times this is fitted to their noise.
-constexpr std::int64_t kPlacesPerEffect = 40;
+constexpr std::int64_t kPlacesPerEffect = 60;
 
 class PhysicsResidual : public PositionModel {
  public:
@@ -164,9 +164,11 @@ double heldOut_m2(const PositionModel& model, const FitData& rows) {
   return sum_m2;
 }
 
-/// Whether the scene, refitted with folds of places left out, foretells these better than a Gaussian process alone.
+/// Whether the scene, refitted with folds of places left out, foretells these clearly better than a Gaussian process
+/// alone.
 bool helpsHeldOut(const FitData& data, std::vector<ScenePositions>& without_fold,
                   const std::map<int, int>& fold_of_node, const Settings& settings) {
+  constexpr double kLeastGain = 0.95;  // RMS.
   Settings quick = settings;
   quick["restarts"] = std::int64_t{1};
   double with_m2 = 0.0;
@@ -185,7 +187,7 @@ bool helpsHeldOut(const FitData& data, std::vector<ScenePositions>& without_fold
     with_m2 += heldOut_m2(**with, rows);
     alone_m2 += heldOut_m2(**alone, rows);
   }
-  return with_m2 < alone_m2;
+  return with_m2 < kLeastGain * kLeastGain * alone_m2;
 }
 
 /// Folds that follow no layer of a grid, whatever its counts: multiples of the golden ratio, modulo 1.
@@ -216,7 +218,7 @@ Result<PhysicsFit> findScene(const FitData& data, const Places& places, const Se
   if (!fit || !fit->positions) return fit;
   if (!helpsHeldOut(rowsOfFitData(data, rows), fit->without_fold, options.fold_of_node, settings)) {
     fit->positions.reset();
-    fit->why_none = "the one that fits best (" + listed(fit->named) + ") foretells places left out no better";
+    fit->why_none = "the one that fits best (" + listed(fit->named) + ") does not foretell places left out 5 % better";
   }
   return fit;
 }
@@ -294,8 +296,8 @@ PositionMethod physicsResidualPosition() {
   method.settings = gaussianProcessPosition().settings;
   method.settings.push_back(
       integerOf(kMostEffects, "Most effects", 1, 4, 2,
-                "No more effects than this are sought behind the data, and no more than one for every 40 places."));
-  method.settings.push_back(integerOf(kSearchPlaces, "Places for the scene", 50, 3000, 200,
+                "No more effects than this are sought behind the data, and no more than one for every 60 places."));
+  method.settings.push_back(integerOf(kSearchPlaces, "Places for the scene", 50, 3000, 120,
                                       "With more places than these, the scene is sought on a well-spread part of them; "
                                       "the Gaussian process takes all."));
   method.fit = fitPhysicsResidual;
