@@ -108,8 +108,8 @@ QWidget* GapPage::makeHeader() {
     return label;
   };
   headline_ = add("headline", "headline");
-  sentence_ = add("gapSentence", "title");
-  next_ = add("gapNext", "heading");
+  sentence_ = add("gapSentence", "heading");
+  next_ = add("gapNext", "");
   believed_ = add("gapBelieved", "muted");
   layout->addLayout(texts, 1);
   layout->addWidget(makeButtons(header_), 0, Qt::AlignTop);
@@ -150,11 +150,13 @@ QWidget* GapPage::makeFieldSide() {
   layout->setSpacing(0);
   after_ = new QCheckBox(tr("Show what is &left with the causes added"), side);
   after_->setObjectName(QStringLiteral("showAfter"));
-  after_->setContentsMargins(12, 8, 12, 8);
   connect(after_, &QCheckBox::toggled, this, &GapPage::showField);
   field_ = new FieldView(side);
   field_->setObjectName(QStringLiteral("gapField"));
-  layout->addWidget(after_);
+  auto* switch_row = new QHBoxLayout;
+  switch_row->setContentsMargins(20, 8, 12, 8);
+  switch_row->addWidget(after_);
+  layout->addLayout(switch_row);
   layout->addWidget(field_, 1);
   return side;
 }
@@ -335,8 +337,6 @@ void GapPage::showWords() {
     sentence_->setText(QString::fromStdString(report_->text));
     next = QString::fromStdString(report_->next_measurement);
     if (!next.isEmpty()) next = tr("Next measurement: %1").arg(next);
-    const QString prediction = QString::fromStdString(predictionText(*report_));
-    if (!prediction.isEmpty()) next += (next.isEmpty() ? QString() : QStringLiteral("\n")) + prediction;
   } else {
     headline_->setText(diagnosing_ ? tr("Diagnosing...") : tr("Not diagnosed yet"));
     sentence_->setText(diagnosing_ ? tr("Trying every known cause on places it has not seen.")
@@ -357,6 +357,14 @@ void GapPage::showField() {
   field_->setMagnification(scale.magnification);
 }
 
+void GapPage::addText(const char* name, const QString& words) {
+  auto* label = new QLabel(words, charts_);
+  label->setObjectName(QLatin1String(name));
+  label->setWordWrap(true);
+  label->setTextInteractionFlags(Qt::TextSelectableByMouse);
+  charts_layout_->addWidget(label);
+}
+
 void GapPage::showCharts() {
   while (QLayoutItem* item = charts_layout_->takeAt(0)) {
     delete item->widget();
@@ -368,12 +376,9 @@ void GapPage::showCharts() {
     view->setChart(chart);
     charts_layout_->addWidget(view);
   }
-  for (const GapFinding& finding : report_->findings) {
-    auto* words = new QLabel(QString::fromStdString(finding.text), charts_);
-    words->setObjectName(QStringLiteral("gapFinding"));
-    words->setWordWrap(true);
-    charts_layout_->addWidget(words);
-  }
+  const std::string prediction = predictionText(*report_);
+  if (!prediction.empty()) addText("gapPrediction", tr("To be checked: %1").arg(QString::fromStdString(prediction)));
+  for (const GapFinding& finding : report_->findings) addText("gapFinding", QString::fromStdString(finding.text));
   charts_layout_->addStretch(1);
 }
 

@@ -78,6 +78,7 @@ class GapPage : public QWidget {
   void showWords();
   void showField();
   void showCharts();
+  void addText(const char* name, const QString& words);
   void showButtons();
 
   Workbench& workbench_;

@@ -95,7 +95,8 @@ double largestHalf_m(const BelievedBody& body) {
 }  // namespace
 
 std::string bodyLabel(const BelievedBody& body) {
-  const double half_cm = 100.0 * largestHalf_m(body);
+  const double exact_cm = 100.0 * largestHalf_m(body);
+  const double half_cm = exact_cm < 10.0 ? 0.1 * std::ceil(10.0 * exact_cm) : std::ceil(exact_cm);
   return half_cm > 0.0 ? body.name + ", \xC2\xB1 " + shortNumber(half_cm) + " cm" : body.name;
 }
 

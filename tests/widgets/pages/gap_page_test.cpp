@@ -135,7 +135,7 @@ void GapPageTest::showsWhatTheReportSays() {
            QStringLiteral("Partly explained: ") + QString::fromStdString(effectLabel("compact_metal")));
   QCOMPARE(textOf(*page, "gapSentence"), QString::fromStdString(report.text));
   QVERIFY(textOf(*page, "gapNext").contains(QString::fromStdString(report.next_measurement)));
-  QVERIFY(textOf(*page, "gapNext").contains(QStringLiteral("Place 2 falls from 31 to 12 +- 4 mm")));
+  QVERIFY(textOf(*page, "gapPrediction").contains(QStringLiteral("Place 2 falls from 31 to 12 +- 4 mm")));
 
   const GapBarChart& probability = chart(*page, "probability");
   QCOMPARE(probability.bars.size(), std::size_t{3});
