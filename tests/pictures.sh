@@ -6,17 +6,19 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 target="${1:-$root/resources/pictures}"
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
-render() { # render NAME [VARIABLE=VALUE...]
-  local name="$1"
-  shift
+render() { # render NAME TEST [VARIABLE=VALUE...]
+  local name="$1" test="$2"
+  shift 2
   mkdir -p "$work/$name"
   env QT_QPA_PLATFORM=xcb XDG_RUNTIME_DIR="$work" FIELDTRUE_ARTEFACTS="$work/$name" "$@" \
     xvfb-run --auto-servernum --server-args="-screen 0 2800x1800x24" \
-    "$root/build/ci/tests/widgets_guided_session_test" >"$work/$name.log" || { cat "$work/$name.log" >&2; exit 1; }
+    "$root/build/ci/tests/widgets_$test" >"$work/$name.log" || { cat "$work/$name.log" >&2; exit 1; }
 }
 chmod 700 "$work"
-render light
-render dark FIELDTRUE_DARK=1
+for test in guided_session_test gap_page_test; do
+  render light "$test"
+  render dark "$test" FIELDTRUE_DARK=1
+done
 mkdir -p "$target"
 cp "$work/light/4-acquire.png" "$target/acquire.png"
 cp "$work/light/5-compare.png" "$target/compare.png"
@@ -25,5 +27,7 @@ cp "$work/light/3-plan.png" "$target/plan.png"
 cp "$work/light/5-compare-two.png" "$target/compare-two.png"
 cp "$work/light/5-compare-slice.png" "$target/compare-slice.png"
 cp "$work/light/5-place-and-curve.png" "$target/node.png"
+cp "$work/light/6-gap.png" "$target/gap.png"
+cp "$work/dark/6-gap.png" "$target/gap-dark.png"
 if [ -n "${FIELDTRUE_ALL_PICTURES:-}" ]; then cp -r "$work/light" "$work/dark" "$target/"; fi
 echo "Pictures: $target"

@@ -170,6 +170,7 @@ ReportInput ExportPage::reportInput() const {
   ReportInput input;
   input.table = workbench_.table();
   if (workbench_.comparison()) input.comparison = *workbench_.comparison();
+  input.gap = workbench_.gapReport();
   input.source = workbench_.sessionPath().toStdString();
   input.plan = toJson(workbench_.plan()).dump();
   input.places = workbench_.status().places;

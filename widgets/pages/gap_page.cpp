@@ -163,7 +163,6 @@ QWidget* GapPage::makeFieldSide() {
 
 QWidget* GapPage::makeInspector() {
   auto* inspector = new QScrollArea(this);
-  inspector->setObjectName(QStringLiteral("inspector"));
   inspector->setWidgetResizable(true);
   inspector->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
   inspector->setMinimumWidth(320);
@@ -172,6 +171,7 @@ QWidget* GapPage::makeInspector() {
   charts_layout_->setContentsMargins(12, 12, 12, 12);
   charts_layout_->setSpacing(16);
   inspector->setWidget(charts_);
+  inspector->setObjectName(QStringLiteral("gapCharts"));
   return inspector;
 }
 
@@ -320,6 +320,7 @@ void GapPage::showReport() {
   showField();
   showCharts();
   showButtons();
+  workbench_.setGapReport(report_);
   emit changed();
 }
 

@@ -11,6 +11,7 @@
 #include "acquisition/session/acquisition_controller.h"
 #include "calib/correctors/corrector.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/gap/gap_report.h"
 
 namespace fieldtrue {
 
@@ -47,6 +48,9 @@ class Workbench : public QObject {
   const std::optional<Corrector>& corrector() const { return corrector_; }
   /// Whether the calibration was fitted on the rows the session has now.
   bool correctorIsCurrent() const;
+  /// Of the rows the session has now.
+  const std::optional<GapReport>& gapReport() const { return gap_report_; }
+  void setGapReport(std::optional<GapReport> report) { gap_report_ = std::move(report); }
   bool isComparing() const { return comparing_; }
   bool isFitting() const { return fitting_; }
 
@@ -112,6 +116,7 @@ class Workbench : public QObject {
   SampleTable samples_;
   std::optional<Comparison> comparison_;
   std::optional<Corrector> corrector_;
+  std::optional<GapReport> gap_report_;
   std::stop_source comparison_stop_;
   int comparison_run_ = 0;
   bool comparing_ = false;

@@ -134,6 +134,18 @@ void writeFields(HtmlWriter& html, const GapReport& report, bool with_pictures) 
   html.close();
 }
 
+void writeDiagnosis(HtmlWriter& html, const GapReport& report, bool with_pictures) {
+  html.element("p", report.text, {{"class", "lead"}});
+  if (!report.next_measurement.empty()) html.element("p", "Next measurement: " + report.next_measurement);
+  const std::string prediction = predictionText(report);
+  if (!prediction.empty()) html.element("p", "To be checked: " + prediction);
+  writeFields(html, report, with_pictures);
+  html.open("div", {{"class", "pictures"}});
+  for (const GapBarChart& chart : gapCharts(report)) writeChart(html, chart);
+  html.close();
+  writeFindings(html, report);
+}
+
 }  // namespace
 
 ErrorField gapField(const GapReport& report, bool after) {
@@ -154,22 +166,14 @@ ErrorField gapField(const GapReport& report, bool after) {
 }
 
 void writeGapSection(HtmlWriter& html, const GapReport& report, bool with_pictures) {
-  html.element("h2", "Simulation and reality");
-  html.element("p", gapHeadline(report), {{"class", "verdict"}});
-  html.element("p", report.text, {{"class", "lead"}});
-  if (!report.next_measurement.empty()) html.element("p", "Next measurement: " + report.next_measurement);
-  const std::string prediction = predictionText(report);
-  if (!prediction.empty()) html.element("p", "To be checked: " + prediction);
-  writeFields(html, report, with_pictures);
-  html.open("div", {{"class", "pictures"}});
-  for (const GapBarChart& chart : gapCharts(report)) writeChart(html, chart);
-  html.close();
-  writeFindings(html, report);
+  html.element("h2", "Simulation and reality: " + gapHeadline(report));
+  writeDiagnosis(html, report, with_pictures);
 }
 
 std::string gapHtml(const GapReport& report, bool with_pictures) {
   HtmlWriter html("Simulation and reality", kReportStyle);
-  writeGapSection(html, report, with_pictures);
+  html.element("p", gapHeadline(report), {{"class", "verdict"}});
+  writeDiagnosis(html, report, with_pictures);
   return html.finish().toStdString();
 }
 

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "calib/core/file_io.h"
+#include "widgets/report/gap_section.h"
 #include "widgets/report/html_writer.h"
 #include "widgets/report/numbers.h"
 #include "widgets/report/report_curves.h"
@@ -164,6 +165,7 @@ std::string htmlReport(const ReportInput& input) {
   writeMethods(html, input.comparison);
   writeLearningCurves(html, input.learning_curves);
   writeRegion(html, input.comparison);
+  if (input.gap) writeGapSection(html, *input.gap, input.with_pictures);
   writeMeasured(html, input);
   html.element("h2", "Places, worst first");
   writePlaceTables(html, places);

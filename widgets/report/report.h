@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "calib/core/error.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/learning_curve.h"
+#include "calib/gap/gap_report.h"
 
 namespace fieldtrue {
 
@@ -18,6 +20,7 @@ struct ReportInput {
   CalibrationTable table;                      ///< The rows that were compared.
   Comparison comparison;                       ///< Of that table.
   std::vector<LearningCurve> learning_curves;  ///< Of that table; empty = not asked for.
+  std::optional<GapReport> gap;                ///< The diagnosis of that table; none = not asked for.
   std::string source;                          ///< The file the table came from.
   std::string plan;                            ///< How the places were planned; empty = not known.
   std::vector<PlannedPlace> places;            ///< What was planned, in visiting order; empty = the table's places.

@@ -18,6 +18,7 @@ namespace {
 constexpr double kSolidOpacity = 0.55;
 constexpr double kRegionOpacity = 0.22;
 constexpr int kRingSteps = 64;
+constexpr int kWireSteps = 12;
 constexpr double kRingThickness = 0.012;  ///< Of the room's diagonal, as the next.
 constexpr double kLeastBall = 0.012;
 constexpr double kEdgeWidth_px = 2.0;
@@ -68,11 +69,23 @@ void addEllipsoid(Mesh& mesh, const Eigen::Vector3d& center_m, const Eigen::Matr
 
 void addRing(Mesh& mesh, const BelievedBody& loop, double thickness_m) {
   const auto [u, v] = across(loop.normal);
-  const auto at = [&, u = u, v = v](int i) -> Eigen::Vector3d {
+  const auto out = [&, u = u, v = v](int i) -> Eigen::Vector3d {
     const double angle = 2.0 * std::numbers::pi * i / kRingSteps;
-    return loop.center_m + loop.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
+    return std::cos(angle) * u + std::sin(angle) * v;
   };
-  for (int i = 0; i < kRingSteps; ++i) mesh.addCylinder(at(i), at(i + 1), thickness_m, 10);
+  const auto skin = [&](int i, int j) -> Eigen::Vector3d {
+    const double angle = 2.0 * std::numbers::pi * j / kWireSteps;
+    return std::cos(angle) * out(i) + std::sin(angle) * loop.normal;
+  };
+  const auto at = [&](int i, int j) -> Eigen::Vector3d {
+    return loop.center_m + loop.radius_m * out(i) + thickness_m * skin(i, j);
+  };
+  for (int i = 0; i < kRingSteps; ++i) {
+    for (int j = 0; j < kWireSteps; ++j) {
+      const Eigen::Vector3d normal = (skin(i, j) + skin(i + 1, j + 1)).normalized();
+      addFace(mesh, {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)}, normal);
+    }
+  }
 }
 
 /// Half axes no longer than the room, so that a place hardly known does not hide everything.

@@ -6,6 +6,7 @@
 #include <QLabel>
 #include <QProgressBar>
 #include <QPushButton>
+#include <QScrollArea>
 #include <QSignalSpy>
 #include <QTemporaryDir>
 #include <QTest>
@@ -294,6 +295,7 @@ void GapPageTest::windowFindsTheMetal() {
   QVERIFY(QDir().mkpath(folder));
   QTest::qWait(400);
   QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap.png")));
+  QVERIFY(find<QScrollArea>(*page, "gapCharts")->widget()->grab().save(folder + QStringLiteral("/6-gap-charts.png")));
   find<QCheckBox>(*page, "showAfter")->setChecked(true);
   QTest::qWait(400);
   QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-after.png")));

@@ -6,6 +6,7 @@
 #include "tests/support/xml_tree.h"
 #include "tests/widgets/gap_fixture.h"
 #include "widgets/report/gap_section.h"
+#include "widgets/report/report.h"
 #include "widgets/views/gap_bars.h"
 
 using namespace fieldtrue;
@@ -96,6 +97,19 @@ class GapHtmlTest : public QObject {
     const auto page = parsed(writtenReport(), true);
     const bool drawn = figure(*page, QStringLiteral("gap-before")) && figure(*page, QStringLiteral("gap-after"));
     QVERIFY(drawn || page->text.contains(QStringLiteral("Picture could not be drawn:")));
+  }
+
+  void theSessionsReportTellsItToo() {
+    ReportInput input;
+    input.with_pictures = false;
+    QVERIFY(htmlReport(input).find("Simulation and reality") == std::string::npos);
+    input.gap = writtenReport();
+    QString error;
+    const auto page = parseXml(QByteArray::fromStdString(htmlReport(input)), error);
+    QVERIFY2(error.isEmpty(), qPrintable(error));
+    QVERIFY(page->text.contains(QString::fromStdString(gapHeadline(*input.gap))));
+    QVERIFY(page->text.contains(QString::fromStdString(input.gap->text)));
+    QVERIFY(figure(*page, QStringLiteral("gap-waterfall")));
   }
 
   void writingWhereNobodyCanIsAnError() {
