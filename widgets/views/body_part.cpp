@@ -109,7 +109,7 @@ double largestHalf_m(const BelievedBody& body) {
 
 std::string bodyLabel(const BelievedBody& body) {
   const double exact_cm = 100.0 * largestHalf_m(body);
-  const double half_cm = exact_cm < 10.0 ? 0.1 * std::ceil(10.0 * exact_cm) : std::ceil(exact_cm);
+  const double half_cm = exact_cm < 10.0 ? 0.1 * std::round(10.0 * exact_cm) : std::round(exact_cm);
   return half_cm > 0.0 ? body.name + ", \xC2\xB1 " + shortNumber(half_cm) + " cm" : body.name;
 }
 

@@ -27,6 +27,7 @@
 
 #include "calib/core/table_io.h"
 #include "widgets/pages/curve_panel.h"
+#include "widgets/pages/gap_page.h"
 #include "widgets/pages/main_window.h"
 #include "widgets/pages/method_panel.h"
 #include "widgets/pages/units.h"
@@ -61,6 +62,7 @@ class GuidedSessionTest : public QObject {
   void inspectsAPlace();
   void drawsLearningCurves();
   void comparesASettingToo();
+  void diagnosesTheGap();
   void fitsAndExports();
   void reopensWhereItWas();
 
@@ -406,6 +408,20 @@ void GuidedSessionTest::comparesASettingToo() {
   QCOMPARE(window_->workbench().comparison()->position.size(),
            static_cast<std::size_t>(find<MethodPanel>("positionPanel")->tickedCount()) + 1);
   tabs->setCurrentIndex(0);
+}
+
+void GuidedSessionTest::diagnosesTheGap() {
+  click("step_gap");
+  QVERIFY(onPage("page_gap"));
+  auto* page = window_->findChild<GapPage*>();
+  QVERIFY(page && !page->report().has_value());
+  click("diagnose");
+  QTRY_VERIFY_WITH_TIMEOUT(page->report().has_value(), 120000);
+  QCOMPARE(page->report()->input.places, kPlaces);
+  QVERIFY(page->report()->verdict != GapVerdict::kNoGap);
+  QCOMPARE(find<QLabel>("gapSentence")->text(), QString::fromStdString(page->report()->text));
+  QVERIFY(window_->workbench().gapReport().has_value());
+  picture(QStringLiteral("6-gap-session"));
 }
 
 void GuidedSessionTest::fitsAndExports() {
