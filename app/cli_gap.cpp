@@ -92,7 +92,8 @@ Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common)
   if (const auto written = writeGapReport(options.out, *report); !written) return notPossible(written.error());
   Answer answer{gapText(*report) + "\nWritten to " + options.out + "\n", toJson(*report), input->notes};
   if (!options.html.empty()) {
-    if (const auto written = writeGapHtml(*report, options.html); !written) return notPossible(written.error());
+    if (const auto written = writeGapHtml(*report, options.html, &input->table); !written)
+      return notPossible(written.error());
     answer.text += "Page written to " + options.html + "\n";
   }
   if (!options.updated_scene.empty()) {

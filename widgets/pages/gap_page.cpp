@@ -307,7 +307,7 @@ void GapPage::tell(const Result<void>& written, const QString& path) {
 Result<void> GapPage::saveReport(const QString& path) const {
   if (!report_) return fail(ErrorCode::kBadInput, "There is no diagnosis to save yet; press Diagnose first");
   if (const auto written = writeGapReport(path.toStdString(), *report_); !written) return written;
-  return writeGapHtml(*report_, (path + QStringLiteral(".html")).toStdString());
+  return writeGapHtml(*report_, (path + QStringLiteral(".html")).toStdString(), &table_);
 }
 
 Result<void> GapPage::saveScene(const QString& path) const {
@@ -352,8 +352,8 @@ void GapPage::showField() {
     field_->setField({});
     return;
   }
-  const FieldScale scale = fieldScale(gapField(*report_, false));
-  field_->setField(gapField(*report_, after_->isChecked()));
+  const FieldScale scale = fieldScale(gapField(*report_, false, &table_));
+  field_->setField(gapField(*report_, after_->isChecked(), &table_));
   field_->setScaleMax_mm(scale.max_mm);
   field_->setMagnification(scale.magnification);
 }

@@ -1,6 +1,7 @@
 #include "widgets/report/gap_section.h"
 
 #include <algorithm>
+#include <map>
 #include <sstream>
 
 #include "calib/core/file_io.h"
@@ -23,8 +24,7 @@ constexpr std::size_t kNoteLetters = 92;
 
 std::string dataUrl(const QImage& image) { return "data:image/png;base64," + pngBytes(image).toBase64().toStdString(); }
 
-void writeField(HtmlWriter& html, const GapReport& report, bool after, const FieldScale& scale) {
-  const ErrorField field = gapField(report, after);
+void writeField(HtmlWriter& html, const ErrorField& field, const char* id, const FieldScale& scale) {
   QString why;
   const auto draw = [&](bool dark) {
     return renderFieldPicture(field, scale.max_mm, scale.magnification, kFieldSize, dark, &why);
@@ -37,7 +37,7 @@ void writeField(HtmlWriter& html, const GapReport& report, bool after, const Fie
   }
   const std::string caption = field.title.toStdString() + "; colours to " + significantText(scale.max_mm) +
                               " mm, arrows x" + significantText(scale.magnification, 2);
-  html.open("figure", {{"id", after ? "gap-after" : "gap-before"}});
+  html.open("figure", {{"id", id}});
   html.open("picture");
   html.emptyElement("source", {{"media", "screen and (prefers-color-scheme: dark)"}, {"srcset", dataUrl(dark)}});
   html.emptyElement("img", {{"src", dataUrl(light)}, {"alt", caption}});
@@ -122,24 +122,25 @@ void writeFindings(HtmlWriter& html, const GapReport& report) {
   html.close();
 }
 
-void writeFields(HtmlWriter& html, const GapReport& report, bool with_pictures) {
+void writeFields(HtmlWriter& html, const GapReport& report, bool with_pictures, const CalibrationTable* table) {
   if (!with_pictures) {
     html.element("p", "Pictures could not be drawn: they were not asked for.", {{"class", "notice"}});
     return;
   }
-  const FieldScale scale = fieldScale(gapField(report, false));
+  const ErrorField before = gapField(report, false, table);
+  const FieldScale scale = fieldScale(before);
   html.open("div", {{"class", "pictures"}});
-  writeField(html, report, false, scale);
-  writeField(html, report, true, scale);
+  writeField(html, before, "gap-before", scale);
+  writeField(html, gapField(report, true, table), "gap-after", scale);
   html.close();
 }
 
-void writeDiagnosis(HtmlWriter& html, const GapReport& report, bool with_pictures) {
+void writeDiagnosis(HtmlWriter& html, const GapReport& report, bool with_pictures, const CalibrationTable* table) {
   html.element("p", report.text, {{"class", "lead"}});
   if (!report.next_measurement.empty()) html.element("p", "Next measurement: " + report.next_measurement);
   const std::string prediction = predictionText(report);
   if (!prediction.empty()) html.element("p", "To be checked: " + prediction);
-  writeFields(html, report, with_pictures);
+  writeFields(html, report, with_pictures, table);
   html.open("div", {{"class", "pictures"}});
   for (const GapBarChart& chart : gapCharts(report)) writeChart(html, chart);
   html.close();
@@ -148,7 +149,11 @@ void writeDiagnosis(HtmlWriter& html, const GapReport& report, bool with_picture
 
 }  // namespace
 
-ErrorField gapField(const GapReport& report, bool after) {
+ErrorField gapField(const GapReport& report, bool after, const CalibrationTable* table) {
+  std::map<std::pair<int, int>, Eigen::Vector3d> places_m;
+  if (table)
+    for (const Node& row : table->nodes)
+      places_m.emplace(std::pair(row.node, row.visit), row.reference_from_sensor.position_m);
   const Pose reference_from_tracker = inverse(report.tracker_from_reference);
   ErrorField field;
   field.title = after ? QStringLiteral("Gap with the causes added") : QStringLiteral("Gap as simulated now");
@@ -156,7 +161,8 @@ ErrorField gapField(const GapReport& report, bool after) {
   field.bodies = believedBodies(report);
   for (const GapNode& node : report.nodes) {
     FieldArrow arrow;
-    arrow.from_m = reference_from_tracker * node.place_m;
+    const auto place = places_m.find({node.node, node.visit});
+    arrow.from_m = place != places_m.end() ? place->second : reference_from_tracker * node.place_m;
     arrow.error_m = reference_from_tracker.orientation * (after ? node.after_m : node.before_m);
     arrow.node = node.node;
     arrow.flagged = node.is_flagged;
@@ -165,20 +171,20 @@ ErrorField gapField(const GapReport& report, bool after) {
   return field;
 }
 
-void writeGapSection(HtmlWriter& html, const GapReport& report, bool with_pictures) {
+void writeGapSection(HtmlWriter& html, const GapReport& report, bool with_pictures, const CalibrationTable* table) {
   html.element("h2", "Simulation and reality: " + gapHeadline(report));
-  writeDiagnosis(html, report, with_pictures);
+  writeDiagnosis(html, report, with_pictures, table);
 }
 
-std::string gapHtml(const GapReport& report, bool with_pictures) {
+std::string gapHtml(const GapReport& report, bool with_pictures, const CalibrationTable* table) {
   HtmlWriter html("Simulation and reality", kReportStyle);
   html.element("p", gapHeadline(report), {{"class", "verdict"}});
-  writeDiagnosis(html, report, with_pictures);
+  writeDiagnosis(html, report, with_pictures, table);
   return html.finish().toStdString();
 }
 
-Result<void> writeGapHtml(const GapReport& report, const std::filesystem::path& path) {
-  const std::string page = gapHtml(report);
+Result<void> writeGapHtml(const GapReport& report, const std::filesystem::path& path, const CalibrationTable* table) {
+  const std::string page = gapHtml(report, true, table);
   return writeFileAtomically(path, [&](std::ostream& out) { out << page; });
 }
 

@@ -165,7 +165,7 @@ std::string htmlReport(const ReportInput& input) {
   writeMethods(html, input.comparison);
   writeLearningCurves(html, input.learning_curves);
   writeRegion(html, input.comparison);
-  if (input.gap) writeGapSection(html, *input.gap, input.with_pictures);
+  if (input.gap) writeGapSection(html, *input.gap, input.with_pictures, &input.table);
   writeMeasured(html, input);
   html.element("h2", "Places, worst first");
   writePlaceTables(html, places);

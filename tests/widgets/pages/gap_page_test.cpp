@@ -287,6 +287,10 @@ void GapPageTest::windowFindsTheMetal() {
   QVERIFY(page->report().has_value());
   const ErrorField& field = find<FieldView>(*page, "gapField")->field();
   QCOMPARE(field.arrows.size(), page->report()->nodes.size());
+  // The rig puts places at whole multiples of 0.2 m; so they are drawn.
+  for (const FieldArrow& arrow : field.arrows)
+    for (int axis = 0; axis < 3; ++axis)
+      FT_VERIFY_MATCH(near(arrow.from_m[axis], 0.2 * std::round(arrow.from_m[axis] / 0.2), 1e-9));
   QVERIFY(!field.bodies.empty());
   const double off_m = (field.bodies[0].center_m - room_.body_m).norm();
   QVERIFY2(off_m < 0.1, qPrintable(QStringLiteral("%1 m from where the metal is").arg(off_m)));
