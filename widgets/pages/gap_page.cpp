@@ -171,7 +171,7 @@ QWidget* GapPage::makeInspector() {
   charts_layout_->setContentsMargins(12, 12, 12, 12);
   charts_layout_->setSpacing(16);
   inspector->setWidget(charts_);
-  inspector->setObjectName(QStringLiteral("gapCharts"));
+  inspector->setObjectName(QStringLiteral("inspector"));
   return inspector;
 }
 
@@ -381,6 +381,7 @@ void GapPage::showCharts() {
   if (!prediction.empty()) addText("gapPrediction", tr("To be checked: %1").arg(QString::fromStdString(prediction)));
   for (const GapFinding& finding : report_->findings) addText("gapFinding", QString::fromStdString(finding.text));
   charts_layout_->addStretch(1);
+  charts_layout_->activate();
 }
 
 void GapPage::showButtons() {
@@ -396,6 +397,7 @@ void GapPage::showButtons() {
   save_scene_->setEnabled(!diagnosing_);
   after_->setEnabled(report_.has_value());
   progress_->setVisible(diagnosing_);
+  header_->layout()->activate();
 }
 
 }  // namespace fieldtrue

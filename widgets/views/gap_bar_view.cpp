@@ -11,6 +11,7 @@ namespace {
 constexpr int kBarHeight = 12;
 constexpr int kGap = 8;
 constexpr int kUsualWidth = 320;
+constexpr int kNarrowest = 200;
 constexpr int kWrapped = Qt::AlignLeft | Qt::AlignTop | Qt::TextWordWrap;
 
 QFont boldOf(QFont font) {
@@ -55,6 +56,8 @@ int GapBarView::heightForWidth(int width) const {
   for (const GapBar& bar : chart_.bars) height += rowHeight(bar, width);
   return height;
 }
+
+QSize GapBarView::minimumSizeHint() const { return {kNarrowest, sizeHint().height()}; }
 
 QSize GapBarView::sizeHint() const { return {kUsualWidth, heightForWidth(std::max(width(), kUsualWidth))}; }
 

@@ -14,6 +14,7 @@ class GapBarView : public QWidget {
   void setChart(const GapBarChart& chart);
   const GapBarChart& chart() const { return chart_; }
   QSize sizeHint() const override;
+  QSize minimumSizeHint() const override;
   bool hasHeightForWidth() const override { return true; }
   int heightForWidth(int width) const override;
 

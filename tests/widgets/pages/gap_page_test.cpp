@@ -299,7 +299,7 @@ void GapPageTest::windowFindsTheMetal() {
   QVERIFY(QDir().mkpath(folder));
   QTest::qWait(400);
   QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap.png")));
-  QVERIFY(find<QScrollArea>(*page, "gapCharts")->widget()->grab().save(folder + QStringLiteral("/6-gap-charts.png")));
+  QVERIFY(find<QScrollArea>(*page, "inspector")->widget()->grab().save(folder + QStringLiteral("/6-gap-charts.png")));
   find<QCheckBox>(*page, "showAfter")->setChecked(true);
   QTest::qWait(400);
   QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-after.png")));
