@@ -113,6 +113,8 @@ std::string causesText(const GapReport& report) {
   return text;
 }
 
+constexpr double kPoorlyPredicted = 0.5;
+
 std::string verdictText(const GapReport& report) {
   const std::string gap =
       shown(report.position_rms_mm) + " mm where noise alone would be " + shown(report.floor_position_mm) + " mm";
@@ -122,7 +124,10 @@ std::string verdictText(const GapReport& report) {
       return "No gap: the recording agrees with the simulation within its noise (" + gap + ").";
     case GapVerdict::kExplained:
       return "The gap (" + gap + ") is explained by: " + causesText(report) +
-             "; on places the fit did not see it takes " + percent + " of it away.";
+             "; on places the fit did not see it takes " + percent + " of it away" +
+             (report.remaining_fraction > kPoorlyPredicted
+                  ? ", because these lie where nothing else tells of it; nothing is left where it was measured."
+                  : ".");
     case GapVerdict::kPartlyExplained:
       return "The gap (" + gap + ") is partly explained by: " + causesText(report) + "; this takes " + percent +
              " of it away, the rest has another cause.";
@@ -144,15 +149,16 @@ void addSequence(const HeldOutGap& held_out, double mm_per_unit, GapReport& repo
   }
 }
 
-void addRemaining(const HeldOutGap& held_out, const GapReport& before, GapReport& report) {
+void addRemaining(const HeldOutGap& held_out, const Evidence& evidence, GapReport& report) {
   double sum = 0.0;
   std::vector<std::pair<double, int>> worst;
-  for (const GapNode& node : before.nodes) {
+  for (const GapNode& node : report.nodes) {
     sum += node.after_m.squaredNorm();
     worst.emplace_back(node.after_m.norm(), node.node);
   }
-  report.remaining_position_rms_mm = 1e3 * std::sqrt(sum / static_cast<double>(before.nodes.size()));
+  report.remaining_position_rms_mm = 1e3 * std::sqrt(sum / static_cast<double>(report.nodes.size()));
   report.remaining_fraction = held_out.fractionAfter(report.selected.size());
+  if (evidence.has_effect) report.remaining_fraction = std::max(report.remaining_fraction, evidence.fraction);
   std::sort(worst.rbegin(), worst.rend());
   for (const auto& [size_m, node] : worst) {
     if (1e3 * size_m < 2.5 * report.floor_position_mm || report.remaining_where.size() >= 10) break;
@@ -231,10 +237,11 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   report.origin = search.structureOfNone().origin;
   report.candidates = describeCandidates(search, selection, held_out, report.floor_position_mm);
   report.selected = describeSelected(search, selection, held_out, report.candidates, report.floor_position_mm);
-  report.verdict = verdictOf(weigh(search, selection, held_out, left, *rows));
+  const Evidence evidence = weigh(search, selection, held_out, left, *rows);
+  report.verdict = verdictOf(evidence);
   addTraces(left.traces, report);
   addSequence(held_out, report.floor_position_mm, report);
-  addRemaining(held_out, report, report);
+  addRemaining(held_out, evidence, report);
   report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);
   report.isolability = isolabilityOf(search, kStartsForIsolability, control);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");

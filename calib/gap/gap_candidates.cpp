@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "calib/gap/gap_profile.h"
 
@@ -13,8 +14,40 @@ constexpr double kTemperature = 2.5;
 /// Effects whose fitted signals correlate beyond this and whose evidence is closer than that are not told apart.
 constexpr double kSameSignal = 0.9;
 constexpr double kSameEvidence = 10.0;
-/// Intervals of fitted parameters are widened for the physics that a catalogue leaves out.
 constexpr double kNinety = 1.645;
+/// Real things are no point dipoles, round loops or endless planes: a place is not known better than to a share of the
+/// size of what stands there, or of a plane's distance, however many nodes say so. Shares and factor found on bodies
+/// made by other physics.
+constexpr double kShareOfSize = 0.12;
+constexpr double kShareOfDistance = 0.03;
+constexpr double kWiderOfPlaced = 1.4;
+
+/// SD of a place that stands for the physics the catalogue leaves out [m].
+double unmodelledPlaceSd_m(const FittedEffect& fitted) {
+  double sd_m = 0.0;
+  for (const FittedParameter& p : fitted.values) {
+    if (p.name == "size_m") sd_m = std::max(sd_m, kShareOfSize * p.value);
+    if (p.name == "radius_m") sd_m = std::max(sd_m, 2.0 * kShareOfSize * p.value / std::numbers::sqrt2);
+    if (p.name == "distance_m") sd_m = std::max(sd_m, kShareOfDistance * p.value);
+  }
+  return std::min(sd_m, 0.3);
+}
+
+/// Widens the intervals of a thing in the room for the physics that its model leaves out.
+void widenPlaced(const FittedEffect& fitted, GapCandidate& candidate) {
+  if (!fitted.location_m) return;
+  const double place_sd_m = unmodelledPlaceSd_m(fitted);
+  for (Estimate& estimate : candidate.parameters) {
+    if (!estimate.low90 || !estimate.high90) continue;
+    const bool is_center = estimate.name.rfind("center_", 0) == 0;
+    const double more = is_center ? kNinety * place_sd_m : 0.0;
+    estimate.low90 = estimate.value - std::hypot(kWiderOfPlaced * (estimate.value - *estimate.low90), more);
+    estimate.high90 = estimate.value + std::hypot(kWiderOfPlaced * (*estimate.high90 - estimate.value), more);
+  }
+  if (!candidate.location_covariance_m2) return;
+  *candidate.location_covariance_m2 = kWiderOfPlaced * kWiderOfPlaced * *candidate.location_covariance_m2 +
+                                      place_sd_m * place_sd_m * Eigen::Matrix3d::Identity();
+}
 
 /// Parameters of one term within the covariance of a refined model.
 struct TermPlace {
@@ -62,10 +95,12 @@ Sensitivity sensitivityOf(const GapTerm& term, const FittedEffect& fitted) {
   return sensitivity;
 }
 
+FittedEffect fittedOf(const GapTerm& term) { return term.fit->describe(term.searched, term.linear); }
+
 /// What a fitted term says, with intervals where its model was refined.
 void describeTerm(const RefinedModel& refined, std::size_t term, GapCandidate& candidate) {
   const GapTerm& fitted_term = refined.model.terms[term];
-  const FittedEffect fitted = fitted_term.fit->describe(fitted_term.searched, fitted_term.linear);
+  const FittedEffect fitted = fittedOf(fitted_term);
   candidate.effect = fitted_term.effect->id;
   candidate.location_m = fitted.location_m;
   candidate.material = fitted.material;
@@ -140,10 +175,14 @@ void findEquivalents(const GapSearch& search, const Selection& selection, std::v
   }
 }
 
-/// What does not help on places it was not fitted to counts for less.
-double evidenceOf(const GapCandidate& c) {
+/// What does not help on places it was not fitted to counts for less; where nothing was worth selecting, nothing is
+/// likelier than none.
+double evidenceOf(const GapCandidate& c, bool is_any_selected) {
   constexpr double kCostOfFailing = 10.0;
-  return c.bic_gain - (c.effect != "none" && c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
+  constexpr double kMostUnselected = -2.0;
+  if (c.effect == "none") return 0.0;
+  const double evidence = c.bic_gain - (c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
+  return is_any_selected ? evidence : std::min(evidence, kMostUnselected);
 }
 
 /// Two names of one thing, as a wrong scale of the rig and of the tracker: the first carries the probability of both.
@@ -161,12 +200,12 @@ void joinExactTwins(std::vector<GapCandidate>& candidates) {
   }
 }
 
-void setProbabilities(std::vector<GapCandidate>& candidates) {
+void setProbabilities(std::vector<GapCandidate>& candidates, bool is_any_selected) {
   double most = 0.0;
-  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c));
+  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_selected));
   double sum = 0.0;
   for (GapCandidate& c : candidates) {
-    c.probability = std::exp(0.5 * (evidenceOf(c) - most) / kTemperature);
+    c.probability = std::exp(0.5 * (evidenceOf(c, is_any_selected) - most) / kTemperature);
     sum += c.probability;
   }
   for (GapCandidate& c : candidates) c.probability /= sum;
@@ -187,32 +226,62 @@ Shrinkage shrinkageOf(double before, double after, double low_after, double high
   return shrinkage;
 }
 
+double sumOfSquares(std::span<const Vector6d> residuals) {
+  double sum = 0.0;
+  for (const Vector6d& residual : residuals) sum += residual.squaredNorm();
+  return sum;
+}
+
+/// What an effect that was not selected would take away: by its exact fit, less what that many parameters take from
+/// noise; nothing where the places it did not see say so.
+Shrinkage shrinkageOfTried(const GapSearch& search, const TriedEffect& tried, const HeldOutGap& held_out, double none,
+                           double count, double mm_per_unit) {
+  double fall = tried.held_out_gain;
+  if (tried.held_out_gain > 0.0 && !tried.refined.model.terms.empty()) {
+    double parameters = 0.0;
+    for (const GapTerm& term : tried.model.terms)
+      parameters += static_cast<double>(term.linear.size() + term.searched.size());
+    const double left = sumOfSquares(whitenedResiduals(search.physics(), tried.model, search.whitening()));
+    fall = std::max(fall, none - left - parameters);
+  }
+  const double after = held_out.before - fall / count;
+  Shrinkage shrinkage = shrinkageOf(held_out.before, after, after, after, mm_per_unit);
+  shrinkage.low90.reset();
+  shrinkage.high90.reset();
+  return shrinkage;
+}
+
 }  // namespace
 
 std::vector<GapCandidate> describeCandidates(const GapSearch& search, const Selection& selection,
                                              const HeldOutGap& held_out, double mm_per_unit) {
   const GapRows& rows = search.physics().rows();
   const double count = static_cast<double>(rows.rows.size()) * rows.channels();
+  const double none = sumOfSquares(whitenedResiduals(search.physics(), search.none().model, search.whitening()));
   std::vector<GapCandidate> candidates;
   for (const TriedEffect& tried : selection.alternatives) {
     GapCandidate candidate;
     const bool is_refined = !tried.refined.model.terms.empty();
     RefinedModel model = is_refined ? tried.refined : RefinedModel{tried.model, {}, 0, 0.0};
     describeTerm(model, model.model.terms.size() - 1, candidate);
+    widenPlaced(fittedOf(model.model.terms.back()), candidate);
     candidate.bic_gain = tried.bic_gain;
-    const double after = held_out.before - tried.held_out_gain / count;
-    candidate.shrinkage = shrinkageOf(held_out.before, after, after, after, mm_per_unit);
-    candidate.shrinkage.low90.reset();
-    candidate.shrinkage.high90.reset();
+    candidate.shrinkage = shrinkageOfTried(search, tried, held_out, none, count, mm_per_unit);
     candidates.push_back(std::move(candidate));
   }
   findEquivalents(search, selection, candidates);
-  GapCandidate none;
-  none.effect = "none";
-  none.equivalents = {"none"};
-  none.shrinkage = shrinkageOf(held_out.before, held_out.before, held_out.before, held_out.before, mm_per_unit);
-  candidates.push_back(std::move(none));
-  setProbabilities(candidates);
+  if (selection.ways.size() == 1 && held_out.after.size() == 1) {
+    for (GapCandidate& c : candidates)
+      if (c.effect == search.ways()[selection.ways.front()].effect->id)
+        c.shrinkage = shrinkageOf(held_out.before, held_out.after[0], held_out.after_low90[0], held_out.after_high90[0],
+                                  mm_per_unit);
+  }
+  GapCandidate nothing;
+  nothing.effect = "none";
+  nothing.equivalents = {"none"};
+  nothing.shrinkage = shrinkageOf(held_out.before, held_out.before, held_out.before, held_out.before, mm_per_unit);
+  candidates.push_back(std::move(nothing));
+  setProbabilities(candidates, !selection.ways.empty());
   return candidates;
 }
 
@@ -225,6 +294,7 @@ std::vector<SelectedEffect> describeSelected(const GapSearch& search, const Sele
     SelectedEffect effect;
     describeTerm(selection.model, t, effect);
     profileSearched(search, selection.model, t, effect);
+    widenPlaced(fittedOf(selection.model.model.terms[t]), effect);
     effect.credit_fraction = credit[t];
     effect.equivalents = {effect.effect};
     effect.probability = 1.0;

@@ -12,6 +12,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr double kHuge = 1e4;
+constexpr double kEnough = 5e-3;  // Fall of minus twice the log likelihood that ends a fit.
 
 /// Scale s of squared three-dimensional distances under a Student t law: the fixed point of
 /// s^2 = mean(w d^2) / 3, w = (nu + 3)/(nu + d^2/s^2).
@@ -173,9 +174,9 @@ LocalFit refineLocally(const Linearized& at, const EffectFit& fit, const Eigen::
   if (start.size() > 0) {
     using Solver = ceres::TinySolver<ProjectedFit>;
     Solver solver;
-    solver.options.max_num_iterations = 30;
-    solver.options.gradient_tolerance = 1e-6;
-    solver.options.parameter_tolerance = 1e-6;
+    solver.options.max_num_iterations = 15;
+    solver.options.gradient_tolerance = 1e-5;
+    solver.options.parameter_tolerance = 1e-4;
     Solver::Parameters parameters = start;
     solver.Solve(projected, &parameters);
     if (parameters.allFinite() && fit.allows(parameters)) local.searched = parameters;
@@ -195,43 +196,14 @@ class JointFit {
       : physics_(physics), whitening_(whitening), options_(options), block_(physics.size(), 0) {}
 
   RefinedModel run(GapModel model) {
-    double cost = costOf(model, true);
-    double damping = 1e-3;
+    double cost = adaptedCostOf(model);
+    double damping = kFirstDamping;
     for (int step = 0; step < options_.most_steps; ++step) {
-      const Linearized at(physics_, model, whitening_, block_);
-      Eigen::MatrixXd J = at.nuisance();
-      if (options_.frozen) J.col(*options_.frozen).setZero();
-      const Eigen::VectorXd w = weights(at);
-      Eigen::MatrixXd normal = J.transpose() * w.asDiagonal() * J;
-      Eigen::VectorXd right = J.transpose() * (w.asDiagonal() * at.residual());
-      addPriors(model, at.nAlignment(), normal, right);
-      const Eigen::Vector3d center_m = alignmentCenter_m(at.settings());
-      Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
-      normal = scale.asDiagonal() * normal * scale.asDiagonal();
-      bool improved = false;
-      double fall = 0.0;
-      for (int attempt = 0; attempt < 7 && !improved; ++attempt) {
-        Eigen::MatrixXd damped = normal;
-        damped.diagonal().array() += damping + 1e-10;
-        for (const bool moves_rig : {true, false}) {
-          const Eigen::Index fixed = moves_rig ? 0 : at.nAlignment();
-          const Eigen::VectorXd y = stepOf(damped, right, scale, fixed);
-          GapModel next = model;
-          const Applied applied = y.allFinite() ? apply(y, center_m, at.nAlignment(), next) : Applied::kForbidden;
-          const double next_cost = applied == Applied::kForbidden ? cost : costOf(next, false);
-          if (next_cost < cost) {
-            fall = cost - next_cost;
-            model = std::move(next);
-            cost = next_cost;
-            improved = true;
-          }
-          if (improved || applied != Applied::kAtTolerance) break;
-        }
-        damping = improved ? std::max(1e-9, 0.2 * damping) : 6.0 * std::max(damping, 1e-6);
-      }
-      if (!improved) break;
-      cost = costOf(model, true);
-      if (fall < 1e-4) break;
+      const System system = systemAt(model);
+      const double fall = descend(system, model, cost, damping);
+      if (fall <= 0.0) break;
+      cost = adaptedCostOf(model);
+      if (fall < kEnough) break;
     }
     return finished(std::move(model), cost);
   }
@@ -239,7 +211,59 @@ class JointFit {
  private:
   bool isUsed(std::size_t row) const { return options_.used.empty() || options_.used[row] != 0; }
 
+  static constexpr double kFirstDamping = 1e-3;
+
   enum class Applied { kFully, kAtTolerance, kForbidden };
+
+  /// Normal equations about one state.
+  struct System {
+    Eigen::MatrixXd normal;
+    Eigen::VectorXd right;
+    Eigen::VectorXd scale;
+    Eigen::Vector3d center_m;
+    int n_alignment = 0;
+  };
+
+  System systemAt(const GapModel& model) const {
+    const Linearized at(physics_, model, whitening_, block_);
+    System system;
+    system.center_m = alignmentCenter_m(at.settings());
+    system.n_alignment = at.nAlignment();
+    const Eigen::VectorXd w = weights(at);
+    Eigen::MatrixXd J = at.nuisance();
+    if (options_.frozen) J.col(*options_.frozen).setZero();
+    system.normal = J.transpose() * w.asDiagonal() * J;
+    system.right = J.transpose() * (w.asDiagonal() * at.residual());
+    addPriors(model, at.nAlignment(), system.normal, system.right);
+    system.scale = system.normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
+    return system;
+  }
+
+  /// One damped step downhill. @return fall of the cost; 0 where none was found
+  double descend(const System& system, GapModel& model, double& cost, double& damping) const {
+    const Eigen::MatrixXd scaled = system.scale.asDiagonal() * system.normal * system.scale.asDiagonal();
+    for (int attempt = 0; attempt < 7; ++attempt) {
+      Eigen::MatrixXd damped = scaled;
+      damped.diagonal().array() += damping + 1e-10;
+      for (const bool moves_rig : {true, false}) {
+        const Eigen::VectorXd y = stepOf(damped, system.right, system.scale, moves_rig ? 0 : system.n_alignment);
+        GapModel next = model;
+        const Applied applied =
+            y.allFinite() ? apply(y, system.center_m, system.n_alignment, next) : Applied::kForbidden;
+        const double next_cost = applied == Applied::kForbidden ? cost : costOf(next);
+        if (next_cost < cost) {
+          const double fall = cost - next_cost;
+          model = std::move(next);
+          cost = next_cost;
+          damping = std::max(1e-9, 0.2 * damping);
+          return fall;
+        }
+        if (applied != Applied::kAtTolerance) break;
+      }
+      damping = 6.0 * std::max(damping, 1e-6);
+    }
+    return 0.0;
+  }
 
   /// One damped step; the first `fixed` parameters stay.
   static Eigen::VectorXd stepOf(const Eigen::MatrixXd& damped, const Eigen::VectorXd& right,
@@ -279,14 +303,24 @@ class JointFit {
     return is_moved ? Applied::kAtTolerance : Applied::kFully;
   }
 
-  /// Sum over rows of the residual law's penalty at the present scales, and that of the alignment's tolerances.
-  double costOf(const GapModel& model, bool adapt_scale) {
+  /// Sum over rows of the residual law's penalty at the present scales, and that of the priors.
+  double costOf(const GapModel& model) const { return costAt(usedResiduals(model), model); }
+  double adaptedCostOf(const GapModel& model) {
+    const std::vector<Vector6d> used = usedResiduals(model);
+    scale_ = devianceOf(used, physics_.rows().has_orientation, options_.law).scale;
+    return costAt(used, model);
+  }
+
+  std::vector<Vector6d> usedResiduals(const GapModel& model) const {
     const std::vector<Vector6d> whitened = whitenedResiduals(physics_, model, whitening_);
     std::vector<Vector6d> used;
     for (std::size_t i = 0; i < whitened.size(); ++i)
       if (isUsed(i)) used.push_back(whitened[i]);
+    return used;
+  }
+
+  double costAt(std::span<const Vector6d> used, const GapModel& model) const {
     const bool both = physics_.rows().has_orientation;
-    if (adapt_scale) scale_ = devianceOf(used, both, options_.law).scale;
     const double nu = options_.law.degrees_of_freedom;
     double sum = 0.0;
     for (const Vector6d& r : used) {

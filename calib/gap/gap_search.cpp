@@ -52,13 +52,15 @@ GapSearch::GapSearch(const GapRows& rows, std::vector<std::unique_ptr<PhysicalEf
 /// Where the rig's tolerance is not stated, it is what the flexible fit leaves beyond the samples' noise; the law of
 /// the residuals is the one under which that remainder is most likely.
 void GapSearch::settleNoise() {
-  for (int round = 0; round < 3; ++round) {
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
     whitening_ = makeWhitening(rows_, placing_sd_m_, placing_sd_rad_);
     none_ = refineJointly(physics_, none_.model, whitening_, {});
-    structure_ = findStructure(Linearized(physics_, none_.model, whitening_, space_blocks_), rows_, round == 2);
+    structure_ =
+        findStructure(Linearized(physics_, none_.model, whitening_, space_blocks_), rows_, round == kRounds - 1);
     // A stated tolerance may be wrong: position and rotation must weigh as they deserve, so both follow the remainder.
-    placing_sd_m_ *= std::clamp(structure_.scale.position, 0.05, 20.0);
-    placing_sd_rad_ *= std::clamp(structure_.scale.rotation, 0.05, 20.0);
+    placing_sd_m_ = placingFrom(Channel::kPosition, placing_sd_m_);
+    if (rows_.has_orientation) placing_sd_rad_ = placingFrom(Channel::kRotation, placing_sd_rad_);
   }
   double best = std::numeric_limits<double>::infinity();
   for (const double nu : {4.0, 8.0, 100.0}) {
@@ -68,6 +70,33 @@ void GapSearch::settleNoise() {
       law_.degrees_of_freedom = nu;
     }
   }
+}
+
+/// The placing SD under which the whitened remainder of the flexible fit has unit scale, the samples' noise taken as
+/// stated; next to nothing where that alone is more than enough.
+double GapSearch::placingFrom(Channel channel, double present) const {
+  constexpr double kLeast = 1e-6;
+  constexpr double kTimes = 30.0;  // At most, in either direction and round.
+  const bool is_position = channel == Channel::kPosition;
+  const auto varianceAt = [&](const GapRow& row, double placing) {
+    const double own = is_position ? row.mean_covariance_m2.trace() / 3.0 : row.mean_rotation_variance_rad2;
+    return own + placing * placing + kLeast * kLeast;
+  };
+  const auto scaleAt = [&](double placing) {
+    std::vector<Vector6d> left(structure_.left.size(), Vector6d::Zero());
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      const double factor = std::sqrt(varianceAt(rows_.rows[i], present) / varianceAt(rows_.rows[i], placing));
+      left[i].head<3>() = factor * (is_position ? structure_.left[i].head<3>() : structure_.left[i].tail<3>());
+    }
+    return normalScaleOf(left);
+  };
+  double low = std::max(kLeast, present / kTimes);
+  double high = std::max(kLeast, present * kTimes);
+  for (int step = 0; step < 40; ++step) {
+    const double middle = std::sqrt(low * high);
+    (scaleAt(middle) > 1.0 ? low : high) = middle;
+  }
+  return std::sqrt(low * high);
 }
 
 void GapSearch::settleWays() {
@@ -101,8 +130,8 @@ double GapSearch::bicOf(const GapModel& model) const {
 
 RefinedModel GapSearch::refined(const GapModel& start, std::span<const char> used) const {
   RefineOptions options;
-  options.law = law_;
   options.used = used;
+  options.law = law_;
   return refineJointly(physics_, start, whitening_, options);
 }
 
@@ -132,8 +161,10 @@ std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& 
 void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const RefinedModel& base,
                            TriedEffect& tried) const {
   const EffectWay& chosen = ways_[tried.way];
+  constexpr double kHopeful = 0.4;  // Of the best start's gain.
   std::optional<LocalFit> best;
   for (const ScanResult::Start& start : starts) {
+    if (best && start.gain < kHopeful * starts.front().gain) break;
     LocalFit local = refineLocally(at, *chosen.fit, start.searched);
     if (!best || local.gain > best->gain) best = std::move(local);
   }
@@ -217,10 +248,11 @@ void GapSearch::finish(TriedEffect& tried, double base_bic) const {
 /// exactly is fitted exactly too.
 void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const {
   constexpr double kNear = 60.0;
+  constexpr double kNearNothing = 25.0;
   constexpr double kNearShare = 0.2;
   const double base_bic = bicOf(base.model);
   double best = tried.empty() ? 0.0 : tried.front().bic_gain;
-  double margin = std::max(kNear, kNearShare * best);
+  double margin = best < kNearNothing ? kNearNothing : std::max(kNear, kNearShare * best);
   for (;;) {
     std::vector<std::size_t> due;
     for (std::size_t i = 0; i < tried.size(); ++i)
@@ -230,7 +262,7 @@ void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& 
     best = 0.0;
     for (const TriedEffect& one : tried)
       if (!one.refined.model.terms.empty()) best = std::max(best, one.bic_gain);
-    margin = kNear;
+    margin = std::clamp(best, kNearNothing, kNear);
   }
 }
 
@@ -317,7 +349,7 @@ class Selector {
   /// One flexible thing in the room can pass for two errors of the instrument, and the other way round: the best of the
   /// other kind is worth a start of its own where it explains a good part.
   const TriedEffect* firstOfOtherKind(const std::vector<TriedEffect>& tried, const TriedEffect& best) const {
-    constexpr double kGoodPart = 0.3;
+    constexpr double kGoodPart = 0.4;
     const auto is_in_room = [&](const TriedEffect& one) { return one.fitted.location_m.has_value(); };
     for (const TriedEffect& one : tried) {
       if (one.bic_gain < std::max(options_.least_gain_first, kGoodPart * best.bic_gain)) break;
@@ -336,8 +368,8 @@ class Selector {
     return selection;
   }
 
-  static void add(const TriedEffect& tried, Selection& selection) {
-    selection.model = tried.refined.model.terms.empty() ? RefinedModel{tried.model, {}, 0, 0.0} : tried.refined;
+  void add(const TriedEffect& tried, Selection& selection) const {
+    selection.model = tried.refined.model.terms.empty() ? search_.refined(tried.model) : tried.refined;
     selection.ways.push_back(tried.way);
   }
 

@@ -65,7 +65,10 @@ class GapSearch {
   std::vector<TriedEffect> rank(const RefinedModel& base, const RunControl& control) const;
 
  private:
+  enum class Channel { kPosition, kRotation };
+
   void settleNoise();
+  double placingFrom(Channel channel, double present) const;
   void settleWays();
   std::optional<TriedEffect> tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
                                     const RefinedModel& base, const RunControl& control) const;

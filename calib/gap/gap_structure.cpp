@@ -263,6 +263,9 @@ GapOrigin originOf(const Normal& normal, const Basis& basis, Eigen::Index q, dou
   return {share[0] / sum, share[1] / sum, share[2] / sum, share[3] / sum};
 }
 
+/// Under a normal law the t scale with 8 degrees of freedom is 0.915 of the SD.
+constexpr double kScaleOfNormal = 0.915;
+
 void setScales(const Eigen::VectorXd& left, const Linearized& at, double inflate, bool both, Structure& structure) {
   structure.left.assign(at.order().size(), Vector6d::Zero());
   for (std::size_t k = 0; k < at.order().size(); ++k) {
@@ -270,12 +273,15 @@ void setScales(const Eigen::VectorXd& left, const Linearized& at, double inflate
         left.segment(static_cast<Eigen::Index>(k) * at.channels(), at.channels()) * inflate;
   }
   structure.scale = devianceOf(structure.left, both, {8.0}).scale;
-  // Under a normal law the t scale with 8 degrees of freedom is 0.915 of the SD.
-  structure.scale.position /= 0.915;
-  structure.scale.rotation /= 0.915;
+  structure.scale.position /= kScaleOfNormal;
+  structure.scale.rotation /= kScaleOfNormal;
 }
 
 }  // namespace
+
+double normalScaleOf(std::span<const Vector6d> left) {
+  return devianceOf(left, false, {8.0}).scale.position / kScaleOfNormal;
+}
 
 Eigen::Matrix3Xd harmonicGradients(const Eigen::Vector3d& p, int degree) {
   constexpr double kStep = 1e-4;  // Central differences of polynomials of degree 4: exact to 1e-8.

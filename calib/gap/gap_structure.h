@@ -25,6 +25,9 @@ struct Structure {
 /// @param with_origin whether to split the energy by origin (16 fits instead of one)
 Structure findStructure(const Linearized& at, const GapRows& rows, bool with_origin);
 
+/// Robust scale of the first three components, 1 where they are normal with unit variance.
+double normalScaleOf(std::span<const Vector6d> left);
+
 /// Gradients of the regular solid harmonics of degree 1 to `degree` at a place: degree (degree + 2) columns.
 /// @param p place over a length of the order of the region, from its middle
 Eigen::Matrix3Xd harmonicGradients(const Eigen::Vector3d& p, int degree);
