@@ -33,6 +33,17 @@ double unmodelledPlaceSd_m(const FittedEffect& fitted) {
   return std::min(sd_m, 0.3);
 }
 
+/// No interval of a searched parameter reaches beyond where it may be searched.
+void keepWithinSearch(const EffectFit& fit, GapCandidate& candidate) {
+  for (const FitParameter& bound : fit.searched()) {
+    for (Estimate& estimate : candidate.parameters) {
+      if (estimate.name != bound.name || !estimate.low90 || !estimate.high90) continue;
+      estimate.low90 = std::max(*estimate.low90, bound.low);
+      estimate.high90 = std::min(*estimate.high90, bound.high);
+    }
+  }
+}
+
 /// Widens the intervals of a thing in the room for the physics that its model leaves out.
 void widenPlaced(const FittedEffect& fitted, GapCandidate& candidate) {
   if (!fitted.location_m) return;
@@ -265,6 +276,7 @@ std::vector<GapCandidate> describeCandidates(const GapSearch& search, const Sele
     RefinedModel model = is_refined ? tried.refined : RefinedModel{tried.model, {}, 0, 0.0};
     describeTerm(model, model.model.terms.size() - 1, candidate);
     widenPlaced(fittedOf(model.model.terms.back()), candidate);
+    keepWithinSearch(*model.model.terms.back().fit, candidate);
     candidate.bic_gain = tried.bic_gain;
     candidate.shrinkage = shrinkageOfTried(search, tried, held_out, none, count, mm_per_unit);
     candidates.push_back(std::move(candidate));
@@ -295,6 +307,7 @@ std::vector<SelectedEffect> describeSelected(const GapSearch& search, const Sele
     describeTerm(selection.model, t, effect);
     profileSearched(search, selection.model, t, effect);
     widenPlaced(fittedOf(selection.model.model.terms[t]), effect);
+    keepWithinSearch(*selection.model.model.terms[t].fit, effect);
     effect.credit_fraction = credit[t];
     effect.equivalents = {effect.effect};
     effect.probability = 1.0;

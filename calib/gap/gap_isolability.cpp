@@ -1,7 +1,6 @@
 #include "calib/gap/gap_isolability.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,13 +14,7 @@ namespace {
 /// Takes the alignment out of columns.
 class AlignmentProjector {
  public:
-  explicit AlignmentProjector(const Linearized& at) {
-    Eigen::MatrixXd nuisance = at.nuisance().leftCols(at.nAlignment());
-    for (Eigen::Index j = 0; j < nuisance.cols(); ++j) nuisance.col(j).normalize();
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(nuisance);
-    qr.setThreshold(1e-7);
-    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(nuisance.rows(), qr.rank());
-  }
+  explicit AlignmentProjector(const Linearized& at) : basis_(spanOf(at.nuisance().leftCols(at.nAlignment()))) {}
   Eigen::MatrixXd operator()(const Eigen::MatrixXd& m) const { return m - basis_ * (basis_.transpose() * m); }
 
  private:

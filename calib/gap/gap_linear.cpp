@@ -1,6 +1,7 @@
 #include "calib/gap/gap_linear.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -38,6 +39,17 @@ std::vector<EffectResponse> alignmentResponses(const SensorSetting& setting, con
 }
 
 }  // namespace
+
+Eigen::MatrixXd spanOf(Eigen::MatrixXd columns) {
+  if (columns.cols() == 0) return columns;
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+    const double norm = columns.col(j).norm();
+    if (norm > 0.0) columns.col(j) /= norm;
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
+  qr.setThreshold(1e-7);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
+}
 
 Whitening makeWhitening(const GapRows& rows, double placing_sd_m, double placing_sd_rad) {
   Whitening whitening;

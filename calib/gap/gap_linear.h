@@ -9,6 +9,9 @@
 
 namespace fieldtrue {
 
+/// Orthonormal columns that span the given ones; as many as are independent, none for none.
+Eigen::MatrixXd spanOf(Eigen::MatrixXd columns);
+
 /// Turns a row's residual into one of unit variance per channel, as far as the noise is known.
 struct Whitening {
   std::vector<Eigen::Matrix3d> position;  ///< Inverse Cholesky factor [1/m], per row.

@@ -3,7 +3,6 @@
 #include <ceres/tiny_solver.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -52,14 +51,7 @@ class ProjectedFit {
     const Segment& last = at.segments().back();
     const Eigen::Index end = last.begin + last.count;
     if (end < at.size()) parts_.push_back({end, at.size() - end});
-    Eigen::MatrixXd nuisance = picked(at.nuisance());
-    for (Eigen::Index j = 0; j < nuisance.cols(); ++j) {
-      const double norm = nuisance.col(j).norm();
-      if (norm > 0.0) nuisance.col(j) /= norm;
-    }
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(nuisance);
-    qr.setThreshold(1e-7);
-    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(nuisance.rows(), qr.rank());
+    basis_ = spanOf(picked(at.nuisance()));
     residual_ = projected(picked(at.residual()));
     for (const FitParameter& p : fit.searched()) width_.push_back(std::max(1e-6, p.high - p.low));
   }

@@ -34,14 +34,7 @@ class TraceTest {
     weight_ = Eigen::VectorXd::Ones(at.size());
     weight_.head(n_rows * at.channels()) =
         robustWeights(at.residual().head(n_rows * at.channels()), n_rows, at.channels());
-    Eigen::MatrixXd nuisance = weight_.asDiagonal() * at.nuisance();
-    for (Eigen::Index j = 0; j < nuisance.cols(); ++j) {
-      const double norm = nuisance.col(j).norm();
-      if (norm > 0.0) nuisance.col(j) /= norm;
-    }
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(nuisance);
-    qr.setThreshold(1e-7);
-    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(nuisance.rows(), qr.rank());
+    basis_ = spanOf(weight_.asDiagonal() * at.nuisance());
     left_ = projected(weight_.cwiseProduct(at.residual()));
   }
 

@@ -167,7 +167,7 @@ void describeWhere(const GapSearch& search, const GapModel& with_effects, GapRep
   const std::vector<Vector6d> before = search.physics().residuals(none);
   const std::vector<Vector6d> after = search.physics().residuals(with_effects);
   const std::vector<Vector6d> white = whitenedResiduals(search.physics(), none, search.whitening());
-  const std::vector<SensorSetting> settings = search.physics().settings(none.alignment);
+  const std::vector<SensorSetting> settings = search.physics().settings(with_effects.alignment);
   std::vector<Matrix6d> noise;
   std::vector<RowGap> rows;
   std::vector<double> p;
