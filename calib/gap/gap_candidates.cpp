@@ -190,10 +190,10 @@ void findEquivalents(const GapSearch& search, const Selection& selection, std::v
 /// likelier than none.
 double evidenceOf(const GapCandidate& c, bool is_any_selected) {
   constexpr double kCostOfFailing = 10.0;
-  constexpr double kMostUnselected = -2.0;
+  constexpr double kCostOfUnselected = 12.0;
   if (c.effect == "none") return 0.0;
   const double evidence = c.bic_gain - (c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
-  return is_any_selected ? evidence : std::min(evidence, kMostUnselected);
+  return is_any_selected ? evidence : std::min(evidence, 0.0) - kCostOfUnselected;
 }
 
 /// Two names of one thing, as a wrong scale of the rig and of the tracker: the first carries the probability of both.

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "calib/core/file_io.h"
@@ -21,11 +22,15 @@ class AlignmentProjector {
   Eigen::MatrixXd basis_;
 };
 
+constexpr int kNowhere = -1;
+
 /// What one effect does on this design: the columns at some of its starts, alignment taken out.
 struct Signature {
   std::string effect;
   std::vector<Eigen::MatrixXd> imitations;
-  Eigen::MatrixXd typical;  ///< Unit columns.
+  std::vector<int> imitation_places;  ///< Which of the common places each stands at; kNowhere: it stands at none.
+  Eigen::MatrixXd typical;            ///< Unit columns.
+  std::vector<int> typical_places;
 };
 
 std::vector<Eigen::VectorXd> someStarts(const EffectFit& fit, std::size_t count) {
@@ -37,13 +42,54 @@ std::vector<Eigen::VectorXd> someStarts(const EffectFit& fit, std::size_t count)
   return some;
 }
 
+/// Where things in the room are taken to stand: near the places of the sensor, where they show, and all of them at the
+/// same ones, so that one may imitate another.
+std::vector<Eigen::Vector3d> commonCenters_m(std::span<const EffectWay> ways, std::span<const SensorSetting> settings,
+                                             std::size_t count) {
+  std::vector<Eigen::Vector3d> centers_m;
+  const auto placed = std::find_if(ways.begin(), ways.end(), [](const EffectWay& way) { return hasCenter(*way.fit); });
+  if (placed == ways.end()) return centers_m;
+  std::vector<std::pair<double, Eigen::Vector3d>> near_m;
+  for (const Eigen::VectorXd& start : placed->fit->starts()) {
+    if (!placed->fit->allows(start)) continue;
+    double nearest_m = std::numeric_limits<double>::infinity();
+    for (const SensorSetting& setting : settings)
+      nearest_m = std::min(nearest_m, (setting.tracker_from_sensor.position_m - start.head<3>()).norm());
+    near_m.emplace_back(nearest_m, start.head<3>());
+  }
+  std::stable_sort(near_m.begin(), near_m.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  near_m.resize((near_m.size() + 2) / 3);
+  for (std::size_t i = 0; i < std::min(count, near_m.size()); ++i)
+    centers_m.push_back(near_m[i * near_m.size() / std::min(count, near_m.size())].second);
+  return centers_m;
+}
+
+std::vector<Eigen::VectorXd> startsFor(const EffectFit& fit, std::span<const Eigen::Vector3d> centers_m,
+                                       std::size_t count) {
+  if (!hasCenter(fit)) return someStarts(fit, count);
+  std::vector<Eigen::VectorXd> starts = startsAt(fit, centers_m);
+  std::erase_if(starts, [&](const Eigen::VectorXd& start) { return !fit.allows(start); });
+  return starts;
+}
+
+std::vector<int> placesOf(const EffectFit& fit, std::span<const Eigen::VectorXd> starts,
+                          std::span<const Eigen::Vector3d> centers_m) {
+  std::vector<int> places(starts.size(), kNowhere);
+  if (!hasCenter(fit)) return places;
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    for (std::size_t c = 0; c < centers_m.size(); ++c)
+      if (starts[i].head<3>() == centers_m[c]) places[i] = static_cast<int>(c);
+  return places;
+}
+
 /// Unit columns that stand for an effect: each of its linear parameters at a few of its starts.
-Eigen::MatrixXd typicalOf(const std::vector<Eigen::MatrixXd>& columns) {
+void setTypical(const std::vector<Eigen::MatrixXd>& columns, const std::vector<int>& places, Signature& signature) {
   constexpr std::size_t kMost = 8;
   const std::size_t used = std::min(kMost, columns.size());
   std::vector<Eigen::VectorXd> list;
   for (std::size_t i = 0; i < used; ++i) {
-    const Eigen::MatrixXd& m = columns[i * columns.size() / used];
+    const std::size_t chosen = i * columns.size() / used;
+    const Eigen::MatrixXd& m = columns[chosen];
     Eigen::VectorXd mixed = Eigen::VectorXd::Zero(m.rows());
     for (Eigen::Index j = 0; j < m.cols(); ++j) {
       const double norm = m.col(j).norm();
@@ -52,10 +98,10 @@ Eigen::MatrixXd typicalOf(const std::vector<Eigen::MatrixXd>& columns) {
       mixed += m.col(j) / norm * (j % 2 == 0 ? 1.0 : -0.6);
     }
     if (used > 1 && mixed.norm() > 0.0) list.emplace_back(mixed.normalized());
+    signature.typical_places.resize(list.size(), places[chosen]);
   }
-  Eigen::MatrixXd typical(columns.front().rows(), static_cast<Eigen::Index>(list.size()));
-  for (std::size_t i = 0; i < list.size(); ++i) typical.col(static_cast<Eigen::Index>(i)) = list[i];
-  return typical;
+  signature.typical.resize(columns.front().rows(), static_cast<Eigen::Index>(list.size()));
+  for (std::size_t i = 0; i < list.size(); ++i) signature.typical.col(static_cast<Eigen::Index>(i)) = list[i];
 }
 
 /// Share of each unit column that the columns of `by` make.
@@ -74,7 +120,14 @@ Eigen::VectorXd imitated(const Eigen::MatrixXd& typical, const Eigen::MatrixXd& 
 
 double imitation(const Signature& a, const Signature& b) {
   Eigen::VectorXd best = Eigen::VectorXd::Zero(a.typical.cols());
-  for (const Eigen::MatrixXd& by : b.imitations) best = best.cwiseMax(imitated(a.typical, by));
+  for (std::size_t k = 0; k < b.imitations.size(); ++k) {
+    const Eigen::VectorXd shares = imitated(a.typical, b.imitations[k]);
+    for (Eigen::Index i = 0; i < shares.size(); ++i) {
+      const int place = a.typical_places[static_cast<std::size_t>(i)];
+      const int other = b.imitation_places[k];
+      if (place == kNowhere || other == kNowhere || place == other) best[i] = std::max(best[i], shares[i]);
+    }
+  }
   return median({best.data(), best.data() + best.size()});
 }
 
@@ -119,9 +172,10 @@ Isolability isolabilityOf(const GapSearch& search, std::size_t starts_each, cons
   const std::vector<int> one_block(search.physics().size(), 0);
   const Linearized at(search.physics(), search.none().model, search.whitening(), one_block);
   const AlignmentProjector projected(at);
+  const std::vector<Eigen::Vector3d> centers_m = commonCenters_m(search.ways(), at.settings(), starts_each / 2);
   std::vector<Signature> signatures;
   for (const EffectWay& way : search.ways()) {
-    const std::vector<Eigen::VectorXd> starts = someStarts(*way.fit, starts_each);
+    const std::vector<Eigen::VectorXd> starts = startsFor(*way.fit, centers_m, starts_each);
     std::vector<Eigen::MatrixXd> columns(starts.size());
     control.parallel_for(starts.size(), [&](std::size_t i) {
       if (!control.stop.stop_requested()) columns[i] = projected(at.columns(*way.fit, starts[i]));
@@ -129,10 +183,14 @@ Isolability isolabilityOf(const GapSearch& search, std::size_t starts_each, cons
     if (control.stop.stop_requested() || columns.empty()) continue;
     const auto found = std::find_if(signatures.begin(), signatures.end(),
                                     [&](const Signature& s) { return s.effect == way.effect->id; });
+    const std::vector<int> places = placesOf(*way.fit, starts, centers_m);
     if (found == signatures.end()) {
-      signatures.push_back({way.effect->id, columns, typicalOf(columns)});
+      Signature signature{way.effect->id, columns, places, {}, {}};
+      setTypical(columns, places, signature);
+      signatures.push_back(std::move(signature));
     } else {
       found->imitations.insert(found->imitations.end(), columns.begin(), columns.end());
+      found->imitation_places.insert(found->imitation_places.end(), places.begin(), places.end());
     }
   }
   Isolability isolability;

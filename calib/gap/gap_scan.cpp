@@ -130,6 +130,31 @@ class Scanner {
 
 }  // namespace
 
+bool hasCenter(const EffectFit& fit) {
+  const std::vector<FitParameter> searched = fit.searched();
+  return searched.size() >= 3 && searched.front().name == "center_x_m";
+}
+
+std::vector<Eigen::VectorXd> startsAt(const EffectFit& fit, std::span<const Eigen::Vector3d> centers_m) {
+  std::vector<Eigen::VectorXd> others;
+  for (const Eigen::VectorXd& start : fit.starts()) {
+    const Eigen::VectorXd other = start.tail(start.size() - 3);
+    const bool is_new =
+        std::none_of(others.begin(), others.end(), [&](const Eigen::VectorXd& o) { return o.isApprox(other, 1e-9); });
+    if (is_new) others.push_back(other);
+    if (other.size() == 0) break;
+  }
+  std::vector<Eigen::VectorXd> starts;
+  for (const Eigen::Vector3d& center_m : centers_m) {
+    for (const Eigen::VectorXd& other : others) {
+      Eigen::VectorXd start(3 + other.size());
+      start << center_m, other;
+      starts.push_back(std::move(start));
+    }
+  }
+  return starts;
+}
+
 ScanResult scan(const Linearized& at, const EffectFit& fit, std::vector<Eigen::VectorXd> starts, std::size_t kept,
                 const RunControl& control) {
   std::erase_if(starts, [&](const Eigen::VectorXd& start) { return !fit.allows(start); });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "calib/core/run_control.h"
@@ -18,6 +19,11 @@ struct ScanResult {
   std::vector<Start> without_block;   ///< Best by the rows outside each hold-out block.
   std::vector<double> held_out_gain;  ///< Fall of the held-out sum of squares of each block, at that start.
 };
+
+/// Whether a fit is of a thing that stands somewhere in the room.
+bool hasCenter(const EffectFit& fit);
+/// The starts of such a fit moved to the given centres, one for each of its other coarse values.
+std::vector<Eigen::VectorXd> startsAt(const EffectFit& fit, std::span<const Eigen::Vector3d> centers_m);
 
 /// Tries starts of a fit, its linear parameters and those of `at` refitted, on all rows and with each block held out:
 /// the cross products of each block are summed once, so a hold-out costs no pass over the rows.

@@ -180,36 +180,6 @@ void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Line
   tried.model.terms.push_back(std::move(term));
 }
 
-namespace {
-
-bool hasCenter(const EffectFit& fit) {
-  const std::vector<FitParameter> searched = fit.searched();
-  return searched.size() >= 3 && searched.front().name == "center_x_m";
-}
-
-/// The starts of a fit moved to the given centres, one for each of its other coarse values.
-std::vector<Eigen::VectorXd> startsAt(const EffectFit& fit, std::span<const Eigen::Vector3d> centers_m) {
-  std::vector<Eigen::VectorXd> others;
-  for (const Eigen::VectorXd& start : fit.starts()) {
-    const Eigen::VectorXd other = start.tail(start.size() - 3);
-    const bool is_new =
-        std::none_of(others.begin(), others.end(), [&](const Eigen::VectorXd& o) { return o.isApprox(other, 1e-9); });
-    if (is_new) others.push_back(other);
-    if (other.size() == 0) break;
-  }
-  std::vector<Eigen::VectorXd> starts;
-  for (const Eigen::Vector3d& center_m : centers_m) {
-    for (const Eigen::VectorXd& other : others) {
-      Eigen::VectorXd start(3 + other.size());
-      start << center_m, other;
-      starts.push_back(std::move(start));
-    }
-  }
-  return starts;
-}
-
-}  // namespace
-
 void GapSearch::shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
                              const RefinedModel& base, const RunControl& control) const {
   constexpr std::size_t kCenters = 4;

@@ -80,7 +80,15 @@ std::set<std::string> trueClasses(const Session& session) {
 std::set<std::string> selectedClasses(const Session& session) {
   std::set<std::string> labels;
   if (!session.answer.is_answered || isSilent(session)) return labels;
-  for (const NamedCause& cause : session.answer.selected) labels.insert(labelOf(session, cause.effect));
+  const auto is_true = [&](const std::string& id) {
+    return std::any_of(session.effects.begin(), session.effects.end(), [&](const auto& e) { return e.id == id; });
+  };
+  for (const NamedCause& cause : session.answer.selected) {
+    // The readings of every session are filtered, some quantised: to say so is neither asked for nor wrong.
+    const bool is_of_signal =
+        std::find(kFloorEffects.begin(), kFloorEffects.end(), cause.effect) != kFloorEffects.end();
+    if (!is_of_signal || is_true(cause.effect)) labels.insert(labelOf(session, cause.effect));
+  }
   return labels;
 }
 
