@@ -15,6 +15,7 @@
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/gap_json.h"
+#include "calib/gap/recording_change.h"
 #include "widgets/report/gap_section.h"
 
 /// diagnose, plan-check, blind: the gap between the simulation and what was recorded.
@@ -25,6 +26,7 @@ constexpr const char* kBlindProgram = "fieldtrue-blind";
 
 struct DiagnoseOptions {
   std::string nodes;
+  std::string against;
   std::string samples;
   std::string scene;
   std::string out;
@@ -46,6 +48,13 @@ Read<DiagnosisInput> readDiagnosisInput(const DiagnoseOptions& options) {
   if (!nodes) return tl::unexpected(nodes.error());
   input.table = std::move(nodes->table);
   input.notes = std::move(nodes->notes);
+  if (!options.against.empty()) {
+    auto before = readNodesArgument(options.against);
+    if (!before) return tl::unexpected(before.error());
+    auto change = changeSince(before->table, input.table);
+    if (!change) return notPossible(change.error());
+    input.table = *std::move(change);
+  }
   if (!options.samples.empty()) {
     auto samples = readSampleTable(std::filesystem::path(options.samples));
     if (!samples) return notPossible(samples.error());
@@ -109,6 +118,10 @@ void addDiagnose(CommandLine& line) {
   auto [command, options] = line.add(
       "diagnose", "Find where a recording differs from the simulation, why, and by how much less", runDiagnose);
   command->add_option("--nodes", options->nodes, "Node table")->type_name("FILE")->required();
+  command
+      ->add_option("--against", options->against,
+                   "Node table of the same places recorded before: find what changed since, whatever the rig says")
+      ->type_name("FILE");
   command->add_option("--samples", options->samples, "Its sample table: mains, filter and lattice show only there")
       ->type_name("FILE");
   command

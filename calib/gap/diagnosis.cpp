@@ -18,6 +18,7 @@ namespace fieldtrue {
 namespace {
 
 constexpr std::size_t kStartsForIsolability = 24;
+constexpr int kFewestPlacesForCauses = 12;
 
 Result<std::vector<std::unique_ptr<PhysicalEffect>>> believedEffects(const Scene* scene, const Excitation& excitation) {
   std::vector<std::unique_ptr<PhysicalEffect>> effects;
@@ -221,7 +222,8 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   const GapSearch search(*rows, std::move(*believed));
   control.progress(0.1);
   SelectionOptions selecting;
-  selecting.most_effects = options.most_effects;
+  const bool has_enough = report.input.places >= kFewestPlacesForCauses;
+  selecting.most_effects = has_enough ? options.most_effects : 0;
   const Selection selection = selectEffects(search, selecting, partOf(control, 0.1, 0.7));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.7);
@@ -247,6 +249,10 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   suggestNext(search, selection, report);
   report.text = verdictText(report);
+  if (!has_enough) {
+    report.text += " Causes are not looked for: " + std::to_string(report.input.places) + " places are too few, " +
+                   std::to_string(kFewestPlacesForCauses) + " are needed.";
+  }
   selectSignalFindings(report);
   control.progress(1.0);
   return report;

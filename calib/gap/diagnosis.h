@@ -21,7 +21,8 @@ struct DiagnosisOptions {
 /// and how far the gap shrinks once it is added.
 /// @param samples the raw readings of the table's rows; null = none
 /// @param scene what the simulator believes; null = an ideal tracker in free space
-/// @error kTooFewNodes below 12 usable places, those with a value that is not finite left out and named; kCancelled
+/// @error kTooFewNodes below 8 usable places (causes are looked for from 12 on), those with a value that is not finite
+/// left out and named; kCancelled
 Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const Scene* scene,
                            const DiagnosisOptions& options = {}, const RunControl& control = {});
 

@@ -10,7 +10,7 @@
 namespace fieldtrue {
 namespace {
 
-constexpr std::size_t kFewestPlaces = 12;
+constexpr std::size_t kFewestPlaces = 8;
 
 /// How many clearly different orientations the rig states.
 int countOrientations(std::span<const GapRow> rows) {

@@ -47,7 +47,7 @@ struct GapRows {
 };
 
 /// @param nodes rows that count, cleaned
-/// @error kTooFewNodes below 12 places
+/// @error kTooFewNodes below 8 places
 Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& metadata);
 
 /// Noise covariance of one row: samples, placing and quantum; position [m^2] before rotation [rad^2].

@@ -275,6 +275,7 @@ class Selector {
 
   Selection run() {
     none_bic_ = search_.bicOf(search_.none().model);
+    if (options_.most_effects < 1) return finished({}, {});
     const std::vector<TriedEffect> first = search_.rank(search_.none(), control_);
     const TriedEffect* best = firstWorth(first, options_.least_gain_first);
     if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);

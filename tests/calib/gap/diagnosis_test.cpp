@@ -161,10 +161,10 @@ class DiagnosisTest : public QObject {
   void refusesWhatItCannotUse() {
     const CalibrationTable whole = recordedIn(gapScene(), gapPlan());
     CalibrationTable few = whole;
-    few.nodes.resize(8);
+    few.nodes.resize(7);
     const auto too_few = diagnose(few, nullptr, nullptr);
     QVERIFY(!too_few && too_few.error().code == ErrorCode::kTooFewNodes);
-    FT_VERIFY_MATCH(holdsAll(too_few.error().message, {"12 places", "has 8"}));
+    FT_VERIFY_MATCH(holdsAll(too_few.error().message, {"8 places", "has 7"}));
     Scene broken = gapScene();
     broken.effects.push_back({"ghost", {}});
     const auto unknown = diagnose(whole, nullptr, &broken);
