@@ -18,7 +18,6 @@ namespace fieldtrue {
 namespace {
 
 constexpr std::size_t kStartsForIsolability = 24;
-constexpr int kFewestPlacesForCauses = 12;
 
 Result<std::vector<std::unique_ptr<PhysicalEffect>>> believedEffects(const Scene* scene, const Excitation& excitation) {
   std::vector<std::unique_ptr<PhysicalEffect>> effects;
@@ -222,7 +221,7 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   const GapSearch search(*rows, std::move(*believed));
   control.progress(0.1);
   SelectionOptions selecting;
-  const bool has_enough = report.input.places >= kFewestPlacesForCauses;
+  const bool has_enough = rows->place_nodes.size() >= kFewestPlacesForCauses;
   selecting.most_effects = has_enough ? options.most_effects : 0;
   const Selection selection = selectEffects(search, selecting, partOf(control, 0.1, 0.7));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
@@ -320,6 +319,10 @@ Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const Scene* s
   if (scene == nullptr) believed.reference_from_tracker = defaultTransmitter(plan);
   auto rows = plannedRows(plan, believed);
   if (!rows) return tl::unexpected<Error>(rows.error());
+  if (rows->place_nodes.size() < kFewestPlacesForCauses) {
+    return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " + std::to_string(kFewestPlacesForCauses) +
+                                             " places; this one has " + std::to_string(rows->place_nodes.size()) + ".");
+  }
   auto effects = believedEffects(&believed, rows->excitation);
   if (!effects) return tl::unexpected<Error>(effects.error());
   const GapSearch search(*rows, std::move(*effects), NoiseFrom::kStated);

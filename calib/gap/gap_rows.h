@@ -46,6 +46,9 @@ struct GapRows {
   int channels() const { return has_orientation ? 6 : 3; }  ///< Residuals a row.
 };
 
+/// From how many places on causes can be told apart; with fewer there is noise to tell, and whether there is a gap.
+constexpr std::size_t kFewestPlacesForCauses = 12;
+
 /// @param nodes rows that count, cleaned
 /// @error kTooFewNodes below 8 places
 Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& metadata);

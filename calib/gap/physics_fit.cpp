@@ -210,7 +210,8 @@ PhysicsFit noPhysics(PhysicsFit fit, std::string why) {
 Result<PhysicsFit> fitPhysics(const CalibrationTable& table, const PhysicsFitOptions& options,
                               const RunControl& control) {
   const auto rows = makeGapRows(cleanRows(table).nodes, table.metadata);
-  if (!rows) return noPhysics({}, "there are fewer places than a cause can be told from");
+  if (!rows || rows->place_nodes.size() < kFewestPlacesForCauses)
+    return noPhysics({}, "there are fewer places than a cause can be told from");
   const GapSearch search(*rows, {});
   SelectionOptions selecting;
   selecting.most_effects = options.most_effects;

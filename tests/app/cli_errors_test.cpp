@@ -161,9 +161,7 @@ class CliErrorsTest : public QObject {
     QCOMPARE(run.err, QByteArray());
   }
 
-  void commandsThatAreNotHereAreNotListed() {
-    QVERIFY(!runCli({"--help"}).out.contains("serve"));
-  }
+  void commandsThatAreNotHereAreNotListed() { QVERIFY(!runCli({"--help"}).out.contains("serve")); }
 
   void sessionsOfANewerVersionAreLeftAlone() {
     const QString session = at("newer.fieldtrue");

@@ -96,7 +96,7 @@ class CliGapTest : public QObject {
                                   << QByteArray("none.csv");
     QTest::newRow("too few places") << QStringList{"diagnose", "--nodes", at("few.nodes.csv"), "--out",
                                                    at("x.gap.json")}
-                                    << 1 << QByteArray("12");
+                                    << 1 << QByteArray("8 places");
     QTest::newRow("no plan") << QStringList{"plan-check"} << 2 << QByteArray("--plan");
     QTest::newRow("bad plan") << QStringList{"plan-check", "--plan", "grid:5x5"} << 2 << QByteArray("5x5");
   }
