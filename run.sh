@@ -3,7 +3,7 @@
 # Without a display the same demonstration runs headless and leaves a report.
 # With arguments the program gets those instead of the demonstration: ./run.sh my.fieldtrue
 source "$(dirname "${BASH_SOURCE[0]}")/.ci/setup.sh"
-build --target fieldtrue fieldtrue-cli
+build ci --target fieldtrue fieldtrue-cli
 
 if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
   [ -n "${DISPLAY:-}" ] && export QT_QPA_PLATFORM="${QT_QPA_PLATFORM:-xcb}"

@@ -6,11 +6,17 @@
 #include <algorithm>
 #include <clocale>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <string_view>
+#include <vector>
 
-#include "widgets/report/thread_pool.h"
+#include "app/cli_barrier.h"
+#include "calib/core/exception_barrier.h"
+#include "calib/core/thread_pool.h"
 
 namespace fieldtrue::cli {
 namespace {
@@ -48,9 +54,90 @@ std::string onOneLine(std::string text) {
   return text;
 }
 
+/// What a slot of the event loop threw first; Qt cannot carry an exception through its loop.
+std::optional<std::string>& thrownInEvent() {
+  static std::optional<std::string> thrown;
+  return thrown;
+}
+
+/// Ends the event loop when a slot throws, so that the command ends with its sentence.
+class Application : public QCoreApplication {
+ public:
+  using QCoreApplication::QCoreApplication;
+
+  bool notify(QObject* receiver, QEvent* event) override {
+    const Result<bool> handled = withBarrier(kNoHalfFile, [&] { return QCoreApplication::notify(receiver, event); });
+    if (handled) return *handled;
+    if (!thrownInEvent()) thrownInEvent() = handled.error().message;
+    quit();
+    return false;
+  }
+};
+
 int complain(const std::string& who, const Failure& failure) {
   std::cerr << who << ": " << onOneLine(failure.message) << '\n';
   return failure.status;
+}
+
+/// Prints what a command has to say. @return the exit status
+int finish(const std::string& who, const Outcome& outcome, bool as_json) {
+  if (const auto& thrown = thrownInEvent()) return complain(who, {kNotPossible, *thrown});
+  if (!outcome) return complain(who, outcome.error());
+  for (const std::string& remark : outcome->remarks) std::cerr << "note: " << remark << '\n';
+  if (as_json) {
+    // A name in another encoding than UTF-8 is told with replacement marks; the work itself is done.
+    std::cout << outcome->json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+  } else {
+    std::cout << outcome->text;
+  }
+  std::cout.flush();
+  if (!std::cout) return complain(who, {kNotPossible, "the answer could not be written to standard output"});
+  return kDone;
+}
+
+/// The options of a command that name what it writes.
+struct Outputs {
+  std::string_view command;
+  std::vector<std::string_view> options;
+};
+const std::vector<Outputs>& outputs() {
+  static const std::vector<Outputs> all = {{"simulate", {"--nodes", "--samples"}},
+                                           {"tables", {"--nodes", "--samples"}},
+                                           {"import", {"--nodes", "--samples"}},
+                                           {"acquire", {"--session"}},
+                                           {"fit", {"--out"}},
+                                           {"compare", {"--html"}},
+                                           {"apply", {"--out"}},
+                                           {"export", {"--out"}},
+                                           {"report", {"--html"}},
+                                           {"resample", {"--nodes-out"}},
+                                           {"diagnose", {"--out", "--html", "--updated-scene"}}};
+  return all;
+}
+
+bool isSameFile(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  if (std::filesystem::exists(a, ignored) && !std::filesystem::is_regular_file(a, ignored)) return false;
+  if (std::filesystem::equivalent(a, b, ignored)) return true;
+  return std::filesystem::weakly_canonical(a, ignored) == std::filesystem::weakly_canonical(b, ignored);
+}
+
+/// What a command would write over: a file that it reads, or that it writes under another option. Empty when nothing.
+std::string writtenOver(const CLI::App& command) {
+  const auto found = std::find_if(outputs().begin(), outputs().end(),
+                                  [&](const Outputs& one) { return one.command == command.get_name(); });
+  if (found == outputs().end()) return {};
+  for (const CLI::Option* other : command.get_options()) {
+    for (const std::string_view name : found->options) {
+      const CLI::Option* output = command.get_option_no_throw(std::string(name));
+      if (!output || output == other || output->count() == 0 || other->count() == 0) continue;
+      if (other->get_items_expected_max() == 0) continue;  // A flag.
+      if (isSameFile(output->results().front(), other->results().front()))
+        return other->get_name() + " and " + output->get_name() + " name the same file, " + output->results().front() +
+               ", which would be written over; choose another name";
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -104,24 +191,17 @@ int CommandLine::run(int argc, char** argv) {
     }
     return complain(kProgram, {kWrongUsage, std::string(error.what()) + " (help: fieldtrue-cli --help)"});
   }
-  const std::string who = std::string(kProgram) + " " + app_.get_subcommands().front()->get_name();
-  const Outcome outcome = run_();
-  if (!outcome) return complain(who, outcome.error());
-  for (const std::string& remark : outcome->remarks) std::cerr << "note: " << remark << '\n';
-  if (common_.json) {
-    std::cout << outcome->json.dump(2) << '\n';
-  } else {
-    std::cout << outcome->text;
-  }
-  std::cout.flush();
-  if (!std::cout) return complain(who, {kNotPossible, "the answer could not be written to standard output"});
-  return kDone;
+  const CLI::App& command = *app_.get_subcommands().front();
+  const std::string who = std::string(kProgram) + " " + command.get_name();
+  if (const std::string clash = writtenOver(command); !clash.empty()) return complain(who, {kWrongUsage, clash});
+  const Result<int> status = withBarrier(kNoHalfFile, [&] { return finish(who, run_(), common_.json); });
+  return status ? *status : complain(who, {kNotPossible, status.error().message});
 }
 
 }  // namespace fieldtrue::cli
 
 int main(int argc, char** argv) {
-  const QCoreApplication application(argc, argv);
+  const fieldtrue::cli::Application application(argc, argv);
   std::setlocale(LC_NUMERIC, "C");  // QCoreApplication takes over the user's, and numbers in files have a point.
   fieldtrue::cli::CommandLine line;
   fieldtrue::cli::addDataCommands(line);
@@ -132,5 +212,6 @@ int main(int argc, char** argv) {
   fieldtrue::cli::addResampleCommand(line);
   fieldtrue::cli::addGapCommands(line);
   fieldtrue::cli::addListCommands(line);
+  fieldtrue::cli::addGuideCommand(line);
   return line.run(argc, argv);
 }

@@ -97,5 +97,6 @@ void addEmulateCommand(CommandLine& line);   ///< emulate
 void addResampleCommand(CommandLine& line);  ///< resample
 void addGapCommands(CommandLine& line);      ///< diagnose, plan-check, blind
 void addListCommands(CommandLine& line);     ///< methods, effects, devices, formats
+void addGuideCommand(CommandLine& line);     ///< guide
 
 }  // namespace fieldtrue::cli

@@ -14,11 +14,14 @@
 #include <string>
 
 #include "acquisition/devices/registry.h"
+#include "acquisition/plan/place_state.h"
+#include "acquisition/plan/plan.h"
 #include "acquisition/session/acquisition_controller.h"
-#include "acquisition/session/plan.h"
 #include "app/cli.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
+#include "calib/core/number_text.h"
+#include "calib/tables/json_text.h"
 #include "widgets/report/numbers.h"
 
 /// acquire: records a plan with a tracker, place by place, into a session file.
@@ -38,15 +41,17 @@ struct AcquireOptions {
 
 std::string placeText(const PlannedPlace& place) {
   const Eigen::Vector3d& p_m = place.reference_from_sensor.position_m;
-  return placeName(place) + "  (" + decimalText(p_m.x(), 2) + " m, " + decimalText(p_m.y(), 2) + " m, " +
-         decimalText(p_m.z(), 2) + " m)";
+  return placeName(place) + "  (" + fixedText(p_m.x(), 2) + " m, " + fixedText(p_m.y(), 2) + " m, " +
+         fixedText(p_m.z(), 2) + " m)";
 }
 
 double sd_mm(const Node& node) { return node.covariance_m2 ? 1000.0 * std::sqrt(node.covariance_m2->trace()) : NAN; }
 
 bool holdsNothing(const QString& session_path) {
-  const auto session = SessionStore::open(session_path);
-  return session && session->nodeTable().nodes.empty();
+  const auto session = acquisition::SessionStore::open(session_path);
+  if (!session) return false;
+  const auto table = session->nodeTable();
+  return table && table->nodes.empty();
 }
 
 /// What the tracker does now, on a terminal's last line.
@@ -57,10 +62,10 @@ class LiveLine {
   LiveLine& operator=(const LiveLine&) = delete;
   ~LiveLine() { clear(); }
 
-  void show(const AcquisitionStatus& status) {
+  void show(const acquisition::AcquisitionStatus& status) {
     if (!terminal_) return;
     std::string text;
-    if (status.take == TakeState::kCollecting) {
+    if (status.take == acquisition::TakeState::kCollecting) {
       text = std::to_string(status.collected) + "/" + std::to_string(status.wanted) + "  ";
     }
     text += status.reason.toStdString();
@@ -91,9 +96,14 @@ class Acquisition {
     const EndRequest end_request([this] { end("stopped"); });
     controller_.openSession(QString::fromStdString(options_.session), plan_json);
     if (failure_) return tl::unexpected(*failure_);
+    if (controller_.status().session->read_only) return notPossible(remarks_.front());
+    for (const std::string& remark : remarks_) tell(remark);
+    is_open_ = true;
     if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
     controller_.setSamplesPerNode(options_.samples_per_node);
     controller_.setAutomatic(options_.automatic);
+    // A command ends with its tracker; who called it decides what is next.
+    controller_.setReconnects(false);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
     if (!over_) QCoreApplication::exec();
@@ -113,43 +123,48 @@ class Acquisition {
     const auto connect = [this](auto signal, auto slot) {
       QObject::connect(&controller_, signal, &context_, [this, slot](auto&&... values) { (this->*slot)(values...); });
     };
-    connect(&AcquisitionController::statusChanged, &Acquisition::onStatus);
-    connect(&AcquisitionController::nodeStored, &Acquisition::onStored);
-    connect(&AcquisitionController::takeFailed, &Acquisition::onTakeFailed);
-    connect(&AcquisitionController::sessionOpened, &Acquisition::onOpened);
-    connect(&AcquisitionController::failed, &Acquisition::onFailed);
-    connect(&AcquisitionController::finished, &Acquisition::onFinished);
+    connect(&acquisition::AcquisitionController::statusChanged, &Acquisition::onStatus);
+    connect(&acquisition::AcquisitionController::nodeStored, &Acquisition::onStored);
+    connect(&acquisition::AcquisitionController::takeFailed, &Acquisition::onTakeFailed);
+    connect(&acquisition::AcquisitionController::takeRefused, &Acquisition::onTakeRefused);
+    connect(&acquisition::AcquisitionController::deviceFailed, &Acquisition::onFailed);
+    connect(&acquisition::AcquisitionController::sessionOpened, &Acquisition::onOpened);
+    connect(&acquisition::AcquisitionController::failed, &Acquisition::onFailed);
+    connect(&acquisition::AcquisitionController::finished, &Acquisition::onFinished);
+    connect(&acquisition::AcquisitionController::remarked, &Acquisition::onRemark);
   }
 
   void onOpened(const QString&, const QString&, const QString& plan_json) { session_plan_ = plan_json.toStdString(); }
 
   std::string otherPlan() const {
     if (!expected_plan_) return {};
-    if (nlohmann::json::parse(session_plan_, nullptr, false) == *expected_plan_) return {};
+    if (const auto plan = parseJson(session_plan_, options_.session); plan && *plan == *expected_plan_) return {};
     return options_.session +
            " was recorded with another plan; leave --plan out to resume it, or name a new session file";
   }
 
-  void onStatus(const AcquisitionStatus& status) {
+  void onStatus(const acquisition::AcquisitionStatus& status) {
     const auto before = status_.current;
+    const std::vector<acquisition::PlaceMisfit> misfits = status_.recorded->misfits;
     status_ = status;
-    if (status.device == DeviceState::kFailed) {
+    tellMisfits(misfits);
+    if (status.device == acquisition::DeviceState::kFailed) {
       fail(status.device_text.toStdString());
       return;
     }
-    if (status.device != DeviceState::kRunning) return;
+    if (status.device != acquisition::DeviceState::kRunning) return;
     if (!told_start_) tellStart();
     live_line_.show(status);
-    if (options_.automatic || !status.current || status.take == TakeState::kCollecting) return;
+    if (options_.automatic || !status.current || status.take == acquisition::TakeState::kCollecting) return;
     if (before != status.current || !prompted_) prompt();
   }
 
   void tellStart() {
     told_start_ = true;
-    const std::size_t n_there = status_.n_done + status_.n_skipped;
+    const std::size_t n_there = status_.recorded->n_done + status_.recorded->n_skipped;
     if (n_there > 0) {
-      lines_ << "Resuming: " << status_.n_done << " of " << status_.places.size() << " done, " << status_.n_skipped
-             << " skipped" << std::endl;
+      lines_ << "Resuming: " << status_.recorded->n_done << " of " << status_.session->places.size() << " done, "
+             << status_.recorded->n_skipped << " skipped" << std::endl;
     }
     if (!status_.current) onFinished();
   }
@@ -157,32 +172,59 @@ class Acquisition {
   void prompt() {
     prompted_ = true;
     live_line_.clear();
-    lines_ << "Next: " << placeText(status_.places.at(*status_.current))
+    lines_ << "Next: " << placeText(status_.session->places.at(*status_.current))
            << "   Enter takes, s skips, u takes back, q quits" << std::endl;
   }
 
   void onStored(int place, const Node& node, const QString& suspicious) {
     const auto index = static_cast<std::size_t>(place);
-    const AcquisitionStatus now = controller_.status();
+    const acquisition::AcquisitionStatus now = controller_.status();
     failed_takes_.erase(index);
     live_line_.clear();
-    lines_ << placeText(now.places.at(index)) << "  done " << now.n_done << " of " << now.places.size() << ", SD "
-           << errorFigure(sd_mm(node)) << " mm";
+    lines_ << placeText(now.session->places.at(index)) << "  done " << now.recorded->n_done << " of "
+           << now.session->places.size() << ", SD " << widgets::errorFigure(sd_mm(node)) << " mm";
     if (node.n_rejected > 0) lines_ << ", " << node.n_rejected << " rejected";
     if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
     lines_ << std::endl;
   }
 
-  void onTakeFailed(const QString& reason) {
-    const AcquisitionStatus now = controller_.status();
+  void onTakeRefused(int place, double off_m) {
+    live_line_.clear();
+    std::cerr << "Not taken: the sensor is " << fixedText(off_m, 2) << " m away from "
+              << placeName(status_.session->places.at(static_cast<std::size_t>(place)))
+              << "; carry it there, or press Enter again to take it here all the same" << std::endl;
+    prompted_ = true;
+  }
+
+  void tellMisfits(const std::vector<acquisition::PlaceMisfit>& before) {
+    for (const acquisition::PlaceMisfit& misfit : status_.recorded->misfits) {
+      if (std::find(before.begin(), before.end(), misfit) != before.end()) continue;
+      live_line_.clear();
+      lines_ << placeName(status_.session->places.at(misfit.place))
+             << " does not fit the others: " << fixedText(misfit.off_m, 2) << " m off" << std::endl;
+    }
+  }
+
+  void onTakeFailed(const QString& reason, int) {
+    const acquisition::AcquisitionStatus now = controller_.status();
     live_line_.clear();
     std::cerr << "Not taken: " << reason.toStdString() << std::endl;
     prompted_ = false;
     if (!options_.automatic || !now.current || ++failed_takes_[*now.current] < kTakesBeforeSkipping) return;
-    std::cerr << placeText(now.places.at(*now.current)) << "  skipped after " << kTakesBeforeSkipping
+    std::cerr << placeText(now.session->places.at(*now.current)) << "  skipped after " << kTakesBeforeSkipping
               << " takes without success" << std::endl;
     failed_takes_.erase(*now.current);
     controller_.skip();
+  }
+
+  void onRemark(const QString& message) {
+    remarks_.push_back(message.toStdString());
+    if (is_open_) tell(remarks_.back());
+  }
+
+  void tell(const std::string& remark) {
+    live_line_.clear();
+    std::cerr << "note: " << remark << std::endl;
   }
 
   void onFailed(const QString& message) { fail(message.toStdString()); }
@@ -239,19 +281,22 @@ class Acquisition {
 
   /// Tells what the file holds, not what was seen on the way.
   Outcome answer() const {
-    const auto session = SessionStore::open(QString::fromStdString(options_.session));
+    const auto session = acquisition::SessionStore::open(QString::fromStdString(options_.session));
     if (!session) return notPossible(session.error());
-    const std::vector<PlaceState> states = session->states();
-    const auto count = [&states](PlaceState state) { return std::count(states.begin(), states.end(), state); };
-    const auto n_skipped = count(PlaceState::kSkipped);
-    const auto n_suspicious = count(PlaceState::kSuspicious);
-    const auto n_done = count(PlaceState::kDone) + n_suspicious;
+    const auto states = session->states();
+    if (!states) return notPossible(states.error());
+    const auto count = [&states](acquisition::PlaceState state) {
+      return std::count(states->begin(), states->end(), state);
+    };
+    const auto n_skipped = count(acquisition::PlaceState::kSkipped);
+    const auto n_suspicious = count(acquisition::PlaceState::kSuspicious);
+    const auto n_done = count(acquisition::PlaceState::kDone) + n_suspicious;
     Answer answer;
     answer.json = {{"session", options_.session}, {"ended", how_},
-                   {"places", states.size()},     {"done", n_done},
+                   {"places", states->size()},    {"done", n_done},
                    {"skipped", n_skipped},        {"suspicious", n_suspicious}};
     answer.text = (how_ == "finished" ? "Finished: " : "Stopped: ") + std::to_string(n_done) + " of " +
-                  std::to_string(states.size()) + " places done, " + std::to_string(n_skipped) + " skipped, all in " +
+                  std::to_string(states->size()) + " places done, " + std::to_string(n_skipped) + " skipped, all in " +
                   options_.session + "\n";
     if (how_ != "finished") answer.text += "The same command resumes it.\n";
     return answer;
@@ -260,11 +305,13 @@ class Acquisition {
   AcquireOptions options_;
   std::ostream& lines_;
   QObject context_;
-  AcquisitionController controller_;
-  AcquisitionStatus status_;
+  acquisition::AcquisitionController controller_;
+  acquisition::AcquisitionStatus status_;
   std::unique_ptr<QSocketNotifier> input_;
   std::string typed_;
   std::string session_plan_;
+  std::vector<std::string> remarks_;  ///< On how the session was opened, and on what it is recorded with.
+  bool is_open_ = false;
   std::optional<nlohmann::json> expected_plan_;
   std::map<std::size_t, int> failed_takes_;
   LiveLine live_line_;
@@ -279,7 +326,7 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   const auto scene = readSceneArgument(options.scene);
   if (!scene) return tl::unexpected(scene.error());
   // Made only to see that its text can be read, before a session file is made; it is not started.
-  if (const auto device = makeDevice(options.device, *scene); !device) return wrongUsage(device.error());
+  if (const auto device = acquisition::makeDevice(options.device, *scene); !device) return wrongUsage(device.error());
   const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
   if (!resumes && options.plan.empty()) {
     return wrongUsage(options.session + " does not exist yet; a new session needs --plan");

@@ -10,8 +10,11 @@
 #include <vector>
 
 #include "app/cli.h"
+#include "app/cli_values.h"
+#include "calib/calibration/corrector.h"
 #include "calib/core/file_io.h"
-#include "calib/correctors/corrector.h"
+#include "calib/recording/unit_slip.h"
+#include "calib/tables/line_reader.h"
 
 /// apply: corrects the poses of a table of any length, row by row.
 namespace fieldtrue::cli {
@@ -59,12 +62,15 @@ struct PendingRow {
 
 class TableCorrector {
  public:
-  TableCorrector(const Corrector& corrector, std::istream& in, std::string name)
-      : corrector_(corrector), in_(in), name_(std::move(name)) {}
+  TableCorrector(const calibration::Corrector& corrector, std::istream& in, std::string name)
+      : corrector_(corrector), lines_(in, std::move(name)), units_(corrector.region(), trackedPositions(corrector)) {}
 
   /// Copies the table with the corrected columns appended.
   Result<void> run(std::ostream& out) {
-    while (nextLine()) {
+    while (true) {
+      const Result<bool> more = lines_.next(line_);
+      if (!more) return tl::unexpected(more.error());
+      if (!*more) break;
       if (line_.empty() || line_.front() == '#') {
         // Between rows the order of rows and remarks is kept by emptying the batch first.
         flush(out);
@@ -75,27 +81,28 @@ class TableCorrector {
       if (!taken) return taken;
       if (rows_.size() == kBatch) flush(out);
     }
-    if (in_.bad()) return fail(ErrorCode::kIo, name_ + " cannot be read to its end");
-    if (!columns_) return fail(ErrorCode::kBadInput, name_ + " has no header row; columns x_m, y_m, z_m are needed");
+    if (!columns_)
+      return fail(ErrorCode::kBadInput, lines_.name() + " has no header row; columns x_m, y_m, z_m are needed");
     flush(out);
     return {};
   }
+
+  /// Once the table was run. @error kBadInput when the readings seem to be in another unit
+  Result<void> checkUnits() const { return units_.check(); }
 
   std::size_t n_rows() const { return n_rows_; }
   std::size_t n_outside() const { return n_outside_; }
   std::size_t n_lost() const { return n_lost_; }
 
  private:
-  bool nextLine() {
-    if (!std::getline(in_, line_)) return false;
-    ++line_number_;
-    if (line_number_ == 1 && line_.starts_with("\xEF\xBB\xBF")) line_.erase(0, 3);
-    if (!line_.empty() && line_.back() == '\r') line_.pop_back();
-    return true;
+  static std::vector<Eigen::Vector3d> trackedPositions(const calibration::Corrector& corrector) {
+    std::vector<Eigen::Vector3d> positions_m;
+    for (const Node& node : corrector.table().nodes) positions_m.push_back(node.tracker_from_sensor.position_m);
+    return positions_m;
   }
 
   tl::unexpected<Error> bad(const std::string& what) const {
-    return fail(ErrorCode::kBadInput, name_ + " line " + std::to_string(line_number_) + what);
+    return fail(ErrorCode::kBadInput, lines_.name() + " line " + std::to_string(lines_.number()) + what);
   }
 
   Result<void> takeHeader(std::ostream& out) {
@@ -190,6 +197,7 @@ class TableCorrector {
     PendingRow row{line_, std::nullopt};
     if (read) {
       row.pose = poses_.size();
+      if (!marked) units_.add(read->position_m);
       poses_.push_back(*read);
     }
     rows_.push_back(std::move(row));
@@ -229,11 +237,10 @@ class TableCorrector {
     out << ',' << (covered ? 1 : 0);
   }
 
-  const Corrector& corrector_;
-  std::istream& in_;
-  std::string name_;
+  const calibration::Corrector& corrector_;
+  LineReader lines_;
+  recording::ReadingUnits units_;
   std::string line_;
-  std::size_t line_number_ = 0;
   std::optional<Columns> columns_;
   std::vector<std::string> names_;
   std::vector<PendingRow> rows_;
@@ -247,10 +254,11 @@ struct ApplyOptions {
   std::string calibration;
   std::string in;
   std::string out;
+  bool force = false;
 };
 
 Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
-  const auto corrector = Corrector::load(options.calibration);
+  const auto corrector = calibration::Corrector::load(options.calibration);
   if (!corrector) return notPossible(corrector.error());
   if (std::filesystem::is_directory(options.in)) return notPossible(options.in + " is a folder, not a table");
   std::ifstream in(options.in, std::ios::binary);
@@ -261,7 +269,10 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
   TableCorrector table(*corrector, in, options.in);
   std::optional<Error> in_error;
   const auto written = writeFileAtomically(options.out, [&](std::ostream& out) {
-    const auto corrected = table.run(out);
+    auto corrected = table.run(out);
+    if (const auto units = table.checkUnits(); corrected && !units && !options.force) {
+      corrected = fail(units.error().code, options.in + ": " + units.error().message + ", or go on with --force");
+    }
     if (corrected) return;
     in_error = corrected.error();
     out.setstate(std::ios::failbit);
@@ -274,6 +285,8 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
   answer.text = std::to_string(table.n_rows()) + " rows written to " + options.out + "; " +
                 std::to_string(table.n_outside()) + " outside the calibrated region (covered = 0), " +
                 std::to_string(table.n_lost()) + " without a pose\n";
+  if (const auto units = table.checkUnits(); !units)
+    answer.remarks.push_back(options.in + ": " + units.error().message + "; used all the same");
   return answer;
 }
 
@@ -290,6 +303,7 @@ void addApplyCommand(CommandLine& line) {
   command->add_option("--out", options->out, "The same table with the corrected columns appended")
       ->type_name("CSV")
       ->required();
+  addForceOption(*command, options->force, "Go on although the readings seem to be in another unit than metres");
 }
 
 }  // namespace fieldtrue::cli

@@ -6,11 +6,14 @@
 #include "acquisition/session/session_store.h"
 #include "app/cli.h"
 #include "app/cli_values.h"
-#include "calib/core/table_io.h"
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/corrector.h"
 #include "calib/exporters/registry.h"
+#include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
+#include "calib/recording/unit_slip.h"
 #include "calib/simulation/simulator.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 
 /// simulate, tables, import, export: commands that make files from other files.
 namespace fieldtrue::cli {
@@ -76,10 +79,11 @@ Outcome runSimulate(const SimulateOptions& options, const CommonOptions& common)
   if (!plan) return tl::unexpected(plan.error());
   const auto scene = readSceneArgument(options.scene);
   if (!scene) return tl::unexpected(scene.error());
-  SimulationOptions simulation_options;
+  simulation::SimulationOptions simulation_options;
   simulation_options.seed = options.seed;
   simulation_options.samples_per_node = options.samples_per_node;
-  const auto simulation = simulate(*scene, places(*plan), simulation_options, runControl(common, "simulating"));
+  const auto simulation =
+      simulation::simulate(*scene, places(*plan), simulation_options, runControl(common, "simulating"));
   if (!simulation) return notPossible(simulation.error());
   return writeTables(options.out, &simulation->table, &simulation->samples, {});
 }
@@ -107,15 +111,23 @@ struct TablesOptions {
 };
 
 Outcome runTables(const TablesOptions& options, const CommonOptions&) {
-  const auto session = SessionStore::open(QString::fromStdString(options.session));
+  const auto session = acquisition::SessionStore::open(QString::fromStdString(options.session));
   if (!session) return notPossible(session.error());
-  const CalibrationTable table = session->nodeTable();
-  if (table.nodes.empty()) {
+  const auto table = session->nodeTable();
+  if (!table) return notPossible(table.error());
+  if (table->nodes.empty()) {
     return notPossible(options.session + " holds no recorded place yet; record at least one with acquire");
   }
-  if (options.out.samples.empty()) return writeTables(options.out, &table, nullptr, {});
-  const SampleTable samples = session->sampleTable();
-  return writeTables(options.out, &table, &samples, {});
+  Outcome written;
+  if (options.out.samples.empty()) {
+    written = writeTables(options.out, &*table, nullptr, {});
+  } else {
+    const auto samples = session->sampleTable();
+    if (!samples) return notPossible(samples.error());
+    written = writeTables(options.out, &*table, &*samples, {});
+  }
+  if (written) written->remarks = session->remarks();
+  return written;
 }
 
 void addTables(CommandLine& line) {
@@ -133,10 +145,10 @@ struct ImportOptions {
 };
 
 /// The chosen importer and its settings, or what is wrong with `--format`.
-Read<std::pair<const Importer*, Settings>> readFormat(const std::string& text) {
+Read<std::pair<const importers::Importer*, Settings>> readFormat(const std::string& text) {
   const auto format = parseMethodText(text);
   if (!format) return wrongUsage(format.error());
-  const auto importer = findImporter(format->id);
+  const auto importer = importers::findImporter(format->id);
   if (!importer) return wrongUsage(importer.error());
   auto settings = resolveSettings(format->id, (*importer)->settings, format->given);
   if (!settings) return wrongUsage(settings.error());
@@ -155,8 +167,12 @@ Outcome runImport(const ImportOptions& options, const CommonOptions&) {
   }
   std::optional<std::filesystem::path> truth;
   if (!options.truth.empty()) truth = options.truth;
-  const auto imported = importer->read(options.in, truth, settings);
+  auto imported = importer->read(options.in, truth, settings);
   if (!imported) return notPossible(imported.error());
+  if (imported->table) {
+    if (const auto units = recording::checkUnits(*imported->table); !units)
+      imported->notes.push_back(units.error().message);
+  }
   if (!options.out.nodes.empty() && !imported->table) {
     return notPossible(options.in +
                        " holds no true positions, so there is no node table; write its samples with --samples");
@@ -190,9 +206,9 @@ struct ExportOptions {
 };
 
 Outcome runExport(const ExportOptions& options, const CommonOptions& common) {
-  const auto exporter = findExporter(options.format);
+  const auto exporter = exporters::findExporter(options.format);
   if (!exporter) return wrongUsage(exporter.error());
-  auto corrector = Corrector::load(options.calibration);
+  auto corrector = calibration::Corrector::load(options.calibration);
   if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
   const auto written = (*exporter)->write(*corrector, options.out);

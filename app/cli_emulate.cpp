@@ -1,19 +1,18 @@
 #include <QCoreApplication>
 #include <QObject>
 #include <QTimer>
-#include <array>
 #include <cmath>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "acquisition/devices/registry.h"
 #include "acquisition/emulators/emulator_faults.h"
-#include "acquisition/emulators/fastrak_emulator.h"
 #include "app/cli.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
-#include "calib/core/table_io.h"
+#include "calib/tables/table_io.h"
 
 /// emulate: plays the device side of a tracker's protocol on a pty or a TCP port.
 namespace fieldtrue::cli {
@@ -30,35 +29,18 @@ struct EmulateOptions {
   std::optional<double> duration_s;
 };
 
-/// One row a tracker that can be emulated.
-struct EmulatorKind {
-  const char* id;
-  const char* label;
-  Result<std::unique_ptr<EmulatorRunner>> (*make)(const FastrakEmulation& emulation);
-};
-constexpr std::array kEmulators = {EmulatorKind{"fastrak", "Polhemus Fastrak", makeFastrakEmulator}};
-
-Read<const EmulatorKind*> findEmulator(const std::string& id) {
-  std::string known;
-  for (const EmulatorKind& kind : kEmulators) {
-    if (kind.id == id) return &kind;
-    known += (known.empty() ? "" : ", ") + std::string(kind.id);
-  }
-  return wrongUsage("no emulator is called '" + id + "'; known: " + known);
-}
-
-Read<FastrakEmulation> readEmulation(const EmulateOptions& options, std::vector<std::string>& notes) {
+Read<acquisition::Emulation> readEmulation(const EmulateOptions& options, std::vector<std::string>& notes) {
   if (options.pty_link.empty() == !options.port) {
     return wrongUsage("an emulator needs one line: --pty LINK or --listen PORT");
   }
   if (!options.scene.empty() && !options.replay.empty()) {
     return wrongUsage("--scene and --replay exclude each other: a recording is sent as it is");
   }
-  FastrakEmulation emulation;
+  acquisition::Emulation emulation;
   emulation.pty_link = options.pty_link;
   emulation.tcp_port = options.port;
   emulation.seed = options.seed;
-  const auto faults = parseFaults(options.faults);
+  const auto faults = acquisition::parseFaults(options.faults);
   if (!faults) return wrongUsage(faults.error());
   emulation.faults = *faults;
   const auto scene = readSceneArgument(options.scene);
@@ -73,18 +55,18 @@ Read<FastrakEmulation> readEmulation(const EmulateOptions& options, std::vector<
 }
 
 Outcome runEmulate(const EmulateOptions& options, const CommonOptions& common) {
-  const auto kind = findEmulator(options.tracker);
-  if (!kind) return tl::unexpected(kind.error());
+  const auto kind = acquisition::findEmulated(options.tracker);
+  if (!kind) return wrongUsage(kind.error());
   Answer answer;
   const auto emulation = readEmulation(options, answer.remarks);
   if (!emulation) return tl::unexpected(emulation.error());
-  auto emulator = (*kind)->make(*emulation);
+  auto emulator = (*kind)->emulate(*emulation);
   if (!emulator) return notPossible(emulator.error());
-  EmulatorRunner& runner = **emulator;
+  acquisition::EmulatorRunner& runner = **emulator;
   std::ostream& lines = common.json ? std::cerr : std::cout;
-  QObject::connect(&runner, &EmulatorRunner::notice, &runner,
+  QObject::connect(&runner, &acquisition::EmulatorRunner::notice, &runner,
                    [&lines](const QString& text) { lines << text.toStdString() << std::endl; });
-  QObject::connect(&runner, &EmulatorRunner::unplugged, &runner,
+  QObject::connect(&runner, &acquisition::EmulatorRunner::unplugged, &runner,
                    [&lines] { lines << "The line is unplugged" << std::endl; });
   const EndRequest end_request([] { QCoreApplication::quit(); });
   const auto started = runner.start();
@@ -102,9 +84,16 @@ Outcome runEmulate(const EmulateOptions& options, const CommonOptions& common) {
   return answer;
 }
 
+std::string emulatedKinds() {
+  std::string ids;
+  for (const acquisition::DeviceKind& kind : acquisition::deviceKinds())
+    if (kind.emulate) ids += (ids.empty() ? "" : ", ") + kind.id;
+  return ids;
+}
+
 std::string faultsHelp() {
   std::string text = "Comma-separated faults to exercise a driver with:";
-  for (const EmulatorFault& fault : emulatorFaults()) {
+  for (const acquisition::EmulatorFault& fault : acquisition::emulatorFaults()) {
     text += "\n  " + fault.id + (fault.needs_count ? "=N" : "") + "  " + fault.help;
   }
   return text;
@@ -114,7 +103,7 @@ std::string faultsHelp() {
 
 void addEmulateCommand(CommandLine& line) {
   auto [command, options] = line.add("emulate", "Play the device side of a tracker on a pty or TCP port", runEmulate);
-  command->add_option("tracker", options->tracker, "Which tracker: fastrak")->type_name("KIND")->required();
+  command->add_option("tracker", options->tracker, "Which tracker: " + emulatedKinds())->type_name("KIND")->required();
   command->add_option("--pty", options->pty_link, "Symbolic link to make for the pseudo-terminal")->type_name("LINK");
   command->add_option("--listen", options->port, "TCP port to listen on; 0 = any free one")
       ->type_name("PORT")

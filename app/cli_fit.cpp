@@ -6,9 +6,11 @@
 
 #include "acquisition/session/session_store.h"
 #include "app/cli.h"
+#include "app/cli_pictures.h"
 #include "app/cli_text.h"
 #include "app/cli_values.h"
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/learning_curve.h"
 #include "widgets/report/report.h"
@@ -27,6 +29,7 @@ struct FitOptions {
   std::string align;
   std::optional<double> bake_um;
   std::string out;
+  TableArguments table;
 };
 
 /// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
@@ -38,9 +41,10 @@ std::vector<Node> fitRows(const CalibrationTable& table) {
   return rows;
 }
 
-Answer fitAnswer(const FitOptions& options, const Corrector& corrector, AlignMode align, std::size_t n_unused) {
-  const FitReport& report = corrector.report();
-  const CorrectorChoice& choice = corrector.choice();
+Answer fitAnswer(const FitOptions& options, const calibration::Corrector& corrector, calibration::AlignMode align,
+                 std::size_t n_unused) {
+  const calibration::FitReport& report = corrector.report();
+  const calibration::CorrectorChoice& choice = corrector.choice();
   Answer answer;
   answer.json = {
       {"schema", "fieldtrue.fit/1"},
@@ -63,15 +67,15 @@ Answer fitAnswer(const FitOptions& options, const Corrector& corrector, AlignMod
 }
 
 Outcome runFit(const FitOptions& options, const CommonOptions& common) {
-  const auto choice = parseCorrectorChoice(options.position, options.orientation);
+  const auto choice = calibration::parseCorrectorChoice(options.position, options.orientation);
   if (!choice) return wrongUsage(choice.error());
-  const auto reading = readNodesArgument(options.nodes);
+  const auto reading = readRowsArgument(options.nodes, options.table);
   if (!reading) return tl::unexpected(reading.error());
   const CalibrationTable& table = reading->table;
-  const auto align = readAlignArgument(options.align, defaultAlignMode(table.metadata));
+  const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(table.metadata));
   if (!align) return tl::unexpected(align.error());
   const std::vector<Node> rows = fitRows(table);
-  auto corrector = Corrector::fit(rows, table.metadata, *choice, *align, runControl(common, "fitting"));
+  auto corrector = calibration::Corrector::fit(rows, table.metadata, *choice, *align, runControl(common, "fitting"));
   if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
   const auto saved = corrector->save(options.out);
@@ -94,6 +98,7 @@ void addFit(CommandLine& line) {
       ->add_option("--align", options->align,
                    "none or rigid; default rigid unless the table says the alignment is known")
       ->type_name("MODE");
+  addTableOptions(*command, options->table);
   command
       ->add_option("--bake-um", options->bake_um,
                    "Bake the position part to a lattice that deviates by at most so much inside the region")
@@ -106,15 +111,18 @@ struct CompareOptions {
   std::string nodes;
   std::string html;
   bool learning_curve = false;
+  TableArguments table;
   ComparisonArguments comparison;
 };
 
-ReportInput reportInput(CalibrationTable table, Comparison comparison, const std::string& source, std::uint64_t seed) {
-  ReportInput input;
+widgets::ReportInput reportInput(CalibrationTable table, evaluation::Comparison comparison, const std::string& source,
+                                 std::uint64_t seed) {
+  widgets::ReportInput input;
   input.table = std::move(table);
   input.comparison = std::move(comparison);
   input.source = source;
   input.seed = seed;
+  input.draw = drawByProgram;
   input.made_at = QDateTime::currentDateTime().toString(Qt::ISODate).toStdString();
   return input;
 }
@@ -122,26 +130,26 @@ ReportInput reportInput(CalibrationTable table, Comparison comparison, const std
 Outcome runCompare(const CompareOptions& options, const CommonOptions& common) {
   const auto arguments = readComparisonArguments(options.comparison);
   if (!arguments) return tl::unexpected(arguments.error());
-  const auto reading = readNodesArgument(options.nodes);
+  const auto reading = readRowsArgument(options.nodes, options.table);
   if (!reading) return tl::unexpected(reading.error());
-  const auto comparison = compareMethods(reading->table, *arguments, runControl(common, "comparing"));
+  const auto comparison = evaluation::compareMethods(reading->table, *arguments, runControl(common, "comparing"));
   if (!comparison) return notPossible(comparison.error());
-  std::vector<LearningCurve> curves;
+  std::vector<evaluation::LearningCurve> curves;
   if (options.learning_curve) {
-    auto learned = learningCurves(reading->table, *arguments, runControl(common, "learning"));
+    auto learned = evaluation::learningCurves(reading->table, *arguments, runControl(common, "learning"));
     if (!learned) return notPossible(learned.error());
     curves = *std::move(learned);
   }
   Answer answer{comparisonText(*comparison, curves), toJson(*comparison), reading->notes};
   if (options.learning_curve) {
     answer.json["learning_curves"] = nlohmann::json::array();
-    for (const LearningCurve& curve : curves) answer.json["learning_curves"].push_back(toJson(curve));
+    for (const evaluation::LearningCurve& curve : curves) answer.json["learning_curves"].push_back(toJson(curve));
   }
   if (!options.html.empty()) {
-    ReportInput input = reportInput(reading->table, *comparison, options.nodes, options.comparison.seed);
+    widgets::ReportInput input = reportInput(reading->table, *comparison, options.nodes, options.comparison.seed);
     input.notes = reading->notes;
     input.learning_curves = std::move(curves);
-    const auto written = writeHtmlReport(input, options.html);
+    const auto written = widgets::writeHtmlReport(input, options.html);
     if (!written) return notPossible(written.error());
   }
   return answer;
@@ -150,6 +158,7 @@ Outcome runCompare(const CompareOptions& options, const CommonOptions& common) {
 void addCompare(CommandLine& line) {
   auto [command, options] = line.add("compare", "Score the methods on places their fits did not see", runCompare);
   command->add_option("--nodes", options->nodes, "Node table")->type_name("FILE")->required();
+  addTableOptions(*command, options->table);
   addComparisonOptions(*command, options->comparison);
   command->add_option("--html", options->html, "Report to write beside the answer")->type_name("FILE");
   command->add_flag("--learning-curve", options->learning_curve,
@@ -160,30 +169,40 @@ struct ReportOptions {
   std::string nodes;
   std::string session;
   std::string html;
+  TableArguments table;
   ComparisonArguments comparison;
 };
 
 /// A report's input without its comparison, from a session or a node table.
-Read<ReportInput> readReportInput(const ReportOptions& options) {
-  ReportInput input;
+Read<widgets::ReportInput> readReportInput(const ReportOptions& options) {
+  widgets::ReportInput input;
   if (options.session.empty()) {
-    auto reading = readNodesArgument(options.nodes);
+    auto reading = readRowsArgument(options.nodes, options.table);
     if (!reading) return tl::unexpected(reading.error());
     input.table = std::move(reading->table);
     input.notes = std::move(reading->notes);
     input.source = options.nodes;
     return input;
   }
-  const auto session = SessionStore::open(QString::fromStdString(options.session));
+  const auto session = acquisition::SessionStore::open(QString::fromStdString(options.session));
   if (!session) return notPossible(session.error());
-  input.table = session->nodeTable();
+  auto table = session->nodeTable();
+  if (!table) return notPossible(table.error());
+  auto states = session->states();
+  if (!states) return notPossible(states.error());
+  input.table = *std::move(table);
   input.source = options.session;
   input.places = session->places();
-  input.states = session->states();
+  input.states = *std::move(states);
+  input.notes = session->remarks();
   if (session->plan().explicit_places.empty()) input.plan = toJson(session->plan()).dump();
   if (input.table.nodes.empty()) {
     return notPossible(options.session + " holds no recorded place yet; record at least four with acquire");
   }
+  auto rows = chooseRows({std::move(input.table), {}}, options.session, options.table);
+  if (!rows) return tl::unexpected(rows.error());
+  input.table = std::move(rows->table);
+  input.notes = std::move(rows->notes);
   return input;
 }
 
@@ -195,18 +214,21 @@ Outcome runReport(const ReportOptions& options, const CommonOptions& common) {
   if (!arguments) return tl::unexpected(arguments.error());
   auto input = readReportInput(options);
   if (!input) return tl::unexpected(input.error());
-  const auto comparison = compareMethods(input->table, *arguments, runControl(common, "comparing"));
+  const auto comparison = evaluation::compareMethods(input->table, *arguments, runControl(common, "comparing"));
   if (!comparison) return notPossible(comparison.error());
-  ReportInput whole = reportInput(std::move(input->table), *comparison, input->source, options.comparison.seed);
+  widgets::ReportInput whole =
+      reportInput(std::move(input->table), *comparison, input->source, options.comparison.seed);
   whole.plan = input->plan;
   whole.places = input->places;
   whole.states = input->states;
   whole.notes = input->notes;
-  const auto written = writeHtmlReport(whole, options.html);
+  const auto written = widgets::writeHtmlReport(whole, options.html);
   if (!written) return notPossible(written.error());
   Answer answer;
   answer.json = {{"file", options.html}, {"verdict", comparison->verdict.text}};
+  answer.remarks = input->notes;
   answer.text = comparison->verdict.text + "\nReport written to " + options.html + "\n";
+  answer.remarks = whole.notes;
   return answer;
 }
 
@@ -214,6 +236,7 @@ void addReport(CommandLine& line) {
   auto [command, options] = line.add("report", "Write one HTML page about a calibration", runReport);
   command->add_option("--session", options->session, "Session file (*.fieldtrue)")->type_name("FILE");
   command->add_option("--nodes", options->nodes, "Node table, instead of a session")->type_name("FILE");
+  addTableOptions(*command, options->table);
   addComparisonOptions(*command, options->comparison);
   command->add_option("--html", options->html, "Page to write")->type_name("FILE")->required();
 }

@@ -9,13 +9,17 @@
 #include <vector>
 
 #include "app/cli.h"
+#include "app/cli_barrier.h"
 #include "app/cli_gap_text.h"
+#include "app/cli_pictures.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
+#include "calib/core/exception_barrier.h"
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
-#include "calib/gap/gap_json.h"
-#include "calib/gap/recording_change.h"
+#include "calib/gap/json.h"
+#include "calib/recording/recording_change.h"
+#include "calib/tables/table_sensors.h"
 #include "widgets/report/gap_section.h"
 
 /// diagnose, plan-check, blind: the gap between the simulation and what was recorded.
@@ -32,33 +36,35 @@ struct DiagnoseOptions {
   std::string out;
   std::string html;
   std::string updated_scene;
+  TableArguments table;
 };
 
 /// All that a diagnosis starts from.
 struct DiagnosisInput {
   CalibrationTable table;
   std::optional<SampleTable> samples;
-  std::optional<Scene> scene;
+  std::optional<simulation::Scene> scene;
   std::vector<std::string> notes;
 };
 
 Read<DiagnosisInput> readDiagnosisInput(const DiagnoseOptions& options) {
   DiagnosisInput input;
-  auto nodes = readNodesArgument(options.nodes);
+  auto nodes = readRowsArgument(options.nodes, options.table);
   if (!nodes) return tl::unexpected(nodes.error());
   input.table = std::move(nodes->table);
   input.notes = std::move(nodes->notes);
   if (!options.against.empty()) {
-    auto before = readNodesArgument(options.against);
+    auto before = readRowsArgument(options.against, options.table);
     if (!before) return tl::unexpected(before.error());
-    auto change = changeSince(before->table, input.table);
+    auto change = recording::changeSince(before->table, input.table);
     if (!change) return notPossible(change.error());
     input.table = *std::move(change);
   }
   if (!options.samples.empty()) {
     auto samples = readSampleTable(std::filesystem::path(options.samples));
     if (!samples) return notPossible(samples.error());
-    input.samples = std::move(samples->table);
+    input.samples =
+        options.table.sensor ? rowsOfSensor(samples->table, *options.table.sensor) : std::move(samples->table);
     input.notes.insert(input.notes.end(), samples->notes.begin(), samples->notes.end());
   }
   if (!options.scene.empty()) {
@@ -77,7 +83,7 @@ Result<T> stoppable(RunControl control, Work work) {
   std::optional<Result<T>> result;
   const EndRequest end_request([&source] { source.request_stop(); });
   std::thread worker([&] {
-    result = work(control);
+    result = withBarrier(kNoHalfFile, [&] { return work(control); });
     QMetaObject::invokeMethod(QCoreApplication::instance(), &QCoreApplication::quit, Qt::QueuedConnection);
   });
   QCoreApplication::exec();
@@ -85,7 +91,7 @@ Result<T> stoppable(RunControl control, Work work) {
   return *std::move(result);
 }
 
-Result<void> writeScene(const std::string& path, const Scene& scene) {
+Result<void> writeScene(const std::string& path, const simulation::Scene& scene) {
   return writeFileAtomically(path, [&](std::ostream& out) { out << toJson(scene).dump(2) << '\n'; });
 }
 
@@ -93,20 +99,20 @@ Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common)
   const auto input = readDiagnosisInput(options);
   if (!input) return tl::unexpected(input.error());
   const SampleTable* samples = input->samples ? &*input->samples : nullptr;
-  const Scene* scene = input->scene ? &*input->scene : nullptr;
-  const auto report = stoppable<GapReport>(runControl(common, "diagnosing"), [&](const RunControl& control) {
-    return diagnose(input->table, samples, scene, {}, control);
+  const simulation::Scene* scene = input->scene ? &*input->scene : nullptr;
+  const auto report = stoppable<gap::GapReport>(runControl(common, "diagnosing"), [&](const RunControl& control) {
+    return gap::diagnose(input->table, samples, scene, {}, control);
   });
   if (!report) return notPossible(report.error());
-  if (const auto written = writeGapReport(options.out, *report); !written) return notPossible(written.error());
+  if (const auto written = gap::writeGapReport(options.out, *report); !written) return notPossible(written.error());
   Answer answer{gapText(*report) + "\nWritten to " + options.out + "\n", toJson(*report), input->notes};
   if (!options.html.empty()) {
-    if (const auto written = writeGapHtml(*report, options.html, &input->table); !written)
+    if (const auto written = widgets::writeGapHtml(*report, drawByProgram, options.html, &input->table); !written)
       return notPossible(written.error());
     answer.text += "Page written to " + options.html + "\n";
   }
   if (!options.updated_scene.empty()) {
-    const Scene updated = updatedScene(input->scene.value_or(Scene{}), *report);
+    const simulation::Scene updated = gap::updatedScene(input->scene.value_or(simulation::Scene{}), *report);
     if (const auto written = writeScene(options.updated_scene, updated); !written) return notPossible(written.error());
     answer.text +=
         "Scene with " + std::to_string(updated.effects.size()) + " effects written to " + options.updated_scene + "\n";
@@ -118,6 +124,7 @@ void addDiagnose(CommandLine& line) {
   auto [command, options] = line.add(
       "diagnose", "Find where a recording differs from the simulation, why, and by how much less", runDiagnose);
   command->add_option("--nodes", options->nodes, "Node table")->type_name("FILE")->required();
+  addTableOptions(*command, options->table);
   command
       ->add_option("--against", options->against,
                    "Node table of the same places recorded before: find what changed since, whatever the rig says")
@@ -139,6 +146,7 @@ struct PlanCheckOptions {
   std::string plan;
   std::string nodes;
   std::string scene;
+  TableArguments table;
 };
 
 std::vector<PlannedPlace> placesOf(const CalibrationTable& table) {
@@ -158,7 +166,7 @@ Read<std::vector<PlannedPlace>> readPlaces(const PlanCheckOptions& options) {
     if (!plan) return tl::unexpected(plan.error());
     return places(*plan);
   }
-  const auto reading = readNodesArgument(options.nodes);
+  const auto reading = readRowsArgument(options.nodes, options.table);
   if (!reading) return tl::unexpected(reading.error());
   return placesOf(reading->table);
 }
@@ -166,14 +174,14 @@ Read<std::vector<PlannedPlace>> readPlaces(const PlanCheckOptions& options) {
 Outcome runPlanCheck(const PlanCheckOptions& options, const CommonOptions& common) {
   const auto places = readPlaces(options);
   if (!places) return tl::unexpected(places.error());
-  std::optional<Scene> scene;
+  std::optional<simulation::Scene> scene;
   if (!options.scene.empty()) {
     auto read = readSceneArgument(options.scene);
     if (!read) return tl::unexpected(read.error());
     scene = *std::move(read);
   }
-  const auto isolability = stoppable<Isolability>(runControl(common, "checking"), [&](const RunControl& control) {
-    return planCheck(*places, scene ? &*scene : nullptr, control);
+  const auto isolability = stoppable<gap::Isolability>(runControl(common, "checking"), [&](const RunControl& control) {
+    return gap::planCheck(*places, scene ? &*scene : nullptr, control);
   });
   if (!isolability) return notPossible(isolability.error());
   Answer answer;
@@ -190,6 +198,7 @@ void addPlanCheck(CommandLine& line) {
   command->add_option("--plan", options->plan, "Plan text (grid:...) or *.plan.json")->type_name("PLAN");
   command->add_option("--nodes", options->nodes, "Node table, instead of a plan: the grid as it was recorded")
       ->type_name("FILE");
+  addTableOptions(*command, options->table);
   command->add_option("--scene", options->scene, "Tracker, its place and the rig's tolerances (*.scene.json)")
       ->type_name("FILE");
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "app/cli_text.h"
+#include "calib/core/number_text.h"
+#include "calib/recording/finding.h"
 #include "widgets/report/numbers.h"
 
 namespace fieldtrue::cli {
@@ -17,13 +19,13 @@ constexpr double kSmallestProbability = 5e-4;
 /// Pairs less alike than this are told apart without trouble.
 constexpr double kSmallestR2 = 0.1;
 
-std::string millimetres(double value_mm) { return std::isfinite(value_mm) ? decimalText(value_mm, 2) + " mm" : "-"; }
+std::string millimetres(double value_mm) { return std::isfinite(value_mm) ? fixedText(value_mm, 2) + " mm" : "-"; }
 
-std::string percent(double fraction) { return std::isfinite(fraction) ? decimalText(100.0 * fraction, 0) + " %" : "-"; }
+std::string percent(double fraction) { return std::isfinite(fraction) ? fixedText(100.0 * fraction, 0) + " %" : "-"; }
 
 std::string interval(const std::optional<double>& low, const std::optional<double>& high, double factor, int decimals) {
   if (!low || !high) return "";
-  return decimalText(factor * *low, decimals) + " to " + decimalText(factor * *high, decimals);
+  return fixedText(factor * *low, decimals) + " to " + fixedText(factor * *high, decimals);
 }
 
 std::string joined(const std::vector<std::string>& texts, const std::string& skipped) {
@@ -34,40 +36,40 @@ std::string joined(const std::vector<std::string>& texts, const std::string& ski
   return list;
 }
 
-std::string gapLine(const GapReport& report) {
+std::string gapLine(const gap::GapReport& report) {
   std::string text = "Gap " + millimetres(report.position_rms_mm) + " RMS over " + std::to_string(report.input.places) +
                      " places, floor " + millimetres(report.floor_position_mm);
   if (report.orientation_rms_deg) {
-    text += "; orientation " + decimalText(*report.orientation_rms_deg, 3) + " deg";
-    if (report.floor_orientation_deg) text += ", floor " + decimalText(*report.floor_orientation_deg, 3) + " deg";
+    text += "; orientation " + fixedText(*report.orientation_rms_deg, 3) + " deg";
+    if (report.floor_orientation_deg) text += ", floor " + fixedText(*report.floor_orientation_deg, 3) + " deg";
   }
   const auto flagged =
-      std::count_if(report.nodes.begin(), report.nodes.end(), [](const GapNode& node) { return node.is_flagged; });
+      std::count_if(report.nodes.begin(), report.nodes.end(), [](const gap::GapNode& node) { return node.is_flagged; });
   if (flagged > 0) text += "; " + std::to_string(flagged) + " rows stand out of it";
   return text + ".\n";
 }
 
-std::string findingsText(const GapReport& report) {
+std::string findingsText(const gap::GapReport& report) {
   std::string text;
-  for (const GapFinding& finding : report.findings) {
+  for (const recording::GapFinding& finding : report.findings) {
     text += (finding.effect.empty() ? "" : finding.effect + ": ") + finding.text + "\n";
   }
   return text;
 }
 
-std::string placeText(const GapCandidate& candidate) {
+std::string placeText(const gap::GapCandidate& candidate) {
   if (!candidate.location_m) return "";
   const Eigen::Vector3d& p_m = *candidate.location_m;
-  return "(" + decimalText(p_m.x(), 2) + ", " + decimalText(p_m.y(), 2) + ", " + decimalText(p_m.z(), 2) + ") m";
+  return "(" + fixedText(p_m.x(), 2) + ", " + fixedText(p_m.y(), 2) + ", " + fixedText(p_m.z(), 2) + ") m";
 }
 
-std::string candidatesText(const GapReport& report) {
+std::string candidatesText(const gap::GapReport& report) {
   std::vector<Row> rows{{"cause", "probability", "BIC gain", "gap left", "shrinks by", "at", "looks like here"}};
-  for (const GapCandidate& candidate : report.candidates) {
+  for (const gap::GapCandidate& candidate : report.candidates) {
     if (rows.size() > kMostCandidates || candidate.probability < kSmallestProbability) break;
     const bool is_none = candidate.effect == "none";
     rows.push_back({candidate.effect + (candidate.is_plausible ? "" : " (not plausible: " + candidate.doubt + ")"),
-                    percent(candidate.probability), decimalText(candidate.bic_gain, 1),
+                    percent(candidate.probability), fixedText(candidate.bic_gain, 1),
                     is_none ? "" : millimetres(candidate.shrinkage.after_mm),
                     is_none ? "" : percent(candidate.shrinkage.fraction), placeText(candidate),
                     joined(candidate.equivalents, candidate.effect)});
@@ -75,34 +77,34 @@ std::string candidatesText(const GapReport& report) {
   return rows.size() > 1 ? alignedColumns(rows) : "";
 }
 
-std::string sequenceText(const GapReport& report) {
+std::string sequenceText(const gap::GapReport& report) {
   if (report.sequence.size() < 2) return "";
   std::vector<Row> rows{{"held out", "gap above the floor", "90 % interval [mm]"}};
-  for (const GapStep& step : report.sequence) {
+  for (const gap::GapStep& step : report.sequence) {
     rows.push_back({step.effect.empty() ? "start" : "+ " + step.effect, millimetres(step.excess_mm),
                     interval(step.low90_mm, step.high90_mm, 1.0, 2)});
   }
   return alignedColumns(rows);
 }
 
-std::string remainingText(const GapReport& report) {
-  if (report.selected.empty() && report.verdict == GapVerdict::kNoGap) return "";
+std::string remainingText(const gap::GapReport& report) {
+  if (report.selected.empty() && report.verdict == gap::GapVerdict::kNoGap) return "";
   std::string text = "What remains: " + millimetres(report.remaining_position_rms_mm) + " RMS, " +
                      percent(report.remaining_fraction) + " of the start";
   if (!report.remaining_where.empty()) {
-    text += ", most at nodes";
-    const std::size_t named = std::min<std::size_t>(report.remaining_where.size(), 8);
-    for (std::size_t i = 0; i < named; ++i) text += (i == 0 ? " " : ", ") + std::to_string(report.remaining_where[i]);
+    std::vector<int> named = report.remaining_where;
+    named.resize(std::min<std::size_t>(named.size(), 8));
+    text += ", most at " + report.names.list(named, 8);
   }
   return text + ".\n";
 }
 
-std::string predictionsText(const GapReport& report) {
+std::string predictionsText(const gap::GapReport& report) {
   std::string text;
-  for (const Prediction& prediction : report.predictions) {
-    text += "Without " + prediction.effect + " node " + std::to_string(prediction.node) + " should go from " +
-            decimalText(prediction.now_mm, 1) + " to " + decimalText(prediction.then_mm, 1) + " +- " +
-            decimalText(prediction.then_sd_mm, 1) + " mm.\n";
+  for (const gap::Prediction& prediction : report.predictions) {
+    text += "Without " + prediction.effect + " " + report.names.of(prediction.node) + " should go from " +
+            fixedText(prediction.now_mm, 1) + " to " + fixedText(prediction.then_mm, 1) + " +- " +
+            fixedText(prediction.then_sd_mm, 1) + " mm.\n";
   }
   return text;
 }
@@ -118,21 +120,22 @@ std::string blocks(const std::vector<std::string>& texts) {
 
 }  // namespace
 
-std::string gapText(const GapReport& report) {
+std::string gapText(const gap::GapReport& report) {
   const std::string next = report.next_measurement.empty() ? "" : "Next: " + report.next_measurement + "\n";
-  return blocks({std::string(idOf(report.verdict)) + ": " + report.text + "\n" + gapLine(report), findingsText(report),
-                 candidatesText(report), sequenceText(report), remainingText(report) + predictionsText(report), next});
+  return blocks({std::string(gap::idOf(report.verdict)) + ": " + report.text + "\n" + gapLine(report),
+                 findingsText(report), candidatesText(report), sequenceText(report),
+                 remainingText(report) + predictionsText(report), next});
 }
 
-std::string isolabilityText(const Isolability& isolability) {
-  std::vector<IsolabilityPair> pairs = isolability.pairs;
+std::string isolabilityText(const gap::Isolability& isolability) {
+  std::vector<gap::IsolabilityPair> pairs = isolability.pairs;
   std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const IsolabilityPair& a, const IsolabilityPair& b) { return a.r2 > b.r2; });
+                   [](const gap::IsolabilityPair& a, const gap::IsolabilityPair& b) { return a.r2 > b.r2; });
   std::vector<Row> rows{{"effect", "and effect", "R2", ""}};
-  for (const IsolabilityPair& pair : pairs) {
+  for (const gap::IsolabilityPair& pair : pairs) {
     if (pair.r2 < kSmallestR2 || rows.size() > kMostPairs) break;
     const std::string told = pair.r2 > 0.9 ? "cannot be told apart" : pair.r2 > 0.5 ? "hard to tell apart" : "";
-    rows.push_back({pair.a, pair.b, decimalText(pair.r2, 3), told});
+    rows.push_back({pair.a, pair.b, fixedText(pair.r2, 3), told});
   }
   const std::size_t apart = pairs.size() + 1 - rows.size();
   std::string text = rows.size() > 1 ? alignedColumns(rows) : "";

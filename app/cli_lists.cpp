@@ -6,7 +6,9 @@
 #include "calib/core/file_io.h"
 #include "calib/correctors/registry.h"
 #include "calib/effects/effect_listing.h"
+#include "calib/exporters/exporter.h"
 #include "calib/exporters/registry.h"
+#include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 
 /// methods, effects, devices, formats: what is available, with settings and units.
@@ -65,22 +67,22 @@ void addMethods(Answer& answer, const std::string& kind, const Rows& rows) {
 
 Outcome listMethods(const ListOptions&, const CommonOptions&) {
   Answer answer;
-  addMethods(answer, "position", positionMethods());
-  addMethods(answer, "orientation", orientationMethods());
+  addMethods(answer, "position", correctors::positionMethods());
+  addMethods(answer, "orientation", correctors::orientationMethods());
   return answer;
 }
 
 Outcome listEffects(const ListOptions&, const CommonOptions&) {
   Answer answer;
-  answer.json["effects"] = effectListing();
-  answer.text = effectListingText();
+  answer.json["effects"] = effects::effectListing();
+  answer.text = effects::effectListingText();
   return answer;
 }
 
 Outcome listDevices(const ListOptions&, const CommonOptions&) {
   Answer answer;
   auto& kinds = answer.json["devices"] = nlohmann::json::array();
-  for (const DeviceKind& kind : deviceKinds()) {
+  for (const acquisition::DeviceKind& kind : acquisition::deviceKinds()) {
     nlohmann::json row = rowJson(kind);
     row["address"] = kind.address_help;
     kinds.push_back(std::move(row));
@@ -88,7 +90,7 @@ Outcome listDevices(const ListOptions&, const CommonOptions&) {
   }
   auto& lines = answer.json["serial_lines"] = nlohmann::json::array();
   answer.text += "\nserial lines of this machine\n";
-  for (const SerialLine& line : serialLines()) {
+  for (const acquisition::SerialLine& line : acquisition::serialLines()) {
     lines.push_back({{"path", line.path}, {"description", line.description}});
     answer.text += "  " + line.path + "  " + line.description + "\n";
   }
@@ -100,7 +102,7 @@ Outcome listFormats(const ListOptions&, const CommonOptions&) {
   Answer answer;
   auto& imports = answer.json["import"] = nlohmann::json::array();
   answer.text = "import\n";
-  for (const Importer& importer : importers()) {
+  for (const importers::Importer& importer : importers::importers()) {
     nlohmann::json row = rowJson(importer);
     row["needs_truth"] = importer.needs_truth;
     imports.push_back(std::move(row));
@@ -109,7 +111,7 @@ Outcome listFormats(const ListOptions&, const CommonOptions&) {
   }
   auto& exports = answer.json["export"] = nlohmann::json::array();
   answer.text += "\nexport\n";
-  for (const Exporter& exporter : exporters()) {
+  for (const exporters::Exporter& exporter : exporters::exporters()) {
     exports.push_back({{"id", exporter.id},
                        {"label", exporter.label},
                        {"extension", exporter.extension},

@@ -4,8 +4,10 @@
 
 #include "app/cli.h"
 #include "app/cli_values.h"
-#include "calib/correctors/resampled_table.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/resampled_table.h"
 #include "calib/evaluation/noise_floor.h"
+#include "calib/tables/table_writer.h"
 
 /// resample: brings the errors of scattered places to a grid in tracked space.
 namespace fieldtrue::cli {
@@ -18,10 +20,11 @@ struct ResampleOptions {
   std::string out;
   std::string align;
   double width_pitches = 1.0;
+  TableArguments table;
 };
 
 /// The grid of a plan, one place a node.
-Read<std::vector<PlannedPlace>> readGrid(const Plan& plan) {
+Read<std::vector<PlannedPlace>> readGrid(const acquisition::Plan& plan) {
   if (!plan.explicit_places.empty())
     return wrongUsage("resample needs the plan of a grid in tracked space, got a plan that lists single places");
   if (plan.orientations > 1 || plan.reseat > 1)
@@ -35,10 +38,11 @@ std::string millimetres(double value_mm) {
   return text;
 }
 
-Answer answerOf(const ResampleOptions& options, const ResampledTable& resampled, const NoiseFloor& floor) {
+Answer answerOf(const ResampleOptions& options, const calibration::ResampledTable& resampled,
+                const evaluation::NoiseFloor& floor) {
   const std::size_t n_grid = resampled.table.nodes.size();
   const std::size_t n_supported = n_grid - resampled.n_without_support;
-  const RegridError& error = resampled.error;
+  const correctors::RegridError& error = resampled.error;
   Answer answer;
   answer.json = {{"schema", "fieldtrue.resample/1"},
                  {"software", std::string("Fieldtrue ") + FIELDTRUE_VERSION},
@@ -69,26 +73,27 @@ Answer answerOf(const ResampleOptions& options, const ResampledTable& resampled,
 }
 
 Outcome runResample(const ResampleOptions& options, const CommonOptions& common) {
-  const auto method = findRegridMethod(options.method);
+  const auto method = correctors::findRegridMethod(options.method);
   if (!method) return wrongUsage(method.error());
   const auto plan = readPlanArgument(options.plan);
   if (!plan) return tl::unexpected(plan.error());
   const auto grid = readGrid(*plan);
   if (!grid) return tl::unexpected(grid.error());
-  const auto reading = readNodesArgument(options.nodes);
+  const auto reading = readRowsArgument(options.nodes, options.table);
   if (!reading) return tl::unexpected(reading.error());
-  const auto align = readAlignArgument(options.align, defaultAlignMode(reading->table.metadata));
+  const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(reading->table.metadata));
   if (!align) return tl::unexpected(align.error());
   // The longest pitch, so that the kernel reaches the neighbours along every axis.
-  const RegridOptions how{*method, plan->pitch_m.maxCoeff(), options.width_pitches};
-  const auto resampled = resampleTable(reading->table, *grid, how, *align, runControl(common, "resampling"));
+  const correctors::RegridOptions how{*method, plan->pitch_m.maxCoeff(), options.width_pitches};
+  const auto resampled =
+      calibration::resampleTable(reading->table, *grid, how, *align, runControl(common, "resampling"));
   if (!resampled) return notPossible(resampled.error());
   const auto written = writeNodeTable(std::filesystem::path(options.out), resampled->table);
   if (!written) return notPossible(written.error());
   std::vector<Node> used;
   std::copy_if(reading->table.nodes.begin(), reading->table.nodes.end(), std::back_inserter(used),
                [](const Node& node) { return node.role == NodeRole::kFit; });
-  Answer answer = answerOf(options, *resampled, noiseFloor(used, reading->table.metadata));
+  Answer answer = answerOf(options, *resampled, evaluation::noiseFloor(used, reading->table.metadata));
   answer.remarks.insert(answer.remarks.begin(), reading->notes.begin(), reading->notes.end());
   if (const std::size_t n_unused = reading->table.nodes.size() - used.size(); n_unused > 0)
     answer.remarks.push_back(std::to_string(n_unused) + " rows of role validation or skipped were not used");
@@ -124,6 +129,7 @@ void addResampleCommand(CommandLine& line) {
       ->add_option("--align", options->align,
                    "none or rigid; default rigid unless the table says the alignment is known")
       ->type_name("MODE");
+  addTableOptions(*command, options->table);
   command->add_option("--nodes-out", options->out, "Node table to write")->type_name("FILE")->required();
 }
 

@@ -5,7 +5,9 @@
 #include <optional>
 
 #include "app/cli_values.h"
-#include "calib/correctors/registry.h"
+#include "calib/calibration/alignment.h"
+#include "calib/correctors/method_label.h"
+#include "calib/evaluation/error_stats.h"
 #include "widgets/report/numbers.h"
 #include "widgets/report/report_data.h"
 
@@ -23,39 +25,35 @@ std::size_t width(const std::string& text) {
 /// The rows of one kind of method.
 struct ScoreTable {
   std::string title;
-  const ErrorStats& before;
-  const std::vector<MethodScore>& scores;
+  const evaluation::ErrorStats& before;
+  const std::vector<evaluation::MethodScore>& scores;
   std::optional<std::size_t> best_row;
-  std::string (*name)(const MethodScore& score);
+  std::string (*name)(const evaluation::MethodScore& score);
 };
 
-/// The method as one would ask for it, with the settings that are not at their defaults.
-template <class Method>
-std::string methodName(const MethodScore& score, const Result<const Method*>& method) {
-  std::string settings = method ? givenSettingsText(score.settings, (*method)->settings) : settingsText(score.settings);
-  settings.erase(std::remove(settings.begin(), settings.end(), ' '), settings.end());
-  return score.method + (settings.empty() ? "" : ":" + settings);
+std::string positionName(const evaluation::MethodScore& score) {
+  return correctors::positionLabel(score.method, score.settings);
+}
+std::string orientationName(const evaluation::MethodScore& score) {
+  return correctors::orientationLabel(score.method, score.settings);
 }
 
-std::string positionName(const MethodScore& score) { return methodName(score, findPositionMethod(score.method)); }
-std::string orientationName(const MethodScore& score) { return methodName(score, findOrientationMethod(score.method)); }
-
-Row statsRow(const std::string& name, const ErrorStats& stats) {
+Row statsRow(const std::string& name, const evaluation::ErrorStats& stats) {
   return {name,
-          errorFigure(stats.rms),
-          errorFigure(stats.rms_low90) + " to " + errorFigure(stats.rms_high90),
-          errorFigure(stats.median),
-          errorFigure(stats.p95),
-          errorFigure(stats.max)};
+          widgets::errorFigure(stats.rms),
+          widgets::errorFigure(stats.rms_low90) + " to " + widgets::errorFigure(stats.rms_high90),
+          widgets::errorFigure(stats.median),
+          widgets::errorFigure(stats.p95),
+          widgets::errorFigure(stats.max)};
 }
 
-Row scoreRow(const std::string& name, const MethodScore& score, bool is_best) {
+Row scoreRow(const std::string& name, const evaluation::MethodScore& score, bool is_best) {
   if (score.skipped) return {name + "  not used: " + *score.skipped};
   Row row = statsRow(name, score.stats);
-  row.push_back(toBestText(score, is_best));
+  row.push_back(widgets::toBestText(score, is_best));
   row.push_back(std::to_string(score.n_uncovered));
-  row.push_back(durationText(score.fit_s));
-  row.push_back(durationText(score.eval_ns * 1e-9));
+  row.push_back(widgets::durationText(score.fit_s));
+  row.push_back(widgets::durationText(score.eval_ns * 1e-9));
   return row;
 }
 
@@ -70,13 +68,13 @@ std::string scoreTable(const ScoreTable& table) {
 }
 
 /// What was found out besides the scores, a sentence a line.
-std::string surroundingsText(const Comparison& comparison) {
+std::string surroundingsText(const evaluation::Comparison& comparison) {
   std::string text;
   for (const std::string& line :
-       {truenessText(comparison), comparison.coverage ? comparison.coverage->text : std::string(),
+       {widgets::truenessText(comparison), comparison.coverage ? comparison.coverage->text : std::string(),
         comparison.fold_back ? comparison.fold_back->text : std::string(),
         comparison.orientation_dependence ? comparison.orientation_dependence->text : std::string(),
-        resamplingText(comparison)})
+        widgets::resamplingText(comparison)})
     if (!line.empty()) text += line + "\n";
   return text;
 }
@@ -107,48 +105,53 @@ std::string alignedColumns(const std::vector<std::vector<std::string>>& rows) {
   return text;
 }
 
-std::string fitText(const Corrector& corrector, AlignMode align, std::size_t n_unused) {
+std::string fitText(const calibration::Corrector& corrector, calibration::AlignMode align, std::size_t n_unused) {
   constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-  const FitReport& report = corrector.report();
-  std::string text = "Fitted " + corrector.choice().position_id + " (position) and " +
-                     corrector.choice().orientation_id + " (orientation) on " + std::to_string(report.n_nodes) +
-                     " rows, align " + toText(align) + ".\n";
+  const calibration::FitReport& report = corrector.report();
+  const calibration::CorrectorChoice& choice = corrector.choice();
+  std::string text = "Fitted " + correctors::positionLabel(choice.position_id, choice.position_settings) +
+                     " (position) and " +
+                     correctors::orientationLabel(choice.orientation_id, choice.orientation_settings) +
+                     " (orientation) on " + std::to_string(report.n_nodes) + " rows, align " + toText(align) + ".\n";
   if (n_unused > 0) text += std::to_string(n_unused) + " validation or skipped rows were left out.\n";
-  text += "In-sample position RMS: " + errorFigure(report.rms_before_mm) + " mm before, " +
-          errorFigure(1000.0 * report.rms_m) + " mm after, largest " + errorFigure(1000.0 * report.max_m) + " mm.\n";
+  text += "In-sample position RMS: " + widgets::errorFigure(report.rms_before_mm) + " mm before, " +
+          widgets::errorFigure(1000.0 * report.rms_m) + " mm after, largest " +
+          widgets::errorFigure(1000.0 * report.max_m) + " mm.\n";
   if (report.orientation_rms_rad) {
-    text += "In-sample orientation RMS: " + errorFigure(kDegPerRad * *report.orientation_rms_rad) + " deg after.\n";
+    text += "In-sample orientation RMS: " + widgets::errorFigure(kDegPerRad * *report.orientation_rms_rad) +
+            " deg after.\n";
   }
   text += "These are errors on the rows the fit saw; compare tells how it does on others.\n";
   appendNotes(text, "", report.notes);
   return text;
 }
 
-std::string learningText(const std::vector<LearningCurve>& curves) {
+std::string learningText(const std::vector<evaluation::LearningCurve>& curves) {
   std::vector<int> counts;
-  for (const LearningCurve& curve : curves)
-    for (const LearningPoint& point : curve.points)
+  for (const evaluation::LearningCurve& curve : curves)
+    for (const evaluation::LearningPoint& point : curve.points)
       if (std::find(counts.begin(), counts.end(), point.n_places) == counts.end()) counts.push_back(point.n_places);
   std::sort(counts.begin(), counts.end());
   if (counts.empty()) return {};
   std::vector<Row> rows{{"RMS (mm) by places fitted to"}};
   rows.front().resize(counts.size() + 1);
   for (std::size_t i = 0; i < counts.size(); ++i) rows.front()[i + 1] = std::to_string(counts[i]);
-  for (const LearningCurve& curve : curves) {
+  for (const evaluation::LearningCurve& curve : curves) {
     Row row(counts.size() + 1, "-");
-    row.front() = curve.method;
-    for (const LearningPoint& point : curve.points) {
+    row.front() = correctors::positionLabel(curve.method, curve.settings);
+    for (const evaluation::LearningPoint& point : curve.points) {
       const auto column = std::find(counts.begin(), counts.end(), point.n_places) - counts.begin();
-      row[static_cast<std::size_t>(column) + 1] = errorFigure(point.rms);
+      row[static_cast<std::size_t>(column) + 1] = widgets::errorFigure(point.rms);
     }
     rows.push_back(std::move(row));
   }
   return "\n" + alignedColumns(rows);
 }
 
-std::string comparisonText(const Comparison& comparison, const std::vector<LearningCurve>& curves) {
+std::string comparisonText(const evaluation::Comparison& comparison,
+                           const std::vector<evaluation::LearningCurve>& curves) {
   std::string text = std::to_string(comparison.places.size()) + " places scored by " + toText(comparison.validation) +
-                     ", align " + toText(comparison.align) + ". Noise floor " + floorText(comparison);
+                     ", align " + toText(comparison.align) + ". Noise floor " + widgets::floorText(comparison);
   text += ".\n\n" + scoreTable({"position (mm)", comparison.before_position_mm, comparison.position,
                                 comparison.best_position_row, positionName});
   if (comparison.before_orientation_deg)
@@ -157,9 +160,9 @@ std::string comparisonText(const Comparison& comparison, const std::vector<Learn
   text += learningText(curves);
   std::string notes;
   appendNotes(notes, "", comparison.notes);
-  for (const auto* scores : {&comparison.position, &comparison.orientation}) {
-    for (const MethodScore& score : *scores) appendNotes(notes, score.method, score.notes);
-  }
+  for (const evaluation::MethodScore& score : comparison.position) appendNotes(notes, positionName(score), score.notes);
+  for (const evaluation::MethodScore& score : comparison.orientation)
+    appendNotes(notes, orientationName(score), score.notes);
   if (!notes.empty()) text += "\n" + notes;
   const std::string surroundings = surroundingsText(comparison);
   if (!surroundings.empty()) text += "\n" + surroundings;

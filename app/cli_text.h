@@ -3,7 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/learning_curve.h"
 
@@ -15,9 +16,10 @@ namespace fieldtrue::cli {
 std::string alignedColumns(const std::vector<std::vector<std::string>>& rows);
 
 /// In-sample figures of a fit.
-std::string fitText(const Corrector& corrector, AlignMode align, std::size_t n_unused);
+std::string fitText(const calibration::Corrector& corrector, calibration::AlignMode align, std::size_t n_unused);
 
 /// The methods' held-out errors, learning curves where there are any, what surrounds the scores, the verdict last.
-std::string comparisonText(const Comparison& comparison, const std::vector<LearningCurve>& curves = {});
+std::string comparisonText(const evaluation::Comparison& comparison,
+                           const std::vector<evaluation::LearningCurve>& curves = {});
 
 }  // namespace fieldtrue::cli

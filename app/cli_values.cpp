@@ -3,7 +3,11 @@
 #include <sstream>
 #include <string_view>
 
+#include "calib/calibration/alignment.h"
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
+#include "calib/recording/unit_slip.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::cli {
 namespace {
@@ -24,19 +28,19 @@ void appendIds(std::string& list, const Rows& rows) {
 
 std::string unknownMethod(const std::string& id) {
   std::string position, orientation;
-  appendIds(position, positionMethods());
-  appendIds(orientation, orientationMethods());
+  appendIds(position, correctors::positionMethods());
+  appendIds(orientation, correctors::orientationMethods());
   return "unknown method '" + id + "'; known for position: " + position + "; for orientation: " + orientation;
 }
 
-Read<void> addMethod(const std::string& text, ComparisonOptions& options) {
+Read<void> addMethod(const std::string& text, evaluation::ComparisonOptions& options) {
   const auto parsed = parseMethodText(text);
   if (!parsed) return wrongUsage(parsed.error());
-  const auto position_row = findPositionMethod(parsed->id);
-  const auto orientation_row = findOrientationMethod(parsed->id);
+  const auto position_row = correctors::findPositionMethod(parsed->id);
+  const auto orientation_row = correctors::findOrientationMethod(parsed->id);
   if (!position_row && !orientation_row) return wrongUsage(unknownMethod(parsed->id));
-  const auto position = readMethod<PositionMethod>(*parsed, position_row);
-  const auto orientation = readMethod<OrientationMethod>(*parsed, orientation_row);
+  const auto position = readMethod<correctors::PositionMethod>(*parsed, position_row);
+  const auto orientation = readMethod<correctors::OrientationMethod>(*parsed, orientation_row);
   if (!position && !orientation) return wrongUsage(position_row ? position.error() : orientation.error());
   if (position) options.position_methods.push_back(*position);
   if (orientation) options.orientation_methods.push_back(*orientation);
@@ -45,16 +49,16 @@ Read<void> addMethod(const std::string& text, ComparisonOptions& options) {
 
 }  // namespace
 
-Read<Plan> readPlanArgument(const std::string& text_or_path) {
-  auto plan = readPlan(text_or_path);
+Read<acquisition::Plan> readPlanArgument(const std::string& text_or_path) {
+  auto plan = acquisition::readPlan(text_or_path);
   if (plan) return *plan;
   if (text_or_path.starts_with("grid:")) return wrongUsage(plan.error());
   return notPossible(plan.error());
 }
 
-Read<Scene> readSceneArgument(const std::string& path) {
-  if (path.empty()) return Scene{};
-  auto scene = readScene(path);
+Read<simulation::Scene> readSceneArgument(const std::string& path) {
+  if (path.empty()) return simulation::Scene{};
+  auto scene = simulation::readScene(path);
   if (!scene) return notPossible(scene.error());
   return *scene;
 }
@@ -65,14 +69,49 @@ Read<TableReading<CalibrationTable>> readNodesArgument(const std::string& path) 
   return std::move(*reading);
 }
 
-Read<AlignMode> readAlignArgument(const std::string& text, AlignMode fallback) {
+void addTableOptions(CLI::App& command, TableArguments& arguments) {
+  command
+      .add_option("--sensor", arguments.sensor,
+                  "Use the rows of this sensor; needed where a table holds several, each with a mounting of its own")
+      ->type_name("N");
+  addForceOption(command, arguments.force, "Go on although true positions and readings seem to be in different units");
+}
+
+void addForceOption(CLI::App& command, bool& force, const std::string& help) {
+  command.add_flag("--force", force, help);
+}
+
+Read<TableReading<CalibrationTable>> chooseRows(TableReading<CalibrationTable> reading, const std::string& name,
+                                                const TableArguments& arguments) {
+  const std::size_t n_all = reading.table.nodes.size();
+  auto rows = rowsOfSensor(reading.table, arguments.sensor);
+  if (!rows) return notPossible(name + ": " + rows.error().message + (arguments.sensor ? "" : ": --sensor N"));
+  reading.table = *std::move(rows);
+  if (const std::size_t n_used = reading.table.nodes.size(); n_used < n_all) {
+    reading.notes.push_back(name + ": " + std::to_string(n_used) + " of " + std::to_string(n_all) +
+                            " rows are of sensor " + std::to_string(*arguments.sensor));
+  }
+  const Result<void> units = recording::checkUnits(reading.table);
+  if (units) return reading;
+  if (!arguments.force) return notPossible(name + ": " + units.error().message + ", or go on with --force");
+  reading.notes.push_back(name + ": " + units.error().message + "; used all the same");
+  return reading;
+}
+
+Read<TableReading<CalibrationTable>> readRowsArgument(const std::string& path, const TableArguments& arguments) {
+  auto reading = readNodesArgument(path);
+  if (!reading) return reading;
+  return chooseRows(*std::move(reading), std::filesystem::path(path).filename().string(), arguments);
+}
+
+Read<calibration::AlignMode> readAlignArgument(const std::string& text, calibration::AlignMode fallback) {
   if (text.empty()) return fallback;
-  if (text == "none") return AlignMode::kNone;
-  if (text == "rigid") return AlignMode::kRigid;
+  if (text == "none") return calibration::AlignMode::kNone;
+  if (text == "rigid") return calibration::AlignMode::kRigid;
   return wrongUsage("--align is '" + text + "'; it must be none or rigid");
 }
 
-std::string toText(AlignMode align) { return align == AlignMode::kRigid ? "rigid" : "none"; }
+std::string toText(calibration::AlignMode align) { return align == calibration::AlignMode::kRigid ? "rigid" : "none"; }
 
 void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
   command
@@ -92,16 +131,16 @@ void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
   command.add_option("--seed", arguments.seed, "Seed of folds and bootstrap (default 1)")->type_name("N");
 }
 
-Read<ComparisonOptions> readComparisonArguments(const ComparisonArguments& arguments) {
-  ComparisonOptions options;
+Read<evaluation::ComparisonOptions> readComparisonArguments(const ComparisonArguments& arguments) {
+  evaluation::ComparisonOptions options;
   options.seed = arguments.seed;
   if (!arguments.validate.empty()) {
-    const auto validation = parseValidation(arguments.validate);
+    const auto validation = evaluation::parseValidation(arguments.validate);
     if (!validation) return wrongUsage(validation.error());
     options.validation = *validation;
   }
   if (!arguments.align.empty()) {
-    const auto align = readAlignArgument(arguments.align, AlignMode::kRigid);
+    const auto align = readAlignArgument(arguments.align, calibration::AlignMode::kRigid);
     if (!align) return tl::unexpected(align.error());
     options.align = *align;
   }

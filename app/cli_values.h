@@ -1,16 +1,18 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "acquisition/session/plan.h"
+#include "acquisition/plan/plan.h"
 #include "app/cli.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/settings.h"
-#include "calib/core/table_io.h"
-#include "calib/correctors/corrector.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/simulation/scene.h"
+#include "calib/tables/table_io.h"
 
 /// Reading of what people write on the command line and in the files they name, with the right exit status.
 namespace fieldtrue::cli {
@@ -20,17 +22,32 @@ template <class T>
 using Read = tl::expected<T, Failure>;
 
 /// A plan text (`grid:...`) or file.
-Read<Plan> readPlanArgument(const std::string& text_or_path);
+Read<acquisition::Plan> readPlanArgument(const std::string& text_or_path);
 
 /// The scene of a file; the clean room with the default tracker when the path is empty.
-Read<Scene> readSceneArgument(const std::string& path);
+Read<simulation::Scene> readSceneArgument(const std::string& path);
 
 /// A node table, and what its reader noticed.
 Read<TableReading<CalibrationTable>> readNodesArgument(const std::string& path);
 
+/// What `--sensor` and `--force` say about a table.
+struct TableArguments {
+  std::optional<int> sensor;
+  bool force = false;
+};
+void addTableOptions(CLI::App& command, TableArguments& arguments);
+void addForceOption(CLI::App& command, bool& force, const std::string& help);
+
+/// The rows of the chosen sensor, in units that can be right; what was noticed goes to the notes.
+/// @param name of the table, in messages
+Read<TableReading<CalibrationTable>> chooseRows(TableReading<CalibrationTable> reading, const std::string& name,
+                                                const TableArguments& arguments);
+/// A node table whose rows are fitted or scored.
+Read<TableReading<CalibrationTable>> readRowsArgument(const std::string& path, const TableArguments& arguments);
+
 /// `none` or `rigid`; `fallback` when empty.
-Read<AlignMode> readAlignArgument(const std::string& text, AlignMode fallback);
-std::string toText(AlignMode align);
+Read<calibration::AlignMode> readAlignArgument(const std::string& text, calibration::AlignMode fallback);
+std::string toText(calibration::AlignMode align);
 
 /// What `--methods`, `--validate`, `--align` and `--seed` say about a comparison.
 struct ComparisonArguments {
@@ -40,7 +57,7 @@ struct ComparisonArguments {
   std::uint64_t seed = 1;
 };
 void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments);
-Read<ComparisonOptions> readComparisonArguments(const ComparisonArguments& arguments);
+Read<evaluation::ComparisonOptions> readComparisonArguments(const ComparisonArguments& arguments);
 
 /// Splits `a,b:key=1,other=2,c` into method texts; a part with '=' and no ':' continues the method before it.
 std::vector<std::string> splitMethods(const std::string& text);

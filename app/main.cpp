@@ -1,16 +1,16 @@
-#include <QApplication>
 #include <QCommandLineParser>
 #include <QIcon>
 #include <QTimer>
 #include <clocale>
 
-#include "widgets/pages/main_window.h"
-#include "widgets/views/gl_format.h"
-#include "widgets/views/theme.h"
+#include "widgets/shell/application.h"
+#include "widgets/shell/main_window.h"
+#include "widgets/style/theme.h"
+#include "widgets/views/host/gl_format.h"
 
 int main(int argc, char** argv) {
-  fieldtrue::setDefaultGlFormat();
-  QApplication application(argc, argv);
+  fieldtrue::widgets::setDefaultGlFormat();
+  fieldtrue::widgets::Application application(argc, argv);
   // Qt takes over the desktop's locale; printf must keep the decimal point that files and messages are written with.
   std::setlocale(LC_NUMERIC, "C");
   QApplication::setApplicationName(QStringLiteral("fieldtrue"));
@@ -31,10 +31,14 @@ int main(int argc, char** argv) {
   parser.addOptions({demo, dark, light});
   parser.process(application);
 
-  const bool use_dark = parser.isSet(dark) || (!parser.isSet(light) && fieldtrue::systemPrefersDark());
-  fieldtrue::applyTheme(application, use_dark);
+  const bool use_dark = parser.isSet(dark) || (!parser.isSet(light) && fieldtrue::widgets::systemPrefersDark());
+  fieldtrue::widgets::applyTheme(application, use_dark);
   QApplication::setWindowIcon(QIcon(QStringLiteral(":/fieldtrue.svg")));
-  fieldtrue::MainWindow window;
+  fieldtrue::widgets::MainWindow window;
+  QObject::connect(&application, &fieldtrue::widgets::Application::threw, &window.workbench(),
+                   [&window](const QString& sentence) {
+                     window.workbench().showMessage({sentence, fieldtrue::widgets::Severity::kDanger, {}, {}});
+                   });
   window.show();
   window.activateWindow();
   const QStringList sessions = parser.positionalArguments();

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Renders the pictures of README.md into resources/pictures, headless: the guided session in the window, page by page.
+# Renders the pictures of README and guide into resources/pictures, headless: the guided session in the window, page by page.
 # Needs a finished build (./test.sh or ./run.sh). `tests/pictures.sh FOLDER` writes somewhere else.
 set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
@@ -12,7 +12,7 @@ render() { # render NAME TEST [VARIABLE=VALUE...]
   mkdir -p "$work/$name"
   env QT_QPA_PLATFORM=xcb XDG_RUNTIME_DIR="$work" FIELDTRUE_ARTEFACTS="$work/$name" "$@" \
     xvfb-run --auto-servernum --server-args="-screen 0 2800x1800x24" \
-    "$root/build/ci/tests/widgets_$test" >"$work/$name.log" || { cat "$work/$name.log" >&2; exit 1; }
+    "$root/build/ci/tests/widgets_pages_tests" "$test" >"$work/$name.log" || { cat "$work/$name.log" >&2; exit 1; }
 }
 chmod 700 "$work"
 for test in guided_session_test gap_page_test; do

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr int kWatch_ms = 250;
@@ -49,6 +49,13 @@ void FastrakDevice::start() {
   }
   line_ = std::move(*line);
   connect(line_.get(), &Transport::lineLost, this, &FastrakDevice::failWith);
+  if (line_->isOpen())
+    beginStartup();
+  else
+    connect(line_.get(), &Transport::lineOpened, this, &FastrakDevice::beginStartup);
+}
+
+void FastrakDevice::beginStartup() {
   startup_ = std::make_unique<FastrakStartup>(*line_, setup_);
   connect(startup_.get(), &FastrakStartup::bytesSeen, this, &FastrakDevice::bytesSeen);
   connect(startup_.get(), &FastrakStartup::failed, this, &FastrakDevice::failWith);
@@ -106,8 +113,8 @@ void FastrakDevice::running() {
 }
 
 QString FastrakDevice::summary() const {
-  QString text = QString("Fastrak %1, %2 at %3 Hz")
-                     .arg(QString::fromStdString(identity_->status.version))
+  QString text = QString("%1, %2 at %3 Hz")
+                     .arg(titleOf(setup_, identity_->status))
                      .arg(identity_->stations.size() == 1 ? QString("station %1").arg(identity_->stations.front())
                                                           : QString("%1 stations").arg(identity_->stations.size()))
                      .arg(rate_hz());
@@ -138,18 +145,18 @@ void FastrakDevice::watch() {
   const int limit_ms = running_ ? setup_.timings.silence_ms : setup_.timings.lock_ms;
   if (quiet_ticks_ * kWatch_ms < limit_ms) return;
   const QString where = QString::fromStdString(setup_.where);
+  const QString name = QString::fromStdString(setup_.name);
   if (parser_->bytes() > bytes_at_last_record_) {
-    failWith(
-        QString("Got bytes that are not Fastrak records on %1: another program may be changing the tracker's settings, "
-                "or the line is disturbed; connect again")
-            .arg(where));
+    failWith(QString("Got bytes that are not %1 records on %2: another program may be changing the tracker's settings, "
+                     "or the line is disturbed; connect again")
+                 .arg(name, where));
   } else if (running_) {
     failWith(
-        QString("The Fastrak on %1 has gone silent: check its power and its cable, then connect again").arg(where));
+        QString("The %1 on %2 has gone silent: check its power and its cable, then connect again").arg(name, where));
   } else {
-    failWith(QString("The Fastrak on %1 answers but sends no records: check that the receiver and the transmitter are "
+    failWith(QString("The %1 on %2 answers but sends no records: check that the receiver and the transmitter are "
                      "plugged in, then connect again")
-                 .arg(where));
+                 .arg(name, where));
   }
 }
 
@@ -175,6 +182,11 @@ void FastrakDevice::stop() {
     return;
   }
   if (farewell_) return;
+  if (!line_->isOpen()) {
+    closeLine();
+    emit stateChanged(DeviceState::kClosed, "Closed");
+    return;
+  }
   watch_.stop();
   running_ = false;
   retire(this, startup_);
@@ -215,4 +227,4 @@ TableMetadata FastrakDevice::describe() const {
   return metadata;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -12,7 +12,7 @@
 #include "acquisition/devices/tracker_device.h"
 #include "acquisition/transports/transport.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// A Polhemus Fastrak on any line. Sensor n of its samples is station n + 1; times count from start().
 class FastrakDevice : public TrackerDevice {
@@ -29,6 +29,7 @@ class FastrakDevice : public TrackerDevice {
   TableMetadata describe() const override;
 
  private:
+  void beginStartup();
   void startupFinished();
   void readReady();
   void watch();
@@ -59,4 +60,4 @@ class FastrakDevice : public TrackerDevice {
   bool running_ = false;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdio>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr std::array kRates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
@@ -86,6 +86,12 @@ FastrakStartup::FastrakStartup(Transport& line, FastrakSetup setup, QObject* par
   connect(&exchange_, &LineExchange::bytesSeen, this, &FastrakStartup::bytesSeen);
 }
 
+QString titleOf(const FastrakSetup& setup, const FastrakStatus& status) {
+  QString title = QString::fromStdString(setup.name);
+  title.front() = title.front().toUpper();
+  return setup.tells_version ? title + ' ' + QString::fromStdString(status.version) : title;
+}
+
 void FastrakStartup::run() { stopStream(); }
 
 void FastrakStartup::stopStream() {
@@ -120,7 +126,10 @@ void FastrakStartup::tryNextRate() {
     if (rate == setup_.baud) continue;
     if (!line_.setBaud(rate)) break;
     identity_.baud = rate;
-    emit progressed(QString("No Fastrak answered at %1 baud; trying %2.").arg(setup_.baud).arg(rate));
+    emit progressed(QString("No %1 answered at %2 baud; trying %3.")
+                        .arg(QString::fromStdString(setup_.name))
+                        .arg(setup_.baud)
+                        .arg(rate));
     exchange_.tell("\r", setup_.timings.clear_ms, [this](const std::string&) { askStatus(1); });
     return;
   }
@@ -133,23 +142,22 @@ void FastrakStartup::tryNextRate() {
 
 void FastrakStartup::giveUp() {
   const QString where = QString::fromStdString(setup_.where);
+  const QString name = QString::fromStdString(setup_.name);
   if (exchange_.bytesHeard() > 0) {
     const int other = setup_.baud == 19200 ? 115200 : 19200;
     const QString shown = QString::fromStdString(firstBytes(exchange_.lastHeard()));
-    emit failed(
-        QString("Got bytes that are not Fastrak records on %1%2: the line's rate is probably wrong; try %3 (%4@%3), "
-                "and check the rate switches at the back of the tracker")
-            .arg(where, shown.isEmpty() ? QString() : " (" + shown + ")")
-            .arg(other)
-            .arg(QString::fromStdString(setup_.device_text)));
+    emit failed(QString("Got bytes that are not %1 records on %2%3: the line's rate is probably wrong; try %4 (%5@%4), "
+                        "and check the rate switches at the back of the tracker")
+                    .arg(name, where, shown.isEmpty() ? QString() : " (" + shown + ")")
+                    .arg(other)
+                    .arg(QString::fromStdString(setup_.device_text)));
     return;
   }
   if (setup_.may_reset && !was_reset_) return reset();
-  emit failed(
-      QString("No answer from a Fastrak on %1: check that it is switched on, that the cable is a null-modem cable "
-              "in the right socket, and that its rate switches say %2")
-          .arg(where)
-          .arg(setup_.baud));
+  emit failed(QString("No answer from a %1 on %2: check that it is switched on, that the cable is a null-modem cable "
+                      "in the right socket, and that its rate switches say %3")
+                  .arg(name, where)
+                  .arg(setup_.baud));
 }
 
 void FastrakStartup::reset() {
@@ -169,14 +177,14 @@ void FastrakStartup::statusCame(const FastrakStatus& status) {
     if (wanted && status.plugged(station)) identity_.stations.push_back(station);
   }
   if (identity_.stations.empty()) {
-    emit failed(QString("The Fastrak on %1 answers but has no receiver plugged in%2; plug one into station 1")
-                    .arg(QString::fromStdString(setup_.where),
+    emit failed(QString("The %1 on %2 answers but has no receiver plugged in%3; plug one into station 1")
+                    .arg(QString::fromStdString(setup_.name), QString::fromStdString(setup_.where),
                          setup_.stations == "auto"
                              ? QString()
                              : QString(" at station %1").arg(QString::fromStdString(setup_.stations))));
     return;
   }
-  emit progressed(QString("Fastrak %1 answered; setting it up.").arg(QString::fromStdString(status.version)));
+  emit progressed(QString("%1 answered; setting it up.").arg(titleOf(setup_, status)));
   commands_ = commands();
   sendCommands(0);
 }
@@ -246,8 +254,8 @@ void FastrakStartup::verify(int tries) {
         const auto status = findStatus(heard);
         if (!status && tries > 1) return verify(tries - 1);
         if (!status) {
-          emit failed(QString("The Fastrak on %1 stopped answering while it was set up; switch it off and on again")
-                          .arg(QString::fromStdString(setup_.where)));
+          emit failed(QString("The %1 on %2 stopped answering while it was set up; switch it off and on again")
+                          .arg(QString::fromStdString(setup_.name), QString::fromStdString(setup_.where)));
           return;
         }
         const char* wrong = status->unit != FastrakUnit::kCentimetre   ? "centimetres"
@@ -255,8 +263,8 @@ void FastrakStartup::verify(int tries) {
                             : status->compensation                     ? "compensation off"
                                                                        : nullptr;
         if (wrong) {
-          emit failed(QString("The Fastrak on %1 did not take the setting \"%2\"; switch it off and on again")
-                          .arg(QString::fromStdString(setup_.where), wrong));
+          emit failed(QString("The %1 on %2 did not take the setting \"%3\"; switch it off and on again")
+                          .arg(QString::fromStdString(setup_.name), QString::fromStdString(setup_.where), wrong));
           return;
         }
         identity_.status = *status;
@@ -273,4 +281,4 @@ void FastrakStartup::startOutput() {
   emit bytesSeen(true, command);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

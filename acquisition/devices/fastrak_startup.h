@@ -11,7 +11,7 @@
 #include "acquisition/protocols/fastrak.h"
 #include "calib/core/settings.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// How long the driver waits for what.
 struct FastrakTimings {
@@ -29,8 +29,10 @@ struct FastrakTimings {
 
 /// How a Fastrak is to be set up.
 struct FastrakSetup {
-  std::string where;        ///< The line as the person wrote it, for messages.
-  std::string device_text;  ///< How to write the device with another rate: "fastrak:/dev/ttyUSB0".
+  std::string name = "Fastrak";  ///< What messages call it.
+  bool tells_version = true;     ///< Whether its version belongs to its name.
+  std::string where;             ///< The line as the person wrote it, for messages.
+  std::string device_text;       ///< How to write the device with another rate: "fastrak:/dev/ttyUSB0".
   int baud = 115200;
   double rate_hz = kFastrakRate_hz;  ///< Shared by the stations; other than 120 only for an emulated tracker.
   std::string stations = "auto";     ///< "auto" = those plugged in, or digits: "13".
@@ -40,6 +42,9 @@ struct FastrakSetup {
   bool may_reset = true;             ///< ^Y when there is no answer.
   FastrakTimings timings;
 };
+
+/// The tracker as messages call it once it has answered: "Fastrak 2.41".
+QString titleOf(const FastrakSetup& setup, const FastrakStatus& status);
 
 /// The output list the driver asks for: position, quaternion, stylus, tail mark.
 inline constexpr std::array<int, 4> kFastrakDriverItems = {2, 11, 16, 1};
@@ -100,4 +105,4 @@ class FastrakStartup : public QObject {
   bool was_reset_ = false;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 LineExchange::LineExchange(Transport& line, QObject* parent) : QObject(parent), line_(line) {
   timer_.setParent(this);
@@ -59,4 +59,4 @@ void LineExchange::finish() {
   if (const Then then = std::exchange(then_, {})) then(last_heard_);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

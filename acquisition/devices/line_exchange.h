@@ -8,7 +8,7 @@
 
 #include "acquisition/transports/transport.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// Talks with a device one step at a time: says something, waits, and hands on what was heard. One step at once.
 class LineExchange : public QObject {
@@ -47,4 +47,4 @@ class LineExchange : public QObject {
   std::uint64_t bytes_heard_ = 0;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

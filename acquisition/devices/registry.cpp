@@ -10,9 +10,10 @@
 
 #include "acquisition/devices/fastrak_device.h"
 #include "acquisition/devices/simulated_device.h"
+#include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/transports/serial_ports.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 Result<Settings> readSettings(const std::string& owner, const std::vector<Setting>& declared, const std::string& text) {
@@ -22,7 +23,7 @@ Result<Settings> readSettings(const std::string& owner, const std::vector<Settin
   return resolveSettings(owner, declared, parsed->given);
 }
 
-Result<std::unique_ptr<TrackerDevice>> makeSimulated(const std::string& address, const Scene& scene) {
+Result<std::unique_ptr<TrackerDevice>> makeSimulated(const std::string& address, const simulation::Scene& scene) {
   auto settings = readSettings("simulated", simulatedSettings(), address);
   if (!settings) return tl::unexpected(settings.error());
   auto setup = simulatedSetup(*settings);
@@ -37,7 +38,7 @@ int baudOf(const std::string& line) {
   return baud;
 }
 
-Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const Scene&) {
+Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const simulation::Scene&) {
   const std::size_t comma = std::min(address.find(','), address.size());
   const std::string line = address.substr(0, comma);
   auto settings = readSettings("fastrak", fastrakSettings(), address.substr(std::min(comma + 1, address.size())));
@@ -56,13 +57,30 @@ Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, c
 
 std::span<const DeviceKind> deviceKinds() {
   static const std::vector<DeviceKind> kKinds = {
-      {"simulated", "Simulated tracker", "nothing, or settings: simulated:speed=4,seed=2,travel_s=1",
-       "A Fastrak in a scene, with an operator who carries the jig", simulatedSettings(), makeSimulated},
-      {"fastrak", "Polhemus Fastrak",
-       "the line, then settings: fastrak:/dev/ttyUSB0@115200, fastrak:tcp:localhost:4000,hemisphere=-x",
-       "3SPACE Fastrak manual OPM00PI002 rev. G", fastrakSettings(), makeFastrak},
-  };
+      {.id = "simulated",
+       .label = "Simulated tracker",
+       .address_help = "nothing, or settings: simulated:speed=4,seed=2,travel_s=1",
+       .source = "A simulated tracker in a scene, with an operator who carries the jig",
+       .settings = simulatedSettings(),
+       .make = makeSimulated},
+      {.id = "fastrak",
+       .label = "Polhemus Fastrak",
+       .address_help = "the line, then settings: fastrak:/dev/ttyUSB0@115200, fastrak:tcp:localhost:4000,hemisphere=-x",
+       .source = "3SPACE Fastrak manual OPM00PI002 rev. G",
+       .settings = fastrakSettings(),
+       .make = makeFastrak,
+       .emulate = makeFastrakEmulator}};
   return kKinds;
+}
+
+Result<const DeviceKind*> findEmulated(const std::string& id) {
+  std::string known;
+  for (const DeviceKind& kind : deviceKinds()) {
+    if (!kind.emulate) continue;
+    if (kind.id == id) return &kind;
+    known += (known.empty() ? "" : ", ") + kind.id;
+  }
+  return fail(ErrorCode::kBadInput, "no emulator is called '" + id + "'; known: " + known);
 }
 
 Result<DeviceAddress> parseDevice(const std::string& text) {
@@ -74,7 +92,7 @@ Result<DeviceAddress> parseDevice(const std::string& text) {
   return device;
 }
 
-Result<std::unique_ptr<TrackerDevice>> makeDevice(const std::string& text, const Scene& scene) {
+Result<std::unique_ptr<TrackerDevice>> makeDevice(const std::string& text, const simulation::Scene& scene) {
   auto device = parseDevice(text);
   if (!device) return tl::unexpected(device.error());
   std::string known;
@@ -91,4 +109,4 @@ std::vector<SerialLine> serialLines() {
   return lines;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

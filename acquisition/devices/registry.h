@@ -7,11 +7,13 @@
 #include <vector>
 
 #include "acquisition/devices/tracker_device.h"
+#include "acquisition/emulators/emulation.h"
+#include "acquisition/emulators/emulator_runner.h"
 #include "calib/core/error.h"
 #include "calib/core/settings.h"
 #include "calib/simulation/scene.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// A device as a person writes it: `kind`, `kind:address` or `kind:address@baud`, e.g. `fastrak:/dev/ttyUSB0@115200`,
 /// `fastrak:tcp:localhost:4000`, `simulated:speed=4,seed=2`.
@@ -30,13 +32,17 @@ struct DeviceKind {
   std::string source;
   std::vector<Setting> settings;
   /// @param address after the first colon; @param scene only used by simulated devices
-  Result<std::unique_ptr<TrackerDevice>> (*make)(const std::string& address, const Scene& scene) = nullptr;
+  Result<std::unique_ptr<TrackerDevice>> (*make)(const std::string& address, const simulation::Scene& scene) = nullptr;
+  /// Its other side, on a pty or a TCP port, not yet started; null where nothing is emulated.
+  Result<std::unique_ptr<EmulatorRunner>> (*emulate)(const Emulation& emulation) = nullptr;
 };
 
 /// Every kind; the simulated tracker is the first row.
 std::span<const DeviceKind> deviceKinds();
+/// The kind of an id that can be emulated. @error kBadInput naming those that can
+Result<const DeviceKind*> findEmulated(const std::string& id);
 /// @error kBadInput naming the known kinds
-Result<std::unique_ptr<TrackerDevice>> makeDevice(const std::string& text, const Scene& scene);
+Result<std::unique_ptr<TrackerDevice>> makeDevice(const std::string& text, const simulation::Scene& scene);
 
 /// Serial lines present on this machine, for the connect page: path and description.
 struct SerialLine {
@@ -45,4 +51,4 @@ struct SerialLine {
 };
 std::vector<SerialLine> serialLines();
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -6,7 +6,7 @@
 #include "acquisition/protocols/fastrak_items.h"
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 SampleClock::SampleClock(double nominal_period_s) : nominal_s_(nominal_period_s), period_s_(nominal_period_s) {
   FT_CHECK(nominal_period_s > 0.0);
@@ -43,4 +43,4 @@ void HemisphereWatch::check(Sample& sample) {
   track = {true, mirrored ? Eigen::Vector3d(-p) : p, 0};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

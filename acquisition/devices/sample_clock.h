@@ -5,7 +5,7 @@
 
 #include "calib/core/calibration_table.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// Gives the readings of one steady stream their times, though they arrive in bunches: a second-order loop follows the
 /// arrivals with the stream's own period.
@@ -43,4 +43,4 @@ class HemisphereWatch {
   std::array<Track, 4> tracks_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

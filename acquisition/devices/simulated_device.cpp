@@ -2,11 +2,13 @@
 
 #include <algorithm>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 FastrakSetup driverSetup(double speed, double rate_hz) {
   FastrakSetup setup;
+  setup.name = "simulated tracker";
+  setup.tells_version = false;
   setup.where = "the simulated line";
   setup.device_text = "simulated";
   setup.hemisphere = "tracked";
@@ -72,13 +74,15 @@ Result<SimulatedSetup> simulatedSetup(const Settings& settings) {
   return setup;
 }
 
-Result<std::unique_ptr<SimulatedDevice>> SimulatedDevice::make(const Scene& scene, const SimulatedSetup& setup) {
-  if (auto usable = TrackerSimulator::make(scene, setup.seed); !usable) return tl::unexpected(usable.error());
+Result<std::unique_ptr<SimulatedDevice>> SimulatedDevice::make(const simulation::Scene& scene,
+                                                               const SimulatedSetup& setup) {
+  if (auto usable = simulation::TrackerSimulator::make(scene, setup.seed); !usable)
+    return tl::unexpected(usable.error());
   return std::unique_ptr<SimulatedDevice>(
       new SimulatedDevice(scene, setup, driverSetup(setup.speed, scene.tracker.rate_hz)));
 }
 
-SimulatedDevice::SimulatedDevice(const Scene& scene, const SimulatedSetup& setup, FastrakSetup driver)
+SimulatedDevice::SimulatedDevice(const simulation::Scene& scene, const SimulatedSetup& setup, FastrakSetup driver)
     : FastrakDevice(
           std::move(driver), [this] { return plugIn(); }, setup.speed),
       scene_(scene),
@@ -88,7 +92,7 @@ Result<std::unique_ptr<Transport>> SimulatedDevice::plugIn() {
   delete emulator_;
   emulator_ = nullptr;
   jig_ = nullptr;
-  auto simulator = TrackerSimulator::make(scene_, simulated_.seed);
+  auto simulator = simulation::TrackerSimulator::make(scene_, simulated_.seed);
   if (!simulator) return tl::unexpected(simulator.error());
   auto jig = std::make_unique<SimulatedJig>(std::move(*simulator), simulated_.habits, simulated_.seed);
   jig_ = jig.get();
@@ -112,7 +116,9 @@ void SimulatedDevice::guideTo(const Pose& reference_from_sensor) {
 
 TableMetadata SimulatedDevice::describe() const {
   TableMetadata metadata = FastrakDevice::describe();
-  metadata.tracker = "simulated Fastrak in " + scene_.name;
+  metadata.tracker = "simulated tracker in " + scene_.name;
+  // How the emulated line was set up says nothing of this tracker, and names another.
+  std::erase_if(metadata.other, [](const auto& entry) { return entry.first.starts_with("fastrak_"); });
   metadata.excitation = scene_.tracker.excitation;
   metadata.carrier_hz = scene_.tracker.carrier_hz;
   metadata.rate_hz = scene_.tracker.rate_hz;
@@ -123,4 +129,4 @@ TableMetadata SimulatedDevice::describe() const {
   return metadata;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

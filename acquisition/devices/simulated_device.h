@@ -7,7 +7,7 @@
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "calib/simulation/scene.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 struct SimulatedSetup {
   double speed = 1.0;  ///< The tracker's seconds per second.
@@ -22,17 +22,17 @@ class SimulatedDevice : public FastrakDevice {
   Q_OBJECT
  public:
   /// @error of the scene
-  static Result<std::unique_ptr<SimulatedDevice>> make(const Scene& scene, const SimulatedSetup& setup);
+  static Result<std::unique_ptr<SimulatedDevice>> make(const simulation::Scene& scene, const SimulatedSetup& setup);
 
   /// The operator travels there in `travel_s`, with a hand that trembles and settles. Call once for each place.
   void guideTo(const Pose& reference_from_sensor) override;
   TableMetadata describe() const override;
 
  private:
-  SimulatedDevice(const Scene& scene, const SimulatedSetup& setup, FastrakSetup driver);
+  SimulatedDevice(const simulation::Scene& scene, const SimulatedSetup& setup, FastrakSetup driver);
   Result<std::unique_ptr<Transport>> plugIn();
 
-  Scene scene_;
+  simulation::Scene scene_;
   SimulatedSetup simulated_;
   EmulatorRunner* emulator_ = nullptr;
   SimulatedJig* jig_ = nullptr;
@@ -44,4 +44,4 @@ std::vector<Setting> simulatedSettings();
 /// @param settings resolved from simulatedSettings()
 Result<SimulatedSetup> simulatedSetup(const Settings& settings);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

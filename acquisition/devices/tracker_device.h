@@ -8,7 +8,7 @@
 
 #include "calib/core/calibration_table.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 enum class DeviceState { kClosed, kConnecting, kRunning, kFailed };
 
@@ -33,12 +33,12 @@ class TrackerDevice : public QObject {
 
  signals:
   /// @param text what happened in words; for kFailed what was seen and what to do
-  void stateChanged(fieldtrue::DeviceState state, const QString& text);
+  void stateChanged(fieldtrue::acquisition::DeviceState state, const QString& text);
   void samplesReceived(const std::vector<fieldtrue::Sample>& samples);
   /// Raw bytes as they went by, for the trace log.
   void bytesSeen(bool sent, const QByteArray& bytes);
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition
 
-Q_DECLARE_METATYPE(fieldtrue::DeviceState)
+Q_DECLARE_METATYPE(fieldtrue::acquisition::DeviceState)

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// Something an emulated tracker sends in one write.
 struct EmulatedOutput {
@@ -25,4 +25,4 @@ class EmulatedTracker {
   virtual bool streaming() const = 0;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -3,7 +3,7 @@
 #include <QHostAddress>
 #include <QTcpSocket>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 TcpEndpoint::TcpEndpoint(quint16 port, QObject* parent) : EmulatorEndpoint(parent), port_(port) {
   connect(&server_, &QTcpServer::newConnection, this, &TcpEndpoint::accept);
@@ -60,4 +60,4 @@ void LoopbackEndpoint::send(const QByteArray& bytes) { line_->write(bytes); }
 
 void LoopbackEndpoint::unplug() { line_->unplug(); }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -10,7 +10,7 @@
 #include "acquisition/transports/loopback_transport.h"
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// The emulated device's end of a line.
 class EmulatorEndpoint : public QObject {
@@ -30,38 +30,6 @@ class EmulatorEndpoint : public QObject {
   void received(const QByteArray& bytes);
   /// Something the person who started the emulator should know.
   void notice(const QString& text);
-};
-
-/// A pseudo-terminal behind a symbolic link.
-class PtyEndpoint : public EmulatorEndpoint {
-  Q_OBJECT
- public:
-  /// @param link path of the symbolic link to make; empty = none, the host opens the terminal's own path
-  explicit PtyEndpoint(QString link, QObject* parent = nullptr);
-  ~PtyEndpoint() override;
-  Result<void> open() override;
-  void send(const QByteArray& bytes) override;
-  void unplug() override;
-  QString address() const override { return link_.isEmpty() ? terminal_ : link_; }
-  QString terminal() const { return terminal_; }
-
- private:
-  Result<void> openTerminal();
-  Result<void> publishLink();
-  void readReady();
-  void writePending();
-  void close();
-
-  QString link_;
-  QString terminal_;
-  int master_ = -1;
-  int slave_ = -1;  ///< Our own, so that the master reads no error while no host is there.
-  bool host_seen_ = false;
-  bool link_made_ = false;
-  std::unique_ptr<QSocketNotifier> readable_;
-  std::unique_ptr<QSocketNotifier> writable_;
-  std::deque<QByteArray> pending_;
-  qsizetype pending_bytes_ = 0;
 };
 
 /// A TCP port; one host at a time, a second one is turned away.
@@ -97,4 +65,4 @@ class LoopbackEndpoint : public EmulatorEndpoint {
   LoopbackTransport* line_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <vector>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 std::span<const EmulatorFault> emulatorFaults() {
   static const std::vector<EmulatorFault> kFaults = {
@@ -79,4 +79,4 @@ Result<EmulatorFaults> parseFaults(const std::string& list) {
   return faults;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

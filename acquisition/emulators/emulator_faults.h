@@ -6,7 +6,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// What an emulated tracker does wrong on purpose, to exercise a driver.
 struct EmulatorFaults {
@@ -36,4 +36,4 @@ std::span<const EmulatorFault> emulatorFaults();
 /// @error kBadInput for an unknown fault (the known ones are listed) or a missing or wrong count
 Result<EmulatorFaults> parseFaults(const std::string& list);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

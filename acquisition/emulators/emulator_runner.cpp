@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr int kTick_ms = 2;
@@ -111,4 +111,4 @@ void EmulatorRunner::unplug() {
   emit unplugged();
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

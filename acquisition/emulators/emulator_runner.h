@@ -11,7 +11,7 @@
 #include "acquisition/emulators/emulator_endpoint.h"
 #include "acquisition/emulators/emulator_faults.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// Joins an emulated tracker and a line: gives it time from a monotonic clock, so that it neither drifts nor drops, and
 /// spoils the line as the faults say.
@@ -61,4 +61,4 @@ class EmulatorRunner : public QObject {
   std::uint64_t records_sent_ = 0;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -1,10 +1,12 @@
 #include "acquisition/emulators/fastrak_emulator.h"
 
-namespace fieldtrue {
+#include "acquisition/emulators/pty_endpoint.h"
+
+namespace fieldtrue::acquisition {
 namespace {
 
 /// Five places in front of the transmitter, in the rig's frame.
-std::vector<Pose> walk(const Scene& scene) {
+std::vector<Pose> walk(const simulation::Scene& scene) {
   std::vector<Pose> places;
   for (const auto& p :
        {Eigen::Vector3d(0.35, 0.0, 0.0), Eigen::Vector3d(0.35, 0.2, 0.0), Eigen::Vector3d(0.5, 0.2, 0.15),
@@ -14,7 +16,7 @@ std::vector<Pose> walk(const Scene& scene) {
   return places;
 }
 
-Result<std::unique_ptr<PoseSource>> makeSource(const FastrakEmulation& emulation) {
+Result<std::unique_ptr<PoseSource>> makeSource(const Emulation& emulation) {
   if (emulation.replay) {
     if (emulation.replay->rows.empty()) {
       return fail(ErrorCode::kBadInput, "The recording to replay has no rows; at least one sample is needed");
@@ -27,7 +29,7 @@ Result<std::unique_ptr<PoseSource>> makeSource(const FastrakEmulation& emulation
     return std::make_unique<ReplaySource>(*emulation.replay);
   }
   constexpr double kStand_s = 3.0;
-  auto simulator = TrackerSimulator::make(emulation.scene, emulation.seed);
+  auto simulator = simulation::TrackerSimulator::make(emulation.scene, emulation.seed);
   if (!simulator) return tl::unexpected(simulator.error());
   auto jig = std::make_unique<SimulatedJig>(std::move(*simulator), OperatorHabits{}, emulation.seed);
   jig->wander(walk(emulation.scene), kStand_s);
@@ -36,7 +38,7 @@ Result<std::unique_ptr<PoseSource>> makeSource(const FastrakEmulation& emulation
 
 }  // namespace
 
-Result<std::unique_ptr<EmulatorRunner>> makeFastrakEmulator(const FastrakEmulation& emulation) {
+Result<std::unique_ptr<EmulatorRunner>> makeFastrakEmulator(const Emulation& emulation) {
   if (emulation.pty_link.empty() == !emulation.tcp_port.has_value()) {
     return fail(ErrorCode::kBadInput, "An emulator needs one line: --pty LINK or --listen PORT");
   }
@@ -63,4 +65,4 @@ std::unique_ptr<EmulatorRunner> makeFastrakEmulator(std::unique_ptr<PoseSource> 
                                           speed);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

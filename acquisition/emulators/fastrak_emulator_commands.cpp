@@ -4,7 +4,7 @@
 #include "acquisition/emulators/fastrak_emulator_core.h"
 #include "acquisition/protocols/plain_number.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 enum RefusalCode { kMissing = -1, kNotNumeric = -2, kOutOfRange = -3, kBufferFull = -5, kUnknown = -99 };
@@ -299,4 +299,4 @@ void FastrakEmulatorCore::flow(const FastrakCommand& command, std::vector<Emulat
   paused_ = command.letter == kFastrakXoff;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

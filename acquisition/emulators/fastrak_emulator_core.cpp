@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 Eigen::Vector3d vectorAt(const std::vector<double>& numbers, std::size_t first) {
@@ -145,4 +145,4 @@ void FastrakEmulatorCore::send(const std::vector<Sample>& samples, bool every, s
   }
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

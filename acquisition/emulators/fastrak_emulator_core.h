@@ -13,7 +13,7 @@
 #include "acquisition/emulators/pose_source.h"
 #include "acquisition/protocols/fastrak.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 struct FastrakEmulatorOptions {
   double reset_silence_s = 10.0;  ///< After ^Y.
@@ -106,4 +106,4 @@ class FastrakEmulatorCore : public EmulatedTracker {
   bool paused_ = false;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -4,7 +4,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 StandingSource::StandingSource(std::vector<Pose> tracker_from_sensor, double rate_hz)
     : poses_(std::move(tracker_from_sensor)), rate_hz_(rate_hz) {
@@ -32,12 +32,14 @@ std::vector<Sample> StandingSource::readNow(std::span<const int> sensors, double
 
 ReplaySource::ReplaySource(const SampleTable& table) {
   FT_CHECK(!table.rows.empty());
-  double latest_s = 0.0;
   for (const auto& row : table.rows) {
     rows_.push_back(row.sample);
-    latest_s = std::max(latest_s, row.sample.time_s - table.rows.front().sample.time_s);
-    due_s_.push_back(latest_s);
+    // That a take was given up is no word of the tracker's.
+    if (row.node < 0 && row.sample.status.starts_with("cancelled:")) rows_.back().status.clear();
   }
+  // Readings between the places stand after those at the places, and a place taken again among its neighbours.
+  std::stable_sort(rows_.begin(), rows_.end(), [](const Sample& a, const Sample& b) { return a.time_s < b.time_s; });
+  for (const Sample& row : rows_) due_s_.push_back(row.time_s - rows_.front().time_s);
 }
 
 unsigned ReplaySource::sensors() const {
@@ -71,4 +73,4 @@ double ReplaySource::rate_hz() const {
   return due_s_.back() > 0.0 ? static_cast<double>(rows_.size() - 1) / due_s_.back() : 0.0;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

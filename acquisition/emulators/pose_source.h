@@ -8,7 +8,7 @@
 
 #include "calib/core/calibration_table.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// Where an emulated tracker's readings come from.
 class PoseSource {
@@ -63,4 +63,4 @@ class ReplaySource : public PoseSource {
   std::vector<double> due_s_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

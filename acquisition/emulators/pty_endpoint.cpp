@@ -1,3 +1,5 @@
+#include "acquisition/emulators/pty_endpoint.h"
+
 #include <fcntl.h>
 #include <stdlib.h>
 #include <termios.h>
@@ -12,7 +14,7 @@
 
 #include "acquisition/emulators/emulator_endpoint.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 /// Over a quarter of an hour of unread records: the host has gone without stopping the stream.
@@ -124,4 +126,4 @@ void PtyEndpoint::close() {
   if (master_ >= 0) ::close(std::exchange(master_, -1));
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr double kLift_m = 0.03;
@@ -15,14 +15,14 @@ constexpr double kStill_m = 1e-6;
 /// @source Flash and Hogan 1985, eq. 5
 double minimumJerk(double t) { return t * t * t * (10.0 - 15.0 * t + 6.0 * t * t); }
 
-Pose restingPose(const Scene& scene) {
+Pose restingPose(const simulation::Scene& scene) {
   constexpr double kInFront_m = 0.3;
   return scene.reference_from_tracker * Pose{Eigen::Vector3d(kInFront_m, 0.0, 0.0), Eigen::Quaterniond::Identity()};
 }
 
 }  // namespace
 
-VirtualOperator::VirtualOperator(const RigModel& rig, const OperatorHabits& habits, const Pose& resting,
+VirtualOperator::VirtualOperator(const simulation::RigModel& rig, const OperatorHabits& habits, const Pose& resting,
                                  std::uint64_t seed)
     : rig_(rig), habits_(habits), random_(seed), asked_(resting), from_(resting), to_(resting) {
   std::uniform_real_distribution<double> turn(0.0, 2.0 * std::numbers::pi);
@@ -75,7 +75,7 @@ bool VirtualOperator::standing(double time_s) const {
   return !moved_ || (held_s >= 0.0 && std::exp(-held_s / habits_.settle_s) * habits_.tremor_m < kStill_m);
 }
 
-SimulatedJig::SimulatedJig(TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed)
+SimulatedJig::SimulatedJig(simulation::TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed)
     : simulator_(std::move(simulator)),
       operator_(simulator_.scene().rig, habits, restingPose(simulator_.scene()), seed),
       leg_s_(habits.travel_s + stand_s_) {}
@@ -111,4 +111,4 @@ std::vector<Sample> SimulatedJig::readNow(std::span<const int> sensors, double t
   return {simulator_.measure(operator_.poseAt(time_s), time_s, 0)};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -7,7 +7,7 @@
 #include "acquisition/emulators/pose_source.h"
 #include "calib/simulation/simulator.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// How the emulated operator carries the jig.
 struct OperatorHabits {
@@ -22,7 +22,8 @@ struct OperatorHabits {
 class VirtualOperator {
  public:
   /// @param rig placing tolerances; @param resting reference_from_sensor where the jig stands at first
-  VirtualOperator(const RigModel& rig, const OperatorHabits& habits, const Pose& resting, std::uint64_t seed);
+  VirtualOperator(const simulation::RigModel& rig, const OperatorHabits& habits, const Pose& resting,
+                  std::uint64_t seed);
   /// Sends the operator to a place. Sent where the jig is already going, nothing changes; sent again where it stands,
   /// it is lifted and set down anew.
   /// @param place reference_from_sensor as the rig says
@@ -35,7 +36,7 @@ class VirtualOperator {
  private:
   Pose placed(const Pose& place);
 
-  RigModel rig_;
+  simulation::RigModel rig_;
   OperatorHabits habits_;
   std::mt19937_64 random_;
   Pose asked_, from_, to_;
@@ -48,12 +49,12 @@ class VirtualOperator {
 /// The tracker of a scene with a jig in the hands of a virtual operator.
 class SimulatedJig : public PoseSource {
  public:
-  SimulatedJig(TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed);
+  SimulatedJig(simulation::TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed);
   void guideTo(const Pose& reference_from_sensor, double time_s);
   /// Lets the operator walk through places in a circle, standing a while at each, as long as nobody guides.
   void wander(std::vector<Pose> places, double stand_s);
   const VirtualOperator& virtualOperator() const { return operator_; }
-  const Scene& scene() const { return simulator_.scene(); }
+  const simulation::Scene& scene() const { return simulator_.scene(); }
 
   unsigned sensors() const override { return 1; }
   std::optional<double> due_s(std::uint64_t cycle, int active) const override;
@@ -63,7 +64,7 @@ class SimulatedJig : public PoseSource {
  private:
   void walk(double time_s);
 
-  TrackerSimulator simulator_;
+  simulation::TrackerSimulator simulator_;
   VirtualOperator operator_;
   std::vector<Pose> tour_;
   double stand_s_ = 3.0;
@@ -71,4 +72,4 @@ class SimulatedJig : public PoseSource {
   std::size_t next_stop_ = 0;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -10,7 +10,7 @@
 #include "acquisition/protocols/fastrak_items.h"
 #include "acquisition/protocols/plain_number.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr double kPowersOfTen[] = {1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6};
@@ -168,4 +168,4 @@ std::string encodeRecord(const FastrakRecord& record, const FastrakLayout& layou
   return out;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

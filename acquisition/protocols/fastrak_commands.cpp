@@ -6,7 +6,7 @@
 
 #include "acquisition/protocols/plain_number.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 using enum FastrakGrammar;
@@ -245,4 +245,4 @@ FastrakCommand lineRate(int baud, char parity, int bits, bool hardware_handshake
 FastrakCommand readBack(char letter, int station) { return forStation(letter, station); }
 
 }  // namespace fastrak
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

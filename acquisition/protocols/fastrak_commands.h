@@ -8,7 +8,7 @@
 
 #include "acquisition/protocols/fastrak_items.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// A command as data: its letter, the station where it has one, and its fields as text; an empty field keeps its value.
 struct FastrakCommand {
@@ -105,4 +105,4 @@ class FastrakCommandReader {
   std::string line_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 Eigen::Vector3d vector3(const double* v) { return {v[0], v[1], v[2]}; }
@@ -205,4 +205,4 @@ Sample toSample(const FastrakRecord& record, double time_s) {
   return check == OrientationCheck::kDamaged ? unusable(kStatusDamaged) : sample;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

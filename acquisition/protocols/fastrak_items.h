@@ -11,7 +11,7 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 enum class FastrakFormat { kAscii, kBinary };
 enum class FastrakUnit { kInch, kCentimetre };
@@ -96,4 +96,4 @@ inline constexpr const char* kStatusFlipped = "flipped";  ///< Mirrored through 
 /// The status is the error letter, `missing` or `damaged`; a sample without a usable pose has the identity pose.
 Sample toSample(const FastrakRecord& record, double time_s);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

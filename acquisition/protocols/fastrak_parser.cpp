@@ -1,6 +1,6 @@
 #include "acquisition/protocols/fastrak_parser.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 bool isErrorLetter(char c) { return c == ' ' || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
@@ -88,4 +88,4 @@ void FastrakParser::add(std::string_view bytes, std::vector<FastrakRecord>& out)
   buffer_.erase(0, consume(buffer_, out));
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

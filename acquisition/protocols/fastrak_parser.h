@@ -8,7 +8,7 @@
 
 #include "acquisition/protocols/fastrak_items.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// What the tracker was told to send, so that its records can be told from noise.
 struct FastrakStreamSettings {
@@ -52,4 +52,4 @@ class FastrakParser {
   std::uint64_t bytes_ = 0, records_ = 0, dropped_bytes_ = 0, losses_of_lock_ = 0;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

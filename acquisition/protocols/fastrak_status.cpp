@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <utility>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr std::size_t kStatusBytes = 55;
@@ -130,7 +130,7 @@ std::string errorMeaning(char letter) {
     if (known == letter) return text;
   }
   if (letter >= 'A' && letter <= 'Z') return std::string("self-test or hardware error (") + letter + ")";
-  return std::string("error letter ") + letter + ", which the manual does not list";
+  return "error letter " + std::string(1, letter) + ", which the manual does not list";
 }
 
 std::string statusMeaning(const std::string& status) {
@@ -150,4 +150,4 @@ std::optional<std::string> findReadBack(std::string_view bytes, char letter, int
   return trimmed(bytes.substr(start + head.size(), end - start - head.size()));
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -6,7 +6,7 @@
 
 #include "acquisition/protocols/fastrak_items.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// What the tracker says of itself (`S` command).
 struct FastrakStatus {
@@ -51,4 +51,4 @@ std::string statusMeaning(const std::string& status);
 /// A reading-back reply (`2`, station, letter, text), e.g. for `I1`: its text without blanks at the ends.
 std::optional<std::string> findReadBack(std::string_view bytes, char letter, int station);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <charconv>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 std::string written(double value, std::chars_format format, int decimals) {
@@ -30,4 +30,4 @@ std::string exponentText(double value, int decimals) {
   return text.starts_with('-') ? text : " " + text;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

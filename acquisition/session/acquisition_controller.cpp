@@ -2,8 +2,9 @@
 
 #include "acquisition/devices/registry.h"
 #include "acquisition/session/acquisition_impl.h"
+#include "acquisition/session/guarded_call.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 namespace {
 
@@ -16,11 +17,19 @@ AcquisitionController::Impl::Impl(AcquisitionController* controller, SamplerOpti
       options(sampler_options),
       sampler(sampler_options),
       silence_timer(controller),
+      retry_timer(controller),
       status_timer(controller) {
   status_timer.setSingleShot(true);
-  QObject::connect(&status_timer, &QTimer::timeout, controller, [this] { emitStatus(); });
+  QObject::connect(&status_timer, &QTimer::timeout, controller, [this] { guarded(*owner, [this] { emitStatus(); }); });
   silence_timer.setInterval(kSilenceCheck_ms);
-  QObject::connect(&silence_timer, &QTimer::timeout, controller, [this] { checkSilence(); });
+  QObject::connect(&silence_timer, &QTimer::timeout, controller,
+                   [this] { guarded(*owner, [this] { checkSilence(); }); });
+  retry_timer.setSingleShot(true);
+  QObject::connect(&retry_timer, &QTimer::timeout, controller, [this] {
+    guarded(*owner, [this] {
+      if (device) device->start();
+    });
+  });
 }
 
 AcquisitionController::Impl::~Impl() {
@@ -34,6 +43,8 @@ AcquisitionController::AcquisitionController(SamplerOptions options, QObject* pa
 
 AcquisitionController::~AcquisitionController() = default;
 
+void AcquisitionController::setWallClock(std::function<QDateTime()> now) { impl_->now = std::move(now); }
+
 void AcquisitionController::adoptDevice(std::unique_ptr<TrackerDevice> device, const Pose& reference_from_tracker) {
   impl_->adopt(std::move(device), reference_from_tracker);
 }
@@ -41,18 +52,18 @@ void AcquisitionController::adoptDevice(std::unique_ptr<TrackerDevice> device, c
 AcquisitionStatus AcquisitionController::status() const { return impl_->status(); }
 
 void AcquisitionController::connectDevice(const QString& device, const QString& scene_path) {
-  Scene scene;
+  simulation::Scene scene;
   if (!scene_path.isEmpty()) {
-    auto read = readScene(scene_path.toStdString());
+    auto read = simulation::readScene(scene_path.toStdString());
     if (!read) {
-      emit failed(QString::fromStdString(read.error().message));
+      emit deviceFailed(QString::fromStdString(read.error().message));
       return;
     }
     scene = *std::move(read);
   }
   auto made = makeDevice(device.toStdString(), scene);
   if (!made) {
-    emit failed(QString::fromStdString(made.error().message));
+    emit deviceFailed(QString::fromStdString(made.error().message));
     return;
   }
   impl_->adopt(*std::move(made), scene.reference_from_tracker);
@@ -73,17 +84,25 @@ void AcquisitionController::take() {
   if (impl_->collecting()) return;
   if (!impl_->store) {
     emit takeFailed(QStringLiteral("There is no session to record into; make a plan or open a session first."));
+  } else if (impl_->store->isReadOnly()) {
+    emit takeFailed(
+        QStringLiteral("Nothing can be stored: the session's file cannot be written to. Copy it to a folder "
+                       "that can be written to, and open it there."));
   } else if (impl_->device_state != DeviceState::kRunning) {
     emit takeFailed(QStringLiteral("The tracker is not connected; connect it and take again."));
   } else if (!impl_->current) {
     emit takeFailed(QStringLiteral("All places are done; choose one to retake it."));
+  } else if (const auto off_m = impl_->tooFar_m(); off_m && !impl_->isRefused()) {
+    impl_->refuse(*off_m);
   } else {
     impl_->startTake();
+    impl_->taken_away = off_m.has_value();
   }
 }
 
 void AcquisitionController::cancelTake() {
   impl_->failure.clear();
+  impl_->refused_at.reset();
   impl_->stopTake();
   impl_->changed();
 }
@@ -93,12 +112,8 @@ void AcquisitionController::skip() {
   impl_->failure.clear();
   impl_->stopTake();
   const std::size_t place = *impl_->current;
-  if (const auto skipped = impl_->store->skip(place, "skipped by the operator"); !skipped) {
-    emit failed(QString::fromStdString(skipped.error().message));
-    return;
-  }
-  impl_->reloadPlace(place);
-  impl_->goOn();
+  if (!impl_->told(impl_->store->skip(place, "skipped by the operator"))) return;
+  if (impl_->told(impl_->reloadPlace(place))) impl_->goOn();
 }
 
 void AcquisitionController::undo() {
@@ -111,8 +126,7 @@ void AcquisitionController::undo() {
     return;
   }
   if (!*place) return;
-  impl_->reloadPlace(**place);
-  impl_->setCurrent(**place);
+  if (impl_->told(impl_->reloadPlace(**place))) impl_->setCurrent(**place);
 }
 
 void AcquisitionController::redo() {
@@ -125,15 +139,14 @@ void AcquisitionController::redo() {
     return;
   }
   if (!*place) return;
-  impl_->reloadPlace(**place);
-  impl_->goOn();
+  if (impl_->told(impl_->reloadPlace(**place))) impl_->goOn();
 }
 
 void AcquisitionController::goTo(int place) {
   if (!impl_->store || place >= static_cast<int>(impl_->states.size())) return;
   impl_->failure.clear();
   impl_->stopTake();
-  impl_->setCurrent(place < 0 ? impl_->store->nextPlace() : static_cast<std::size_t>(place));
+  impl_->setCurrent(place < 0 ? impl_->nextPlace() : static_cast<std::size_t>(place));
 }
 
 void AcquisitionController::setAutomatic(bool automatic) {
@@ -144,6 +157,8 @@ void AcquisitionController::setAutomatic(bool automatic) {
   impl_->waiting_since_s.reset();
   impl_->changed();
 }
+
+void AcquisitionController::setReconnects(bool reconnects) { impl_->reconnects = reconnects; }
 
 void AcquisitionController::setSamplesPerNode(int count) {
   if (count < 1 || count > 100000) {
@@ -157,20 +172,23 @@ void AcquisitionController::setSamplesPerNode(int count) {
 
 void AcquisitionController::setSessionState(const QString& key, const QString& value) {
   if (!impl_->store) return;
-  if (const auto kept = impl_->store->setState(key.toStdString(), value.toStdString()); !kept) {
-    emit failed(QString::fromStdString(kept.error().message));
-  }
+  impl_->told(impl_->store->setState(key.toStdString(), value.toStdString()));
 }
 
 void AcquisitionController::storeFit(const QString& name, const QString& ftcal_text) {
   if (!impl_->store) return;
-  if (const auto kept = impl_->store->storeFit(name.toStdString(), ftcal_text.toStdString()); !kept) {
-    emit failed(QString::fromStdString(kept.error().message));
-  }
+  impl_->told(impl_->store->storeFit(name.toStdString(), ftcal_text.toStdString()));
 }
 
 void AcquisitionController::requestTables() {
-  if (impl_->store) emit tablesReady(impl_->store->nodeTable(), impl_->store->sampleTable());
+  if (!impl_->store) return;
+  const auto table = impl_->store->nodeTable();
+  const auto samples = table ? impl_->store->sampleTable() : tl::unexpected(table.error());
+  if (samples) {
+    emit tablesReady(*table, *samples);
+  } else {
+    emit failed(QString::fromStdString(samples.error().message));
+  }
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -1,23 +1,50 @@
 #pragma once
 
+#include <QDateTime>
 #include <QObject>
 #include <QString>
 #include <QVector>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "acquisition/devices/tracker_device.h"
-#include "acquisition/session/node_sampler.h"
+#include "acquisition/plan/place_state.h"
+#include "acquisition/sampling/node_sampler.h"
 #include "acquisition/session/session_store.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
-/// Everything a view needs to know of a running acquisition, as one value.
+/// A finished take that does not fit the others: how far the sensor stood from where it belongs.
+struct PlaceMisfit {
+  std::size_t place = 0;
+  double off_m = 0.0;
+  bool operator==(const PlaceMisfit&) const = default;
+};
+
+/// What is to be recorded, and where to; another value when a session is opened or closed.
+struct PlannedSession {
+  QString path;                      ///< Empty when none is open.
+  bool read_only = false;            ///< Open as a private copy: nothing can be stored.
+  std::vector<PlannedPlace> places;  ///< In visiting order.
+};
+
+/// What of it is recorded; another value when that changes: take, retake, undo, skip.
+struct RecordedPlaces {
+  std::uint64_t revision = 0;        ///< Grows with every change.
+  std::vector<PlaceState> states;    ///< One a planned place; a take that does not fit the others is suspicious.
+  std::vector<PlaceMisfit> misfits;  ///< By place.
+  std::size_t n_done = 0, n_skipped = 0;
+  bool can_undo = false, can_redo = false;
+};
+
+/// Everything a view needs to know of a running acquisition. What changes seldom is shared: a copy, made 30 times a
+/// second, costs the same however many places there are.
 struct AcquisitionStatus {
-  QString session_path;
-  std::vector<PlannedPlace> places;    ///< In visiting order.
-  std::vector<PlaceState> states;      ///< Same length.
+  std::shared_ptr<const PlannedSession> session = std::make_shared<PlannedSession>();   ///< Never null.
+  std::shared_ptr<const RecordedPlaces> recorded = std::make_shared<RecordedPlaces>();  ///< Never null.
   std::optional<std::size_t> current;  ///< Where the sensor is to be put now; none when all is done.
   bool current_is_retake = false;
   TakeState take = TakeState::kIdle;
@@ -31,22 +58,24 @@ struct AcquisitionStatus {
   QString device_text;
   std::optional<Sample> live;  ///< Newest reading.
   double rate_hz = 0.0;
-  double sd_m = 0.0;             ///< 3-D SD of the last half second.
-  Pose reference_from_tracker;   ///< Best rigid guess so far: fitted from the places done, before that the scene's or
-                                 ///< identity.
-  bool reference_known = false;  ///< At least 4 places not in one plane (or the alignment is known).
-  std::optional<double> distance_m;  ///< From the live position to the current place, by that guess.
-  std::size_t n_done = 0, n_skipped = 0;
-  bool can_undo = false, can_redo = false;
+  double sd_m = 0.0;  ///< 3-D SD of the last half second.
+  /// Best rigid guess so far: fitted from the places done, before that the scene's or identity.
+  Pose reference_from_tracker;
+  bool reference_known = false;      ///< At least 4 places not in one plane (or the alignment is known).
+  std::optional<double> distance_m;  ///< From the live position to the current place, by the takes done.
+  bool distance_known = false;       ///< The takes done tell it well enough to show.
+  bool away = false;                 ///< The sensor stands too far from the current place to be taken without asking.
+  bool refused = false;              ///< A take was refused for that; asked for once more, it is taken.
 };
 
 /// Runs an acquisition: device, sampler and store.
 ///
 /// Automatic mode takes when the sensor stands still near the current place (frame relation known), or has stood still
 /// for 0.7 s after having moved since the last take (not known yet; 3 s when it was found standing at the very start).
-/// The same stand is never taken twice by itself: it must be moved or lifted, or the take asked for. Lives in one
-/// worker thread (or in the main thread of the command line); all calls are slots, all answers are signals carrying
-/// whole values.
+/// The same stand is never taken twice by itself: it must be moved or lifted, or the take asked for. A tracker that ran
+/// and is lost is started again, at growing intervals, until it is back or another is connected (setReconnects). Lives
+/// in one worker thread (or in the main thread of the command line); all calls are slots, all answers are signals
+/// carrying whole values.
 class AcquisitionController : public QObject {
   Q_OBJECT
  public:
@@ -56,39 +85,54 @@ class AcquisitionController : public QObject {
   /// Takes over a device made elsewhere and starts it, in place of the one before.
   /// @param reference_from_tracker what is believed of the transmitter's place before the first place is taken
   void adoptDevice(std::unique_ptr<TrackerDevice> device, const Pose& reference_from_tracker = {});
+  /// Where the date and the clock of a session come from, UTC; the machine's own where nothing is given.
+  void setWallClock(std::function<QDateTime()> now);
   /// The value of the last or next statusChanged, at once.
   AcquisitionStatus status() const;
 
  public slots:
-  /// Connects a device by its text ("simulated", "fastrak:/dev/ttyUSB0@115200"); emits statusChanged, or failed.
+  /// Connects a device by its text ("simulated", "fastrak:/dev/ttyUSB0@115200"); emits statusChanged, or deviceFailed.
   /// @param scene_path for the simulated tracker; empty = clean room
   void connectDevice(const QString& device, const QString& scene_path);
   void disconnectDevice();
-  /// Takes over a session file. @param create_plan_json when not empty, the file is created with this plan (JSON, or
-  /// the text readPlan knows). The session before stays open when this one cannot be opened.
+  /// Takes over a session file; the one that is open already only tells sessionOpened. @param create_plan_json when not
+  /// empty, the file is created with this plan (JSON or readPlan's text). The session before stays when this one fails.
   void openSession(const QString& path, const QString& create_plan_json);
   void closeSession();
-  void take();  ///< Starts collecting at the current place (space bar, Page Down).
+  /// Starts collecting at the current place (space bar, Page Down). Where the takes done tell that the sensor stands
+  /// elsewhere, it is refused once; asked for again within a few seconds it is taken, and marked.
+  void take();
   void cancelTake();
   void skip();
   void undo();
   void redo();
   void goTo(int place);  ///< Makes any place current: retake it. -1 goes back to the first one not done.
   void setAutomatic(bool automatic);
+  void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
   void setSamplesPerNode(int count);
   void setSessionState(const QString& key, const QString& value);  ///< SessionStore::setState.
   void storeFit(const QString& name, const QString& ftcal_text);
-  /// Answers with tablesReady.
+  /// Answers with tablesReady, or failed. Reads every sample: once for a session, then placeChanged and looseKept tell.
   void requestTables();
 
  signals:
-  void statusChanged(const fieldtrue::AcquisitionStatus& status);                      ///< At most about 30 a second.
+  void statusChanged(const fieldtrue::acquisition::AcquisitionStatus& status);         ///< At most about 30 a second.
   void nodeStored(int place, const fieldtrue::Node& node, const QString& suspicious);  ///< It is on disk.
-  void takeFailed(const QString& reason);
-  void finished();  ///< No place is left.
+  void takeFailed(const QString& reason, int place = -1);  ///< The place, where there is one.
+  void takeRefused(int place, double off_m);               ///< The sensor stands so far from it.
+  void deviceFailed(const QString& text);                  ///< The tracker was lost, or cannot be connected.
+  void deviceBack();                                       ///< The tracker that was lost runs again.
+  void finished();                                         ///< No place is left.
   void tablesReady(const fieldtrue::CalibrationTable& table, const fieldtrue::SampleTable& samples);
+  /// A take, a skip, undo or redo changed what is stored of a place: its live take, if it has one, and the samples.
+  void placeChanged(int place, const std::optional<fieldtrue::Node>& node,
+                    const std::vector<fieldtrue::Sample>& samples);
+  /// Readings of no stored take were kept: rows of node -1.
+  void looseKept(const std::vector<fieldtrue::SampleRow>& rows);
+  void metadataChanged(const fieldtrue::TableMetadata& metadata);
   void sessionOpened(const QString& path, const QString& page, const QString& plan_json);
   void fitOpened(const QString& ftcal_text);  ///< The newest calibration of the session just opened, if it has one.
+  void remarked(const QString& message);      ///< What the user should know of the session just opened; no failure.
   void failed(const QString& message);        ///< One sentence for the message line.
 
  private:
@@ -96,9 +140,9 @@ class AcquisitionController : public QObject {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition
 
-Q_DECLARE_METATYPE(fieldtrue::AcquisitionStatus)
+Q_DECLARE_METATYPE(fieldtrue::acquisition::AcquisitionStatus)
 Q_DECLARE_METATYPE(fieldtrue::Node)
 Q_DECLARE_METATYPE(fieldtrue::CalibrationTable)
 Q_DECLARE_METATYPE(fieldtrue::SampleTable)

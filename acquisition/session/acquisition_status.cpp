@@ -1,24 +1,22 @@
 #include <algorithm>
 
+#include "acquisition/plan/place_state.h"
+#include "acquisition/sampling/stillness.h"
 #include "acquisition/session/acquisition_impl.h"
 
 /// What the views are told, and when.
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 namespace {
 
 constexpr qint64 kStatusInterval_ms = 34;
-/// Values with many places cost time to copy: the interval grows by this for each.
-constexpr double kStatusPerPlace_ms = 0.02;
 
 }  // namespace
 
 void AcquisitionController::Impl::changed() {
   if (status_timer.isActive()) return;
-  const auto interval_ms =
-      std::max(kStatusInterval_ms, static_cast<qint64>(kStatusPerPlace_ms * static_cast<double>(states.size())));
-  const qint64 elapsed_ms = since_status.isValid() ? since_status.elapsed() : interval_ms;
-  status_timer.start(static_cast<int>(std::max<qint64>(0, interval_ms - elapsed_ms)));
+  const qint64 elapsed_ms = since_status.isValid() ? since_status.elapsed() : kStatusInterval_ms;
+  status_timer.start(static_cast<int>(std::max<qint64>(0, kStatusInterval_ms - elapsed_ms)));
 }
 
 void AcquisitionController::Impl::emitStatus() {
@@ -26,13 +24,34 @@ void AcquisitionController::Impl::emitStatus() {
   emit owner->statusChanged(status());
 }
 
-AcquisitionStatus AcquisitionController::Impl::status() const {
-  AcquisitionStatus result;
-  if (store) {
-    result.session_path = store->path();
-    result.places = store->places();
+std::shared_ptr<const PlannedSession> AcquisitionController::Impl::plannedSession() const {
+  if (!store) return std::make_shared<PlannedSession>();
+  return std::make_shared<PlannedSession>(PlannedSession{store->path(), store->isReadOnly(), store->places()});
+}
+
+std::shared_ptr<const RecordedPlaces> AcquisitionController::Impl::recordedPlaces() const {
+  auto recorded = std::make_shared<RecordedPlaces>();
+  if (store) recorded->revision = revision;
+  recorded->states = states;
+  for (const auto& [place, off_m] : misfits) {
+    recorded->misfits.push_back({place, off_m});
+    if (states[place] == PlaceState::kDone) recorded->states[place] = PlaceState::kSuspicious;
   }
-  result.states = states;
+  for (const PlaceState state : states) {
+    recorded->n_done += state == PlaceState::kDone || state == PlaceState::kSuspicious ? 1 : 0;
+    recorded->n_skipped += state == PlaceState::kSkipped ? 1 : 0;
+  }
+  recorded->can_undo = can_undo;
+  recorded->can_redo = can_redo;
+  return recorded;
+}
+
+AcquisitionStatus AcquisitionController::Impl::status() const {
+  if (!told_session) told_session = plannedSession();
+  if (!told_recorded) told_recorded = recordedPlaces();
+  AcquisitionStatus result;
+  result.session = told_session;
+  result.recorded = told_recorded;
   result.current = current;
   result.current_is_retake = current && states[*current] != PlaceState::kPlanned;
   result.take = failure.isEmpty() ? sampler.state() : TakeState::kFailed;
@@ -49,12 +68,9 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.reference_from_tracker = guess.reference_from_tracker;
   result.reference_known = guess.known;
   result.distance_m = distanceToCurrent_m();
-  result.n_done = static_cast<std::size_t>(std::count_if(states.begin(), states.end(), [](PlaceState state) {
-    return state == PlaceState::kDone || state == PlaceState::kSuspicious;
-  }));
-  result.n_skipped = static_cast<std::size_t>(std::count(states.begin(), states.end(), PlaceState::kSkipped));
-  result.can_undo = can_undo;
-  result.can_redo = can_redo;
+  result.distance_known = rig.usable() || guess.known;
+  result.away = tooFar_m().has_value();
+  result.refused = isRefused();
   return result;
 }
 
@@ -65,6 +81,7 @@ QString AcquisitionController::Impl::reason(bool* attention) const {
     *attention = true;
     return failure;
   }
+  if (store->isReadOnly()) return QStringLiteral("nothing can be stored: the session's file cannot be written to");
   if (device_state != DeviceState::kRunning) {
     *attention = device_state == DeviceState::kFailed;
     return device_text.isEmpty() ? QStringLiteral("connect the tracker") : device_text;
@@ -87,18 +104,22 @@ QString AcquisitionController::Impl::reason(bool* attention) const {
 QString AcquisitionController::Impl::waitingReason() const {
   if (automatic && stand.hasTaken() && !stand.left()) return QStringLiteral("move the sensor here; or press space");
   if (!stillness.still()) return QString::fromStdString(stillness.reason());
-  return automatic ? automaticReason() : QStringLiteral("press space to take");
+  if (automatic) return automaticReason();
+  return tooFar_m() ? QStringLiteral("not at the place: carry the sensor here") : QStringLiteral("press space to take");
 }
 
 QString AcquisitionController::Impl::automaticReason() const {
-  if (guess.known && !near()) return QStringLiteral("still, but not at the place: move it here; or press space");
+  if ((guess.known && !near()) || tooFar_m())
+    return QStringLiteral("still, but not at the place: move it here; or press space");
   return QStringLiteral("hold still: about to take");
 }
 
 std::optional<double> AcquisitionController::Impl::distanceToCurrent_m() const {
   if (!live || !isGood(*live) || !store || !current) return std::nullopt;
-  const Eigen::Vector3d here_m = guess.reference_from_tracker * live->tracker_from_sensor.position_m;
-  return (here_m - store->places()[*current].reference_from_sensor.position_m).norm();
+  const Eigen::Vector3d& tracked_m = live->tracker_from_sensor.position_m;
+  const Eigen::Vector3d& there_m = store->places()[*current].reference_from_sensor.position_m;
+  if (rig.usable()) return rig.off_m(tracked_m, there_m);
+  return (guess.reference_from_tracker * tracked_m - there_m).norm();
 }
 
 double AcquisitionController::Impl::rate_hz() const {
@@ -109,4 +130,4 @@ double AcquisitionController::Impl::rate_hz() const {
 
 std::string AcquisitionController::Impl::currentName() const { return placeName(store->places()[*current]); }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

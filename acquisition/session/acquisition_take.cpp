@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "acquisition/sampling/stillness.h"
 #include "acquisition/session/acquisition_impl.h"
+#include "acquisition/session/guarded_call.h"
 
 /// The device half of the controller: samples in, takes out.
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 namespace {
 
@@ -16,6 +18,8 @@ constexpr double kLookEvery_s = 0.02;   ///< Stillness is judged no oftener, for
 constexpr double kFailureShown_s = 8.0;
 constexpr std::size_t kRateReadings = 120;
 constexpr std::size_t kNeighbours = 6;
+constexpr int kFirstRetry_ms = 500;
+constexpr int kLastRetry_ms = 8000;
 
 }  // namespace
 
@@ -25,16 +29,19 @@ void AcquisitionController::Impl::adopt(std::unique_ptr<TrackerDevice> next, con
   device = std::move(next);
   believed_reference = believed;
   updateGuess();
-  QObject::connect(device.get(), &TrackerDevice::stateChanged, owner,
-                   [this](DeviceState state, const QString& text) { onDeviceState(state, text); });
+  QObject::connect(device.get(), &TrackerDevice::stateChanged, owner, [this](DeviceState state, const QString& text) {
+    guarded(*owner, [&] { onDeviceState(state, text); });
+  });
   QObject::connect(device.get(), &TrackerDevice::samplesReceived, owner,
-                   [this](const std::vector<Sample>& samples) { onSamples(samples); });
+                   [this](const std::vector<Sample>& samples) { guarded(*owner, [&] { onSamples(samples); }); });
   device->start();
   changed();
 }
 
 void AcquisitionController::Impl::dropDevice() {
   silence_timer.stop();
+  retry_timer.stop();
+  lost = false;
   if (!device) return;
   if (collecting()) failTake("the tracker was disconnected; nothing of this take was stored");
   QObject::disconnect(device.get(), nullptr, owner, nullptr);
@@ -48,22 +55,43 @@ void AcquisitionController::Impl::dropDevice() {
 }
 
 void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString& text) {
+  if (lost && state != DeviceState::kRunning) {
+    // Why it was lost stays to be read; what the attempts to reach it meet is of no use to anybody.
+    if (state == DeviceState::kFailed) retryLater();
+    return;
+  }
+  const bool was_lost = lost;
+  const bool breaks = state == DeviceState::kFailed && device_state == DeviceState::kRunning;
+  lost = breaks && reconnects;
   const bool was_collecting = collecting();
   const bool same = state == device_state && text == device_text;
   const bool begins = state == DeviceState::kRunning && device_state != DeviceState::kRunning;
   device_state = state;
   device_text = text;
+  const QString why = text.endsWith(QLatin1Char('.')) ? text.chopped(1) : text;
+  if (lost) device_text = why + QStringLiteral(" (trying again by itself)");
   if (begins) beginStream();
   if (state != DeviceState::kRunning) {
     silence_timer.stop();
     live.reset();
-    if (was_collecting) failTake("the tracker was lost: " + text.toStdString() + ". Nothing of this take was stored");
+    stillness.clear();
+    if (state == DeviceState::kFailed && !same) emit owner->deviceFailed(device_text);
+    if (was_collecting) failTake("the tracker was lost: " + why.toStdString() + ". Nothing of this take was stored");
   }
   if (state == DeviceState::kFailed && !same) {
     note("device", "failed: " + text.toStdString());
-    if (!was_collecting) emit owner->failed(text);
   }
+  if (lost) {
+    retries = 0;
+    retryLater();
+  }
+  if (was_lost) emit owner->deviceBack();
   changed();
+}
+
+void AcquisitionController::Impl::retryLater() {
+  retry_timer.start(std::min(kFirstRetry_ms << std::min(retries, 8), kLastRetry_ms));
+  ++retries;
 }
 
 void AcquisitionController::Impl::beginStream() {
@@ -75,6 +103,7 @@ void AcquisitionController::Impl::beginStream() {
   silence_timer.start();
   failure.clear();
   mergeMetadata();
+  remarkOnTracker();
   updateGuess();
   note("device", "running: " + device_text.toStdString());
   guide();
@@ -97,10 +126,11 @@ void AcquisitionController::Impl::checkSilence() {
 double AcquisitionController::Impl::sessionTime_s(double device_time_s) {
   if (!store) return device_time_s;
   if (!time_offset_s) {
-    const auto newest_s = store->newestSample_s();
-    const double wall_s = 1e-3 * static_cast<double>(store->created().msecsTo(QDateTime::currentDateTimeUtc()));
+    const auto newest = store->newestSample_s();
+    if (!newest) emit owner->failed(QString::fromStdString(newest.error().message));
+    const double wall_s = 1e-3 * static_cast<double>(store->created().msecsTo(now()));
     // A session that goes on keeps its clock, across reconnections and days, and never steps back.
-    const double begin_s = newest_s ? std::max(wall_s, *newest_s + 1.0) : 0.0;
+    const double begin_s = newest && newest->has_value() ? std::max(wall_s, newest->value() + 1.0) : 0.0;
     time_offset_s = begin_s - device_time_s;
   }
   return device_time_s + *time_offset_s;
@@ -128,23 +158,28 @@ void AcquisitionController::Impl::addSample(const Sample& sample) {
     if (look) stood_still = stillness.still();
     stand.add(sample, stood_still);
   }
-  if (!failure.isEmpty() && sample.time_s - failure_time_s > kFailureShown_s) failure.clear();
+  const bool over = sample.time_s - failure_time_s > kFailureShown_s || (refused_at && !tooFar_m());
+  if (!failure.isEmpty() && over) {
+    failure.clear();
+    refused_at.reset();
+  }
   if (collecting()) {
     const TakeState after = sampler.add(sample);
     if (after == TakeState::kDone) finishTake();
     if (after == TakeState::kFailed) failTake(sampler.message());
-  } else if (automatic && look) {
-    considerAutomaticTake();
+  } else {
+    keepLoose(loose.between(sample));
+    if (automatic && look) considerAutomaticTake();
   }
 }
 
 void AcquisitionController::Impl::considerAutomaticTake() {
-  if (!store || !current || device_state != DeviceState::kRunning) return;
+  if (!store || store->isReadOnly() || !current || device_state != DeviceState::kRunning) return;
   checkNoSignal();
   if (!current || !stood_still) return;
   if (stand.hasTaken() && !stand.left()) return;
   const double wanted_rest_s = guess.known ? kRestNear_s : stand.left() ? kRestUnknown_s : kRestFound_s;
-  if (stand.rested_s() >= wanted_rest_s && (!guess.known || near())) startTake();
+  if (stand.rested_s() >= wanted_rest_s && (!guess.known || near()) && !tooFar_m()) startTake();
 }
 
 void AcquisitionController::Impl::checkNoSignal() {
@@ -162,12 +197,15 @@ bool AcquisitionController::Impl::near() const {
 
 void AcquisitionController::Impl::startTake() {
   failure.clear();
+  refused_at.reset();
+  taken_away = false;
   sampler = NodeSampler(options);
   sampler.start();
   changed();
 }
 
 void AcquisitionController::Impl::stopTake() {
+  keepCancelledTake();
   sampler.cancel();
   waiting_since_s.reset();
 }
@@ -179,42 +217,42 @@ void AcquisitionController::Impl::failTake(const std::string& why) {
   failure_time_s = recent_times_s.empty() ? 0.0 : recent_times_s.back();
   note("take failed", text);
   changed();
-  emit owner->takeFailed(failure);
+  emit owner->takeFailed(failure, current ? static_cast<int>(*current) : -1);
 }
 
 void AcquisitionController::Impl::finishTake() {
   const std::size_t place = *current;
   const NodeStatistics statistics = *sampler.statistics();
-  const std::string suspicious = suspicionOf(statistics, sampler.restarts(), neighbours(place));
+  std::string suspicious = suspicionOf(statistics, sampler.restarts(), neighbours(place));
+  if (taken_away) suspicious += (suspicious.empty() ? "" : "; ") + std::string("taken away from its place, as asked");
   const auto stored = store->storeTake(place, sampler.samples(), statistics, suspicious);
   if (!stored) {
     failTake("not stored: " + stored.error().message);
     return;
   }
+  told(markOtherTracker());
+  keepLoose(loose.cancelled(store->places()[place].node, sampler.abandoned()));
+  sampler.cancel();
   stopTake();
   stand.setTaken(statistics.mean);
-  reloadPlace(place);
-  const Node node = *nodes[place];
-  setCurrent(store->nextPlace());
+  if (const auto reread = reloadPlace(place); !reread) {
+    failTake("stored, but it cannot be read back: " + reread.error().message);
+    return;
+  }
+  const Node node = nodes[place].value();
+  setCurrent(nextPlace());
   emit owner->nodeStored(static_cast<int>(place), node, QString::fromStdString(suspicious));
   if (!current) emit owner->finished();
 }
 
 std::vector<NeighbourTake> AcquisitionController::Impl::neighbours(std::size_t place) const {
-  const Eigen::Vector3d& here_m = store->places()[place].reference_from_sensor.position_m;
-  std::vector<std::pair<double, std::size_t>> by_distance;
-  for (std::size_t other = 0; other < nodes.size(); ++other) {
-    if (other == place || !nodes[other]) continue;
-    by_distance.emplace_back((nodes[other]->reference_from_sensor.position_m - here_m).norm(), other);
-  }
-  std::sort(by_distance.begin(), by_distance.end());
-  if (by_distance.size() > kNeighbours) by_distance.resize(kNeighbours);
   std::vector<NeighbourTake> takes;
-  for (const auto& [distance_m, other] : by_distance) {
+  for (const std::size_t other : nearestTakes(place, kNeighbours + 1)) {
+    if (other == place || takes.size() == kNeighbours) continue;
     const Node& node = *nodes[other];
     takes.push_back({std::sqrt(node.covariance_m2->trace()), node.tracker_from_sensor.position_m.norm()});
   }
   return takes;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 namespace {
 
@@ -66,4 +66,4 @@ TableMetadata merged(TableMetadata known, const TableMetadata& more) {
   return known;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

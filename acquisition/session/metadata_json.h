@@ -4,7 +4,7 @@
 
 #include "calib/core/calibration_table.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// The metadata as a JSON object; what is not set is absent.
 nlohmann::json toJson(const TableMetadata& metadata);
@@ -15,4 +15,4 @@ TableMetadata metadataFromJson(const nlohmann::json& json);
 /// Fills what `known` leaves unset from `more`, entry by entry of `other` too.
 TableMetadata merged(TableMetadata known, const TableMetadata& more);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -1,12 +1,15 @@
 #include "acquisition/session/session_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <QDir>
 #include <QFile>
 #include <QFileInfo>
 #include <array>
 #include <atomic>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 namespace {
 
@@ -39,6 +42,20 @@ constexpr std::array kTables{
     "CREATE TABLE state(key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
 };
 
+/// What sessions of earlier versions lack; those versions read past it.
+constexpr std::array kLaterTables{
+    // Readings of no stored take: between places (cancelled_node NULL), or of a take that failed or was cancelled.
+    "CREATE TABLE IF NOT EXISTS loose_samples(id INTEGER PRIMARY KEY, cancelled_node INTEGER, sensor INTEGER NOT NULL,"
+    " t_s REAL NOT NULL, x_m REAL, y_m REAL, z_m REAL, qw REAL, qx REAL, qy REAL, qz REAL, status TEXT NOT NULL)",
+    // Few rows ever: without it every take would look through all actions for those taken back.
+    "CREATE INDEX IF NOT EXISTS actions_taken_back ON actions(id) WHERE undone = 1",
+};
+
+constexpr const char* kOpenKey = "is_open";
+/// SQLite's lock bytes: PENDING_BYTE, RESERVED_BYTE and the shared range.
+constexpr off_t kLockStart = 0x40000000;
+constexpr off_t kLockBytes = 512;
+
 /// SQLite's primary result codes that have a sentence of their own.
 enum SqliteCode {
   kBusy = 5,
@@ -57,20 +74,68 @@ QString newConnectionName() {
 }
 
 Result<int> readPragma(const SessionFile& file, const char* name) {
-  auto query = file.run(QStringLiteral("PRAGMA %1").arg(QLatin1String(name)));
-  if (!query) return tl::unexpected(query.error());
-  return query->next() ? query->value(0).toInt() : 0;
+  int value = 0;
+  const auto done = file.read(QStringLiteral("PRAGMA %1").arg(QLatin1String(name)), {},
+                              [&value](const QSqlQuery& row) { value = row.value(0).toInt(); });
+  if (!done) return tl::unexpected(done.error());
+  return value;
+}
+
+QString walOf(const QString& path) { return path + QStringLiteral("-wal"); }
+
+/// By the system's own word, which knows of read-only media too.
+bool canWrite(const QString& path) { return ::access(QFile::encodeName(path).constData(), W_OK) == 0; }
+
+/// SQLite makes its journal in the folder and may have to bring one up to date that a crash left.
+bool canWriteInPlace(const QString& path) {
+  return canWrite(path) && canWrite(QFileInfo(path).absolutePath()) &&
+         (!QFileInfo::exists(walOf(path)) || canWrite(walOf(path)));
+}
+
+/// Whether another program holds the file by SQLite's locks, so that it may change while it is copied.
+bool isHeldElsewhere(const QString& path) {
+  const int file = ::open(QFile::encodeName(path).constData(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  struct flock lock {};
+  lock.l_type = F_RDLCK;
+  lock.l_whence = SEEK_SET;
+  lock.l_start = kLockStart;
+  lock.l_len = kLockBytes;
+  const bool held = ::fcntl(file, F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+  ::close(file);
+  return held;
+}
+
+std::string heldElsewhere(const QString& path) {
+  return path.toStdString() + ": the session is open in another program; close it there first";
+}
+
+Result<void> copyFile(const QString& from, const QString& to) {
+  QFile source(from);
+  if (!source.copy(to)) {
+    return fail(ErrorCode::kIo, from.toStdString() + ": cannot be written to where it is, and could not be copied to " +
+                                    QFileInfo(to).absolutePath().toStdString() + " either (" +
+                                    source.errorString().toStdString() + ")");
+  }
+  QFile::setPermissions(to, QFile::ReadOwner | QFile::WriteOwner);
+  return {};
 }
 
 }  // namespace
 
-SessionFile::SessionFile(QString path) : path_(std::move(path)), connection_(newConnectionName()) {}
+SessionFile::SessionFile(QString path)
+    : path_(std::move(path)), opened_path_(path_), connection_(newConnectionName()) {}
 
 SessionFile::~SessionFile() {
-  if (held_) {
+  if (held_ && !isReadOnly()) {
+    if (!lacks_wal_) (void)sayWhetherOpen(false);
     (void)run(QStringLiteral("PRAGMA wal_checkpoint(TRUNCATE)"));
     (void)run(QStringLiteral("PRAGMA journal_mode=DELETE"));
   }
+  disconnect();
+}
+
+void SessionFile::disconnect() const {
   QSqlDatabase::database(connection_, false).close();
   QSqlDatabase::removeDatabase(connection_);
 }
@@ -87,6 +152,8 @@ Result<std::unique_ptr<SessionFile>> SessionFile::create(const QString& path) {
   Result<void> made = file->connect();
   if (made) made = file->hold();
   if (made) made = file->createTables();
+  if (made) made = file->addWhatIsNew();
+  if (made) made = file->sayWhetherOpen(true);
   if (!made) {
     file.reset();
     QFile::remove(path);
@@ -101,12 +168,52 @@ Result<std::unique_ptr<SessionFile>> SessionFile::open(const QString& path) {
   if (!info.exists()) return fail(ErrorCode::kIo, path.toStdString() + ": no such session file");
   if (!info.isFile()) return fail(ErrorCode::kIo, path.toStdString() + ": is not a file");
   std::unique_ptr<SessionFile> file(new SessionFile(path));
-  Result<void> opened = file->connect();
-  if (opened) opened = file->checkIdentity();
-  if (opened) opened = file->hold();
+  const bool has_wal = QFileInfo::exists(walOf(path));
+  Result<void> opened = canWriteInPlace(path) ? file->openWhereItIs() : file->openCopy();
   if (!opened) return tl::unexpected(opened.error());
-  file->held_ = true;
+  if (file->lacks_wal_ && !has_wal) {
+    file->remarks_.push_back(
+        path.toStdString() + ": this file was copied while its session was open, or after a crash, without the file " +
+        walOf(QFileInfo(path).fileName()).toStdString() +
+        " beside the original, which may hold the newest places; copy both and open them together");
+  } else {
+    file->lacks_wal_ = false;
+  }
   return file;
+}
+
+Result<void> SessionFile::openWhereItIs() {
+  Result<void> opened = connect();
+  if (opened) opened = checkIdentity();
+  if (opened) opened = hold();
+  if (!opened) return opened;
+  held_ = true;
+  const Result<bool> was_open = saysItIsOpen();
+  if (!was_open) return tl::unexpected(was_open.error());
+  lacks_wal_ = *was_open;
+  opened = addWhatIsNew();
+  if (opened) opened = sayWhetherOpen(true);
+  return opened;
+}
+
+Result<void> SessionFile::openCopy() {
+  if (isHeldElsewhere(path_)) return fail(ErrorCode::kIo, heldElsewhere(path_));
+  copy_ = std::make_unique<QTemporaryDir>();
+  if (!copy_->isValid()) {
+    return fail(ErrorCode::kIo, path_.toStdString() +
+                                    ": cannot be written to where it is, and there is no room for a " +
+                                    "private copy (" + copy_->errorString().toStdString() + ")");
+  }
+  opened_path_ = copy_->filePath(QStringLiteral("copy.fieldtrue"));
+  Result<void> copied = copyFile(path_, opened_path_);
+  if (copied && QFileInfo::exists(walOf(path_))) copied = copyFile(walOf(path_), walOf(opened_path_));
+  if (copied) copied = openWhereItIs();
+  if (!copied) return copied;
+  remarks_.push_back(path_.toStdString() +
+                     ": the file or its folder cannot be written to, so a private copy was opened and nothing will be "
+                     "stored; to go on recording, copy it to a folder that can be written to");
+  if (auto closed = run(QStringLiteral("PRAGMA query_only=ON")); !closed) return tl::unexpected(closed.error());
+  return {};
 }
 
 Result<void> SessionFile::connect() {
@@ -114,7 +221,7 @@ Result<void> SessionFile::connect() {
     return fail(ErrorCode::kUnsupported, "sessions need Qt's SQLite driver; install the package libqt6sql6-sqlite");
   }
   QSqlDatabase database = QSqlDatabase::addDatabase(QStringLiteral("QSQLITE"), connection_);
-  database.setDatabaseName(path_);
+  database.setDatabaseName(opened_path_);
   database.setConnectOptions(QStringLiteral("QSQLITE_BUSY_TIMEOUT=300"));
   if (!database.open()) return tl::unexpected(explain(database.lastError()));
   return {};
@@ -131,15 +238,17 @@ Result<void> SessionFile::checkIdentity() const {
                 path_.toStdString() + ": was written by a newer version of Fieldtrue (session format " +
                     std::to_string(*version) + ", this version reads up to " + std::to_string(kFormatVersion) + ")");
   }
-  auto check = run(QStringLiteral("PRAGMA quick_check(1)"));
-  if (!check) return tl::unexpected(check.error());
-  if (!check->next() || check->value(0).toString() != QLatin1String("ok")) {
+  QString verdict;
+  const auto checked = read(QStringLiteral("PRAGMA quick_check(1)"), {},
+                            [&verdict](const QSqlQuery& row) { verdict = row.value(0).toString(); });
+  if (!checked) return tl::unexpected(checked.error());
+  if (verdict != QLatin1String("ok")) {
     return fail(ErrorCode::kBadInput, path_.toStdString() + ": the session file is damaged");
   }
   return {};
 }
 
-Result<void> SessionFile::hold() const {
+Result<void> SessionFile::hold() {
   for (const char* statement : {"PRAGMA locking_mode=EXCLUSIVE", "PRAGMA journal_mode=WAL", "PRAGMA synchronous=FULL",
                                 "PRAGMA foreign_keys=ON", "BEGIN IMMEDIATE", "COMMIT"}) {
     if (auto done = run(QLatin1String(statement)); !done) return tl::unexpected(done.error());
@@ -160,6 +269,35 @@ Result<void> SessionFile::createTables() {
   });
 }
 
+Result<void> SessionFile::addWhatIsNew() {
+  return transaction([this]() -> Result<void> {
+    for (const char* statement : kLaterTables) {
+      if (auto done = run(QLatin1String(statement)); !done) return tl::unexpected(done.error());
+    }
+    return {};
+  });
+}
+
+Result<bool> SessionFile::saysItIsOpen() const {
+  bool open = false;
+  const auto done = read(QStringLiteral("SELECT value FROM meta WHERE key = ?"), {QLatin1String(kOpenKey)},
+                         [&open](const QSqlQuery& row) { open = row.value(0).toString() == QLatin1String("yes"); });
+  if (!done) return tl::unexpected(done.error());
+  return open;
+}
+
+Result<void> SessionFile::sayWhetherOpen(bool open) const {
+  const auto said = run(QStringLiteral("INSERT INTO meta(key, value) VALUES(?, ?)"
+                                       " ON CONFLICT(key) DO UPDATE SET value = excluded.value"),
+                        {QLatin1String(kOpenKey), open ? QStringLiteral("yes") : QStringLiteral("no")});
+  if (!said) return tl::unexpected(said.error());
+  // Into the file itself: only there does a copy without its journal find it. What a crash left is made whole with it.
+  if (auto whole = run(QStringLiteral("PRAGMA wal_checkpoint(TRUNCATE)")); !whole) {
+    return tl::unexpected(whole.error());
+  }
+  return {};
+}
+
 Result<QSqlQuery> SessionFile::run(const QString& sql, const QVariantList& values) const {
   QSqlQuery query(QSqlDatabase::database(connection_, false));
   query.setForwardOnly(true);
@@ -167,6 +305,26 @@ Result<QSqlQuery> SessionFile::run(const QString& sql, const QVariantList& value
   for (const QVariant& value : values) query.addBindValue(value);
   if (!query.exec()) return tl::unexpected(explain(query.lastError()));
   return query;
+}
+
+Result<void> SessionFile::runForAll(const QString& sql, const std::vector<QVariantList>& rows) const {
+  QSqlQuery query(QSqlDatabase::database(connection_, false));
+  query.setForwardOnly(true);
+  if (!query.prepare(sql)) return tl::unexpected(explain(query.lastError()));
+  for (const QVariantList& values : rows) {
+    for (qsizetype i = 0; i < values.size(); ++i) query.bindValue(static_cast<int>(i), values[i]);
+    if (!query.exec()) return tl::unexpected(explain(query.lastError()));
+  }
+  return {};
+}
+
+Result<void> SessionFile::read(const QString& sql, const QVariantList& values,
+                               const std::function<void(const QSqlQuery&)>& row) const {
+  auto query = run(sql, values);
+  if (!query) return tl::unexpected(query.error());
+  while (query->next()) row(*query);
+  if (query->lastError().isValid()) return tl::unexpected(explain(query->lastError()));
+  return {};
 }
 
 Result<void> SessionFile::transaction(const std::function<Result<void>()>& body) {
@@ -185,8 +343,13 @@ Error SessionFile::explain(const QSqlError& error) const {
   switch (error.nativeErrorCode().toInt() & 0xff) {
     case kBusy:
     case kLocked:
-      return {ErrorCode::kIo, name + ": the session is open in another program; close it there first"};
+      return {ErrorCode::kIo, heldElsewhere(path_)};
     case kReadOnly:
+      if (isReadOnly()) {
+        return {ErrorCode::kIo, name +
+                                    ": not stored, for the session is open as a private copy of a file that cannot "
+                                    "be written to; copy it to a folder that can, and open it there"};
+      }
       return {ErrorCode::kIo, name + ": the session file or its folder is write-protected"};
     case kFull:
       return {ErrorCode::kIo, name + ": the disk is full; free some space and try again"};
@@ -203,4 +366,4 @@ Error SessionFile::explain(const QSqlError& error) const {
   }
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 namespace {
 
@@ -97,4 +97,4 @@ Sample readSample(const QSqlQuery& row, int first) {
   return sample;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -6,7 +6,7 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/statistics.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// Columns of table `places` after the key, in the order of placeValues.
 inline constexpr const char* kPlaceColumns =
@@ -28,4 +28,4 @@ inline constexpr const char* kSampleColumns = "sensor, t_s, x_m, y_m, z_m, qw, q
 QVariantList sampleValues(const Sample& sample);
 Sample readSample(const QSqlQuery& row, int first_column);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

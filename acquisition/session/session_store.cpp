@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <map>
 
+#include "acquisition/plan/place_state.h"
 #include "acquisition/session/metadata_json.h"
 #include "acquisition/session/session_file.h"
 #include "acquisition/session/session_rows.h"
+#include "calib/tables/json_text.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 namespace {
 
@@ -28,11 +30,20 @@ Result<void> withoutRows(const Result<QSqlQuery>& query) {
   return {};
 }
 
-/// The newest standing action of every place.
-constexpr const char* kLiveActions = "(SELECT place, MAX(id) AS id FROM actions WHERE undone = 0 GROUP BY place)";
-/// The newest standing take of every place, also where a skip came later.
-constexpr const char* kLiveTakes =
-    "(SELECT place, MAX(id) AS id FROM actions WHERE undone = 0 AND kind = 'take' GROUP BY place)";
+/// The newest standing action of every place, or of one; the braces take `which`.
+QString liveActions(const char* which) {
+  return QStringLiteral("(SELECT place, MAX(id) AS id FROM actions WHERE undone = 0%1 GROUP BY place)")
+      .arg(QLatin1String(which));
+}
+constexpr const char* kEveryPlace = "";
+constexpr const char* kOnePlace = " AND place = ?";
+/// Takes only: the newest that stands, also where a skip came later.
+constexpr const char* kTakesOfEveryPlace = " AND kind = 'take'";
+constexpr const char* kTakesOfOnePlace = " AND kind = 'take' AND place = ?";
+
+constexpr std::size_t kMostLoose = 512;           ///< Readings kept back before they are written.
+constexpr double kLongestLoose_s = 5.0;           ///< Time of readings kept back before they are written.
+constexpr std::size_t kMostLooseWaiting = 20000;  ///< When none can be written the oldest go.
 
 }  // namespace
 
@@ -42,12 +53,31 @@ struct SessionStore::Impl {
   std::vector<PlannedPlace> places;
   TableMetadata metadata;
   QDateTime created;
+  std::vector<LooseSample> loose;  ///< Not on disk yet.
+
+  Impl() = default;
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() {
+    // There is nobody left to tell when it fails; a take is never among what waits.
+    if (file && !loose.empty()) (void)store([] { return Result<void>(); });
+  }
+
+  /// The one value of a query, none when it has no row or a NULL.
+  Result<std::optional<QVariant>> value(const QString& sql, const QVariantList& values = {}) const {
+    std::optional<QVariant> result;
+    const auto done = file->read(sql, values, [&result](const QSqlQuery& row) {
+      if (!row.isNull(0)) result = row.value(0);
+    });
+    if (!done) return tl::unexpected(done.error());
+    return result;
+  }
 
   Result<QString> meta(const QString& key) const {
-    auto query = file->run(QStringLiteral("SELECT value FROM meta WHERE key = ?"), {key});
-    if (!query) return tl::unexpected(query.error());
-    if (!query->next()) return damaged("has no " + key.toStdString());
-    return query->value(0).toString();
+    const auto found = value(QStringLiteral("SELECT value FROM meta WHERE key = ?"), {key});
+    if (!found) return tl::unexpected(found.error());
+    if (!*found) return damaged("has no " + key.toStdString());
+    return (*found)->toString();
   }
 
   tl::unexpected<Error> damaged(const std::string& what) const {
@@ -68,15 +98,19 @@ struct SessionStore::Impl {
           std::pair{QStringLiteral("software"), QStringLiteral("fieldtrue " FIELDTRUE_VERSION)}}) {
       if (auto written = setMeta(key, value); !written) return written;
     }
+    std::vector<QVariantList> rows;
     for (std::size_t place = 0; place < places.size(); ++place) {
-      QVariantList values = placeValues(places[place]);
-      values.prepend(static_cast<qlonglong>(place));
-      auto written = file->run(
-          QStringLiteral("INSERT INTO places(place, %1) VALUES(%2)").arg(kPlaceColumns, placeholders(values.size())),
-          values);
-      if (!written) return tl::unexpected(written.error());
+      rows.push_back(placeValues(places[place]));
+      rows.back().prepend(static_cast<qlonglong>(place));
     }
-    return {};
+    return insert(QStringLiteral("places(place, %1)").arg(kPlaceColumns), rows);
+  }
+
+  /// @param into table and columns
+  Result<void> insert(const QString& into, const std::vector<QVariantList>& rows) const {
+    if (rows.empty()) return {};
+    return file->runForAll(QStringLiteral("INSERT INTO %1 VALUES(%2)").arg(into, placeholders(rows.front().size())),
+                           rows);
   }
 
   Result<void> readHead() {
@@ -86,20 +120,23 @@ struct SessionStore::Impl {
     for (const auto* part : {&plan_text, &metadata_text, &created_text}) {
       if (!*part) return tl::unexpected(part->error());
     }
-    const auto plan_json = nlohmann::json::parse(plan_text->toStdString(), nullptr, false);
-    if (plan_json.is_discarded()) return damaged("has no readable plan");
-    auto read_plan = planFromJson(plan_json, file->path().toStdString() + ": plan");
+    const std::string name = file->path().toStdString();
+    const auto plan_json = parseJson(plan_text->toStdString(), name + ": plan");
+    if (!plan_json) return tl::unexpected(plan_json.error());
+    auto read_plan = planFromJson(*plan_json, name + ": plan");
     if (!read_plan) return tl::unexpected(read_plan.error());
     plan = *std::move(read_plan);
-    metadata = metadataFromJson(nlohmann::json::parse(metadata_text->toStdString(), nullptr, false));
+    const auto metadata_json = parseJson(metadata_text->toStdString(), name + ": metadata");
+    if (!metadata_json) return tl::unexpected(metadata_json.error());
+    metadata = metadataFromJson(*metadata_json);
     created = QDateTime::fromString(*created_text, Qt::ISODateWithMs);
     return readPlaces();
   }
 
   Result<void> readPlaces() {
-    auto query = file->run(QStringLiteral("SELECT %1 FROM places ORDER BY place").arg(kPlaceColumns));
-    if (!query) return tl::unexpected(query.error());
-    while (query->next()) places.push_back(readPlace(*query, 0));
+    const auto read = file->read(QStringLiteral("SELECT %1 FROM places ORDER BY place").arg(kPlaceColumns), {},
+                                 [this](const QSqlQuery& row) { places.push_back(readPlace(row, 0)); });
+    if (!read) return read;
     if (places.empty()) return damaged("has no places");
     return {};
   }
@@ -111,6 +148,7 @@ struct SessionStore::Impl {
     auto added = file->run(QStringLiteral("INSERT INTO actions(place, kind, reason, time_utc) VALUES(?, ?, ?, ?)"),
                            {static_cast<qlonglong>(place), QLatin1String(kind), text(reason), now()});
     if (!added) return tl::unexpected(added.error());
+    file->goOnAsItIs();
     return added->lastInsertId().toLongLong();
   }
 
@@ -118,99 +156,160 @@ struct SessionStore::Impl {
                           const NodeStatistics& statistics) const {
     std::map<std::size_t, QString> rejected;
     for (const Rejection& rejection : statistics.rejections) rejected[rejection.sample] = text(rejection.text);
-    const QString sql = QStringLiteral("INSERT INTO samples(action, seq, %1, rejected) VALUES(%2)")
-                            .arg(kSampleColumns, placeholders(sampleValues({}).size() + 3));
+    std::vector<QVariantList> rows;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       QVariantList values{action, static_cast<qlonglong>(i)};
       values << sampleValues(samples[i]) << (rejected.contains(i) ? QVariant(rejected[i]) : QVariant());
-      if (auto added = file->run(sql, values); !added) return tl::unexpected(added.error());
+      rows.push_back(std::move(values));
     }
-    return {};
+    return insert(QStringLiteral("samples(action, seq, %1, rejected)").arg(kSampleColumns), rows);
+  }
+
+  Result<void> addLoose() const {
+    std::vector<QVariantList> rows;
+    for (const LooseSample& reading : loose) {
+      QVariantList values{reading.cancelled_node ? QVariant(*reading.cancelled_node) : QVariant()};
+      rows.push_back(values << sampleValues(reading.sample));
+    }
+    return insert(QStringLiteral("loose_samples(cancelled_node, %1)").arg(kSampleColumns), rows);
+  }
+
+  /// The body and the readings that wait, together or not at all.
+  Result<void> store(const std::function<Result<void>()>& body) {
+    const auto stored = file->transaction([&]() -> Result<void> {
+      if (auto done = body(); !done) return done;
+      return addLoose();
+    });
+    if (stored) loose.clear();
+    return stored;
   }
 
   /// Moves the one action that matches from one undo state to another. @return its place
   Result<std::optional<std::size_t>> moveAction(const QString& which, int undone) {
     std::optional<std::size_t> place;
-    const Result<void> moved = file->transaction([&]() -> Result<void> {
-      auto found = file->run(QStringLiteral("SELECT id, place FROM actions WHERE ") + which);
-      if (!found) return tl::unexpected(found.error());
-      if (!found->next()) return {};
-      place = static_cast<std::size_t>(found->value(1).toLongLong());
-      const qlonglong id = found->value(0).toLongLong();
-      found->finish();
+    const Result<void> moved = store([&]() -> Result<void> {
+      qlonglong id = 0;
+      const auto found =
+          file->read(QStringLiteral("SELECT id, place FROM actions WHERE ") + which, {}, [&](const QSqlQuery& row) {
+            id = row.value(0).toLongLong();
+            place = static_cast<std::size_t>(row.value(1).toLongLong());
+          });
+      if (!found || !place) return found;
       return withoutRows(file->run(QStringLiteral("UPDATE actions SET undone = ? WHERE id = ?"), {undone, id}));
     });
     if (!moved) return tl::unexpected(moved.error());
     return place;
   }
 
-  bool anyAction(int undone) const {
-    auto query = file->run(QStringLiteral("SELECT 1 FROM actions WHERE undone = ? LIMIT 1"), {undone});
-    return query && query->next();
+  Result<bool> any(const QString& which) const {
+    const auto found = value(QStringLiteral("SELECT 1 FROM actions WHERE %1 LIMIT 1").arg(which));
+    if (!found) return tl::unexpected(found.error());
+    return found->has_value();
   }
 
-  std::vector<Node> nodes(const QString& where, const QVariantList& values) const {
-    auto query = file->run(QStringLiteral("SELECT live.place, last.kind, %1 FROM %2 live"
-                                          " JOIN takes ON takes.action = live.id"
-                                          " JOIN %3 newest ON newest.place = live.place"
-                                          " JOIN actions last ON last.id = newest.id %4 ORDER BY live.place")
-                               .arg(kTakeColumns, kLiveTakes, kLiveActions, where),
-                           values);
+  /// Live takes of every place, or of one.
+  Result<std::vector<Node>> nodes(std::optional<std::size_t> only = {}) const {
+    QVariantList values;
+    if (only) values = {static_cast<qlonglong>(*only), static_cast<qlonglong>(*only)};
+    const QString sql = QStringLiteral(
+                            "SELECT live.place, last.kind, %1 FROM %2 live"
+                            " JOIN takes ON takes.action = live.id"
+                            " JOIN %3 newest ON newest.place = live.place"
+                            " JOIN actions last ON last.id = newest.id ORDER BY live.place")
+                            .arg(kTakeColumns, liveActions(only ? kTakesOfOnePlace : kTakesOfEveryPlace),
+                                 liveActions(only ? kOnePlace : kEveryPlace));
     std::vector<Node> result;
-    while (query && query->next()) {
-      const auto place = static_cast<std::size_t>(query->value(0).toLongLong());
-      if (place >= places.size()) continue;
+    const auto done = file->read(sql, values, [&](const QSqlQuery& row) {
+      const auto place = static_cast<std::size_t>(row.value(0).toLongLong());
+      if (place >= places.size()) return;
       const PlannedPlace& planned = places[place];
       Node node;
       node.node = planned.node;
       node.visit = planned.visit;
       node.index = planned.index;
       node.reference_from_sensor = planned.reference_from_sensor;
-      node.role = query->value(1).toString() == QLatin1String("skip") ? NodeRole::kSkipped : planned.role;
-      readTake(*query, 2, node);
+      node.role = row.value(1).toString() == QLatin1String("skip") ? NodeRole::kSkipped : planned.role;
+      readTake(row, 2, node);
       result.push_back(node);
-    }
+    });
+    if (!done) return tl::unexpected(done.error());
     return result;
   }
 
-  std::vector<SampleRow> sampleRows(const QString& where, const QVariantList& values) const {
-    auto query = file->run(QStringLiteral("SELECT live.place, %1 FROM %2 live JOIN samples ON samples.action = live.id"
-                                          " %3 ORDER BY live.place, seq")
-                               .arg(kSampleColumns, kLiveTakes, where),
-                           values);
+  /// Raw samples of the live takes of every place, or of one.
+  Result<std::vector<SampleRow>> sampleRows(std::optional<std::size_t> only = {}) const {
+    QVariantList values;
+    if (only) values << static_cast<qlonglong>(*only);
+    const QString sql = QStringLiteral(
+                            "SELECT live.place, %1 FROM %2 live JOIN samples ON samples.action = live.id"
+                            " ORDER BY live.place, seq")
+                            .arg(kSampleColumns, liveActions(only ? kTakesOfOnePlace : kTakesOfEveryPlace));
     std::vector<SampleRow> rows;
-    while (query && query->next()) {
-      const auto place = static_cast<std::size_t>(query->value(0).toLongLong());
-      if (place >= places.size()) continue;
-      rows.push_back({places[place].node, places[place].visit, readSample(*query, 1)});
-    }
+    const auto done = file->read(sql, values, [&](const QSqlQuery& row) {
+      const auto place = static_cast<std::size_t>(row.value(0).toLongLong());
+      if (place < places.size()) rows.push_back({places[place].node, places[place].visit, readSample(row, 1)});
+    });
+    if (!done) return tl::unexpected(done.error());
     return rows;
   }
 
-  std::vector<std::pair<std::string, std::string>> pairs(const QString& sql) const {
-    auto query = file->run(sql);
+  Result<void> appendLoose(std::vector<SampleRow>& rows) const {
+    const QString sql = QStringLiteral("SELECT cancelled_node, %1 FROM loose_samples ORDER BY id").arg(kSampleColumns);
+    const auto done = file->read(sql, {}, [&rows](const QSqlQuery& row) {
+      LooseSample reading{readSample(row, 1), {}};
+      if (!row.isNull(0)) reading.cancelled_node = row.value(0).toInt();
+      rows.push_back(rowOf(std::move(reading)));
+    });
+    if (!done) return done;
+    for (const LooseSample& reading : loose) rows.push_back(rowOf(reading));
+    return {};
+  }
+
+  /// States of the places that the rows of liveActions name.
+  Result<void> readStates(const char* which, const QVariantList& values, std::vector<PlaceState>& states) const {
+    const QString sql = QStringLiteral(
+                            "SELECT actions.place, kind, reason FROM actions JOIN %1 live"
+                            " ON live.id = actions.id")
+                            .arg(liveActions(which));
+    return file->read(sql, values, [&states](const QSqlQuery& row) {
+      const auto place = static_cast<std::size_t>(row.value(0).toLongLong());
+      if (place >= states.size()) return;
+      const bool skipped = row.value(1).toString() == QLatin1String("skip");
+      const bool fine = row.value(2).toString().isEmpty();
+      states[place] = skipped ? PlaceState::kSkipped : fine ? PlaceState::kDone : PlaceState::kSuspicious;
+    });
+  }
+
+  Result<std::vector<std::pair<std::string, std::string>>> pairs(const QString& sql) const {
     std::vector<std::pair<std::string, std::string>> result;
-    while (query && query->next()) {
-      result.emplace_back(query->value(0).toString().toStdString(), query->value(1).toString().toStdString());
-    }
+    const auto done = file->read(sql, {}, [&result](const QSqlQuery& row) {
+      result.emplace_back(row.value(0).toString().toStdString(), row.value(1).toString().toStdString());
+    });
+    if (!done) return tl::unexpected(done.error());
     return result;
   }
 };
+
+SampleRow rowOf(LooseSample reading) {
+  if (reading.cancelled_node) reading.sample.status = "cancelled:" + std::to_string(*reading.cancelled_node);
+  return {-1, 0, std::move(reading.sample)};
+}
 
 SessionStore::SessionStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SessionStore::SessionStore(SessionStore&&) noexcept = default;
 SessionStore& SessionStore::operator=(SessionStore&&) noexcept = default;
 SessionStore::~SessionStore() = default;
 
-Result<SessionStore> SessionStore::create(const QString& path, const Plan& plan, const TableMetadata& metadata) {
+Result<SessionStore> SessionStore::create(const QString& path, const Plan& plan, const TableMetadata& metadata,
+                                          const QDateTime& created) {
   auto file = SessionFile::create(path);
   if (!file) return tl::unexpected(file.error());
   auto impl = std::make_unique<Impl>();
   impl->file = *std::move(file);
   impl->plan = plan;
-  impl->places = fieldtrue::places(plan);
+  impl->places = fieldtrue::acquisition::places(plan);
   impl->metadata = metadata;
-  impl->created = QDateTime::currentDateTimeUtc();
+  impl->created = created;
   if (auto written = impl->file->transaction([&] { return impl->writeHead(); }); !written) {
     impl.reset();
     QFile::remove(path);
@@ -240,32 +339,26 @@ Result<void> SessionStore::setMetadata(const TableMetadata& metadata) {
   return written;
 }
 
-std::vector<PlaceState> SessionStore::states() const {
+bool SessionStore::isReadOnly() const { return impl_->file->isReadOnly(); }
+const std::vector<std::string>& SessionStore::remarks() const { return impl_->file->remarks(); }
+
+Result<std::vector<PlaceState>> SessionStore::states() const {
   std::vector<PlaceState> result(places().size(), PlaceState::kPlanned);
-  auto query = impl_->file->run(
-      QStringLiteral("SELECT actions.place, kind, reason FROM actions JOIN %1 live ON live.id = actions.id")
-          .arg(kLiveActions));
-  while (query && query->next()) {
-    const auto place = static_cast<std::size_t>(query->value(0).toLongLong());
-    if (place >= result.size()) continue;
-    const bool skipped = query->value(1).toString() == QLatin1String("skip");
-    const bool fine = query->value(2).toString().isEmpty();
-    result[place] = skipped ? PlaceState::kSkipped : fine ? PlaceState::kDone : PlaceState::kSuspicious;
-  }
+  if (auto read = impl_->readStates(kEveryPlace, {}, result); !read) return tl::unexpected(read.error());
   return result;
 }
 
-std::optional<std::size_t> SessionStore::nextPlace() const {
-  const std::vector<PlaceState> all = states();
-  const auto next = std::find(all.begin(), all.end(), PlaceState::kPlanned);
-  if (next == all.end()) return std::nullopt;
-  return static_cast<std::size_t>(next - all.begin());
+Result<PlaceState> SessionStore::state(std::size_t place) const {
+  std::vector<PlaceState> result(place + 1, PlaceState::kPlanned);
+  const auto read = impl_->readStates(kOnePlace, {static_cast<qlonglong>(place)}, result);
+  if (!read) return tl::unexpected(read.error());
+  return result.back();
 }
 
 Result<void> SessionStore::storeTake(std::size_t place, const std::vector<Sample>& samples,
                                      const NodeStatistics& statistics, const std::string& suspicious) {
   FT_CHECK(place < places().size());
-  return impl_->file->transaction([&]() -> Result<void> {
+  return impl_->store([&]() -> Result<void> {
     const auto action = impl_->addAction(place, "take", suspicious);
     if (!action) return tl::unexpected(action.error());
     QVariantList values = takeValues(samples, statistics);
@@ -280,7 +373,7 @@ Result<void> SessionStore::storeTake(std::size_t place, const std::vector<Sample
 
 Result<void> SessionStore::skip(std::size_t place, const std::string& reason) {
   FT_CHECK(place < places().size());
-  return impl_->file->transaction([&]() -> Result<void> {
+  return impl_->store([&]() -> Result<void> {
     const auto action = impl_->addAction(place, "skip", reason);
     if (!action) return tl::unexpected(action.error());
     return {};
@@ -295,15 +388,33 @@ Result<std::optional<std::size_t>> SessionStore::redo() {
   return impl_->moveAction(QStringLiteral("undone = 1 ORDER BY id LIMIT 1"), 0);
 }
 
-bool SessionStore::canUndo() const { return impl_->anyAction(0); }
-bool SessionStore::canRedo() const { return impl_->anyAction(1); }
+Result<bool> SessionStore::canUndo() const { return impl_->any(QStringLiteral("undone = 0")); }
+Result<bool> SessionStore::canRedo() const { return impl_->any(QStringLiteral("undone = 1")); }
+
+Result<void> SessionStore::keepLoose(const std::vector<LooseSample>& readings) {
+  if (isReadOnly()) return {};
+  std::vector<LooseSample>& waiting = impl_->loose;
+  waiting.insert(waiting.end(), readings.begin(), readings.end());
+  if (waiting.size() < kMostLoose &&
+      (waiting.empty() || waiting.back().sample.time_s - waiting.front().sample.time_s < kLongestLoose_s)) {
+    return {};
+  }
+  auto written = flush();
+  if (!written && waiting.size() > kMostLooseWaiting) waiting.erase(waiting.begin(), waiting.end() - kMostLooseWaiting);
+  return written;
+}
+
+Result<void> SessionStore::flush() {
+  if (impl_->loose.empty()) return {};
+  return impl_->store([] { return Result<void>(); });
+}
 
 Result<void> SessionStore::addEvent(const std::string& kind, const std::string& what) {
   return withoutRows(impl_->file->run(QStringLiteral("INSERT INTO events(time_utc, kind, text) VALUES(?, ?, ?)"),
                                       {now(), text(kind), text(what)}));
 }
 
-std::vector<std::pair<std::string, std::string>> SessionStore::events() const {
+Result<std::vector<std::pair<std::string, std::string>>> SessionStore::events() const {
   return impl_->pairs(QStringLiteral("SELECT kind, text FROM events ORDER BY id"));
 }
 
@@ -312,51 +423,69 @@ Result<void> SessionStore::storeFit(const std::string& name, const std::string& 
                                       {now(), text(name), text(ftcal_text)}));
 }
 
-std::vector<std::pair<std::string, std::string>> SessionStore::fits() const {
+Result<std::vector<std::pair<std::string, std::string>>> SessionStore::fits() const {
   return impl_->pairs(QStringLiteral("SELECT name, ftcal FROM fits ORDER BY id DESC"));
 }
 
 Result<void> SessionStore::setState(const std::string& key, const std::string& value) {
+  if (isReadOnly()) return {};  // Where the window stood is no data.
   return withoutRows(impl_->file->run(QStringLiteral("INSERT INTO state(key, value) VALUES(?, ?)"
                                                      " ON CONFLICT(key) DO UPDATE SET value = excluded.value"),
                                       {text(key), text(value)}));
 }
 
-std::string SessionStore::state(const std::string& key) const {
-  auto query = impl_->file->run(QStringLiteral("SELECT value FROM state WHERE key = ?"), {text(key)});
-  return query && query->next() ? query->value(0).toString().toStdString() : std::string();
+Result<std::string> SessionStore::state(const std::string& key) const {
+  const auto found = impl_->value(QStringLiteral("SELECT value FROM state WHERE key = ?"), {text(key)});
+  if (!found) return tl::unexpected(found.error());
+  return *found ? (*found)->toString().toStdString() : std::string();
 }
 
-CalibrationTable SessionStore::nodeTable() const { return {metadata(), impl_->nodes({}, {})}; }
-
-SampleTable SessionStore::sampleTable() const { return {metadata(), impl_->sampleRows({}, {})}; }
-
-std::optional<Node> SessionStore::node(std::size_t place) const {
-  const std::vector<Node> found = impl_->nodes(QStringLiteral("WHERE live.place = ?"), {static_cast<qlonglong>(place)});
-  return found.empty() ? std::nullopt : std::optional(found.front());
+Result<CalibrationTable> SessionStore::nodeTable() const {
+  auto nodes = impl_->nodes();
+  if (!nodes) return tl::unexpected(nodes.error());
+  return CalibrationTable{metadata(), *std::move(nodes)};
 }
 
-std::vector<Sample> SessionStore::samples(std::size_t place) const {
+Result<SampleTable> SessionStore::sampleTable() const {
+  auto rows = impl_->sampleRows();
+  if (!rows) return tl::unexpected(rows.error());
+  if (auto loose = impl_->appendLoose(*rows); !loose) return tl::unexpected(loose.error());
+  return SampleTable{metadata(), *std::move(rows)};
+}
+
+Result<std::optional<Node>> SessionStore::node(std::size_t place) const {
+  auto found = impl_->nodes(place);
+  if (!found) return tl::unexpected(found.error());
+  return found->empty() ? std::optional<Node>() : std::optional(found->front());
+}
+
+Result<std::vector<Sample>> SessionStore::samples(std::size_t place) const {
+  auto rows = impl_->sampleRows(place);
+  if (!rows) return tl::unexpected(rows.error());
   std::vector<Sample> result;
-  for (SampleRow& row : impl_->sampleRows(QStringLiteral("WHERE live.place = ?"), {static_cast<qlonglong>(place)})) {
-    result.push_back(std::move(row.sample));
-  }
+  for (SampleRow& row : *rows) result.push_back(std::move(row.sample));
   return result;
 }
 
-std::optional<double> SessionStore::newestSample_s() const {
-  auto query = impl_->file->run(QStringLiteral("SELECT MAX(t_end_s) FROM takes"));
-  if (!query || !query->next() || query->isNull(0)) return std::nullopt;
-  return query->value(0).toDouble();
+Result<std::optional<double>> SessionStore::newestSample_s() const {
+  std::optional<double> newest_s;
+  for (const char* sql : {"SELECT MAX(t_end_s) FROM takes", "SELECT t_s FROM loose_samples ORDER BY id DESC LIMIT 1"}) {
+    const auto found = impl_->value(QLatin1String(sql));
+    if (!found) return tl::unexpected(found.error());
+    if (*found) newest_s = std::max(newest_s.value_or((*found)->toDouble()), (*found)->toDouble());
+  }
+  for (const LooseSample& reading : impl_->loose) {
+    newest_s = std::max(newest_s.value_or(reading.sample.time_s), reading.sample.time_s);
+  }
+  return newest_s;
 }
 
 Result<void> SessionStore::limitSize(std::int64_t bytes) {
-  auto page_size = impl_->file->run(QStringLiteral("PRAGMA page_size"));
+  const auto page_size = impl_->value(QStringLiteral("PRAGMA page_size"));
   if (!page_size) return tl::unexpected(page_size.error());
-  const qint64 page_bytes = page_size->next() ? page_size->value(0).toLongLong() : 4096;
-  page_size->finish();
+  const qint64 page_bytes = *page_size ? (*page_size)->toLongLong() : 4096;
   return withoutRows(
       impl_->file->run(QStringLiteral("PRAGMA max_page_count=%1").arg(std::max<qint64>(1, bytes / page_bytes))));
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -9,38 +9,51 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/session/plan.h"
+#include "acquisition/plan/place_state.h"
+#include "acquisition/plan/plan.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/core/statistics.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
-/// What is known of one planned place at this moment.
-enum class PlaceState { kPlanned, kDone, kSkipped, kSuspicious };
+/// A reading of no stored take: between the places, or of a take that failed or was cancelled.
+struct LooseSample {
+  Sample sample;
+  std::optional<int> cancelled_node;  ///< Where it was to be taken; none between the places.
+};
+
+/// Its row of a sample table: node -1, and `cancelled:<node>` as status when it is of a take.
+SampleRow rowOf(LooseSample reading);
 
 /// One `*.fieldtrue` file: plan, raw samples, nodes, events and fits in SQLite. WAL with synchronous=FULL while open;
-/// one file again when closed. Use from one thread. Every write is on disk when the call returns.
+/// one file again when closed. Use from one thread. Every write but that of loose readings is on disk when the call
+/// returns. A reading that fails midway is an error, never a part of the answer.
 class SessionStore {
  public:
-  /// Creates a new session file. @error kIo (exists already, no such folder, disk full)
-  static Result<SessionStore> create(const QString& path, const Plan& plan, const TableMetadata& metadata);
-  /// Opens an existing one. @error kIo; kBadInput when it is not a session; kNewerVersion
+  /// Creates a new session file. @param created when the session begins, UTC
+  /// @error kIo (exists already, no such folder, disk full)
+  static Result<SessionStore> create(const QString& path, const Plan& plan, const TableMetadata& metadata,
+                                     const QDateTime& created = QDateTime::currentDateTimeUtc());
+  /// Opens an existing one; where it cannot be written to, a private copy of it.
+  /// @error kIo; kBadInput when it is not a session; kNewerVersion
   static Result<SessionStore> open(const QString& path);
   SessionStore(SessionStore&&) noexcept;
   SessionStore& operator=(SessionStore&&) noexcept;
   ~SessionStore();  ///< Checkpoints and closes.
 
   const QString& path() const;
+  bool isReadOnly() const;  ///< Open as a private copy: what would be stored is refused.
+  /// What its user should know of how it was opened, one sentence each.
+  const std::vector<std::string>& remarks() const;
   const Plan& plan() const;
   const std::vector<PlannedPlace>& places() const;
   const TableMetadata& metadata() const;
   Result<void> setMetadata(const TableMetadata& metadata);
 
   /// State of every planned place, same order as places(). A place without a live take is planned or skipped.
-  std::vector<PlaceState> states() const;
-  /// Index of the first planned place that is neither done nor skipped, none when all are.
-  std::optional<std::size_t> nextPlace() const;
+  Result<std::vector<PlaceState>> states() const;
+  Result<PlaceState> state(std::size_t place) const;
 
   /// Stores a finished take with its raw samples in one transaction; an earlier take of the place is kept but
   /// superseded.
@@ -53,33 +66,38 @@ class SessionStore {
   Result<std::optional<std::size_t>> undo();
   /// Brings back what the last undo took back, until something new is stored.
   Result<std::optional<std::size_t>> redo();
-  bool canUndo() const;
-  bool canRedo() const;
+  Result<bool> canUndo() const;
+  Result<bool> canRedo() const;
+  /// Keeps readings of no take. They are written with the next take, skip or undo, when 512 of them or 5 s have come
+  /// together, and at closing: not one by one.
+  Result<void> keepLoose(const std::vector<LooseSample>& readings);
+  Result<void> flush();  ///< Writes the loose readings that wait.
   /// Keeps something that happened (device lost, take failed) with the time of the wall clock.
   Result<void> addEvent(const std::string& kind, const std::string& text);
   /// Keeps a fitted calibration's text with the session.
   Result<void> storeFit(const std::string& name, const std::string& ftcal_text);
-  std::vector<std::pair<std::string, std::string>> fits() const;  ///< name, ftcal text; newest first.
+  Result<std::vector<std::pair<std::string, std::string>>> fits() const;  ///< name, ftcal text; newest first.
 
   /// Every event, oldest first: kind, text.
-  std::vector<std::pair<std::string, std::string>> events() const;
+  Result<std::vector<std::pair<std::string, std::string>>> events() const;
 
   /// A small state of the program ("page": "compare") kept in the file, so that a session opens where it was.
   Result<void> setState(const std::string& key, const std::string& value);
-  std::string state(const std::string& key) const;
+  Result<std::string> state(const std::string& key) const;
 
   /// Live takes as a node table, with skipped places as rows of role skipped only when they have a take.
-  CalibrationTable nodeTable() const;
-  /// Raw samples of the live takes.
-  SampleTable sampleTable() const;
+  Result<CalibrationTable> nodeTable() const;
+  /// Raw samples of the live takes, then the loose ones with node -1.
+  Result<SampleTable> sampleTable() const;
   /// The live take of a place, none when there is none.
-  std::optional<Node> node(std::size_t place) const;
+  Result<std::optional<Node>> node(std::size_t place) const;
   /// Raw samples of the live take of a place.
-  std::vector<Sample> samples(std::size_t place) const;
+  Result<std::vector<Sample>> samples(std::size_t place) const;
 
   QDateTime created() const;  ///< When the session began, UTC.
-  /// Session time of the newest stored sample, of superseded takes too; none when there is none [s].
-  std::optional<double> newestSample_s() const;
+  /// Session time of the newest stored sample, loose ones and those of superseded takes too; none when there is none
+  /// [s].
+  Result<std::optional<double>> newestSample_s() const;
 
   /// The file may not grow beyond this; what does not fit fails as on a full disk. For quotas and tests.
   Result<void> limitSize(std::int64_t bytes);
@@ -90,4 +108,4 @@ class SessionStore {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 qint64 BufferedTransport::readData(char* to, qint64 size) {
   const qint64 n = std::min<qint64>(size, received_.size());
@@ -30,4 +30,4 @@ void BufferedTransport::openDevice() {
   QIODevice::open(QIODevice::ReadWrite | QIODevice::Unbuffered);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

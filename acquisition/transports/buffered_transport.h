@@ -4,7 +4,7 @@
 
 #include "acquisition/transports/transport.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// The part every transport shares: a buffer of what came, and losing the line once.
 class BufferedTransport : public Transport {
@@ -20,6 +20,7 @@ class BufferedTransport : public Transport {
   /// Tells once that the line is gone; what came before can still be read.
   void lost(const QString& reason);
   void openDevice();
+  void forgetLoss() { lost_ = false; }  ///< Before a line is opened anew.
   bool isLost() const { return lost_; }
 
  private:
@@ -27,4 +28,4 @@ class BufferedTransport : public Transport {
   bool lost_ = false;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

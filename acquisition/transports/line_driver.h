@@ -5,7 +5,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// How a local line (a device file) is opened, set and moved; a LocalTransport watches its file descriptor.
 class LineDriver {
@@ -29,17 +29,4 @@ std::unique_ptr<LineDriver> makeSerialPortDriver();
 /// Through termios: ptys, and ttys that libserialport refuses.
 std::unique_ptr<LineDriver> makeTermiosDriver();
 
-/// Whether the path leads to a pseudo-terminal.
-bool isPseudoTerminal(const std::string& path);
-/// Whether libserialport knows the name as a serial port.
-bool isSerialPort(const std::string& path);
-/// The name libserialport knows: symbolic links (/dev/serial/by-id/...) followed.
-std::string resolvedPath(const std::string& path);
-
-/// One sentence for the system's reason why a line could not be opened.
-/// @param system_error an errno value
-Error lineOpenError(const std::string& path, int system_error);
-/// Takes the line for this process. @error kDevice naming who has it, where that can be known
-Result<void> lockLine(const std::string& path, int descriptor);
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

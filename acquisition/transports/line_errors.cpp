@@ -1,3 +1,5 @@
+#include "acquisition/transports/line_errors.h"
+
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
@@ -14,7 +16,7 @@
 
 #include "acquisition/transports/line_driver.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 std::string processName(long pid) {
@@ -98,4 +100,4 @@ Result<void> lockLine(const std::string& path, int descriptor) {
   return {};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

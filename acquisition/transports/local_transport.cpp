@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 bool hungUp(int descriptor) {
@@ -96,4 +96,4 @@ void LocalTransport::sendBreak(int milliseconds) {
 
 bool LocalTransport::setBaud(int baud) { return driver_ && driver_->setBaud(baud); }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -8,7 +8,7 @@
 #include "acquisition/transports/buffered_transport.h"
 #include "acquisition/transports/line_driver.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// A device file of this machine. Tries its drivers in order: the first that supports the line carries it.
 class LocalTransport : public BufferedTransport {
@@ -41,4 +41,4 @@ class LocalTransport : public BufferedTransport {
   QByteArray pending_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

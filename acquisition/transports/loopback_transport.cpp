@@ -1,6 +1,6 @@
 #include "acquisition/transports/loopback_transport.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 std::pair<std::unique_ptr<LoopbackTransport>, std::unique_ptr<LoopbackTransport>> LoopbackTransport::pair() {
   std::unique_ptr<LoopbackTransport> a(new LoopbackTransport);
@@ -46,4 +46,4 @@ void LoopbackTransport::deliverLater(const QByteArray& bytes) {
       Qt::QueuedConnection);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -6,7 +6,7 @@
 
 #include "acquisition/transports/buffered_transport.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// One end of a line inside this process: what is written to one end is read at the other once control is back
 /// in the event loop.
@@ -31,4 +31,4 @@ class LoopbackTransport : public BufferedTransport {
   QPointer<LoopbackTransport> other_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -6,9 +6,10 @@
 #include <utility>
 
 #include "acquisition/transports/line_driver.h"
+#include "acquisition/transports/line_errors.h"
 #include "acquisition/transports/serial_ports.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 class SerialPortDriver : public LineDriver {
@@ -109,4 +110,4 @@ std::vector<SerialPortInfo> listSerialPorts() {
   return found;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 
 /// A serial line libserialport finds on this machine.
 struct SerialPortInfo {
@@ -12,4 +12,4 @@ struct SerialPortInfo {
 };
 std::vector<SerialPortInfo> listSerialPorts();
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

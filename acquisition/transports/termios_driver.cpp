@@ -8,8 +8,9 @@
 #include <utility>
 
 #include "acquisition/transports/line_driver.h"
+#include "acquisition/transports/line_errors.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr std::pair<int, speed_t> kSpeeds[] = {
@@ -103,4 +104,4 @@ class TermiosDriver : public LineDriver {
 
 std::unique_ptr<LineDriver> makeTermiosDriver() { return std::make_unique<TermiosDriver>(); }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

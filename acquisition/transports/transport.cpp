@@ -3,10 +3,11 @@
 #include <charconv>
 #include <optional>
 
+#include "acquisition/transports/line_errors.h"
 #include "acquisition/transports/local_transport.h"
 #include "acquisition/transports/tcp_transport.h"
 
-namespace fieldtrue {
+namespace fieldtrue::acquisition {
 namespace {
 
 constexpr int kDefaultBaud = 115200;
@@ -60,4 +61,4 @@ Result<std::unique_ptr<Transport>> makeTransport(const std::string& address) {
   return makeLocal(path, baud);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition

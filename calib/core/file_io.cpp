@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <streambuf>
+#include <string_view>
 #include <system_error>
 
 namespace fieldtrue {
@@ -131,11 +132,24 @@ Result<void> writeThrough(const std::filesystem::path& path, const std::function
   return {};
 }
 
+/// Whether a session stands there: a day's work, held in a database that a program may have open. By its name first,
+/// for closing a descriptor of a session that this program has open would drop the locks on it.
+bool isSession(const std::filesystem::path& target) {
+  const std::string extension = target.extension().string();
+  if (extension == ".fieldtrue" || extension == ".fieldtrue-wal" || extension == ".fieldtrue-shm") return true;
+  constexpr std::string_view kDatabase("SQLite format 3\0", 16);
+  const Descriptor descriptor(target, O_RDONLY);
+  std::array<char, kDatabase.size()> head{};
+  return descriptor.valid() && ::read(descriptor.value(), head.data(), head.size()) == ssize_t{kDatabase.size()} &&
+         std::string_view(head.data(), head.size()) == kDatabase;
+}
+
 Result<void> writeAndRename(const std::filesystem::path& path, const std::filesystem::path& target,
                             const std::function<void(std::ostream&)>& write) {
   struct stat old_file {};
   const bool has_old = ::stat(target.c_str(), &old_file) == 0;
   if (has_old && ::access(target.c_str(), W_OK) != 0) return cannotWrite(path, reasonText(errno));
+  if (has_old && isSession(target)) return cannotWrite(path, "it is a session; choose another name");
   TemporaryFile temporary(target);
   Descriptor descriptor(temporary.path(), O_WRONLY | O_CREAT | O_EXCL);
   if (!descriptor.valid()) return cannotWrite(path, reasonText(errno));

@@ -1,3 +1,5 @@
+#include "calib/core/quantum.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>

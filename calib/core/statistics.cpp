@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/core/quantum.h"
+
 namespace fieldtrue {
 
 namespace {

@@ -50,16 +50,6 @@ Result<NodeStatistics> averageSamples(std::span<const Sample> samples, const Ave
 /// @source Markley, Cheng, Crassidis, Oshman 2007, Averaging Quaternions, eq. 12-13
 Eigen::Quaterniond meanRotation(std::span<const Eigen::Quaterniond> rotations, std::span<const double> weights = {});
 
-/// Lattice spacing of which all differences of the values are multiples (within rounding of the text they came from),
-/// if there is one.
-/// @param values_m at least a few dozen readings [m], of one or several axes
-/// @return spacing [m] of 1 um or more, or none when the values are not on a lattice coarser than their rounding
-std::optional<double> findQuantum_m(std::span<const double> values_m);
-
-/// The coarsest decimal step, in metres or inches, of which all values are multiples: what they were printed with.
-/// @return step [m] of 1e-9 or more, 0 when the values have no such step
-double printedStep_m(std::span<const double> values_m);
-
 /// Whether a number is one of the marks that trackers' recordings put for a missing reading, such as -3.7e28.
 bool isMissingMark(double value);
 

@@ -1,14 +1,15 @@
-#include "calib/correctors/automatic.h"
-
 #include <algorithm>
 #include <array>
 #include <cstdio>
 
 #include "calib/correctors/automatic_choice.h"
-#include "calib/correctors/json_values.h"
-#include "calib/correctors/rbf_system.h"
+#include "calib/correctors/base/json_values.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/method_label.h"
+#include "calib/correctors/radial/rbf_system.h"
 
-namespace fieldtrue {
+namespace fieldtrue::correctors {
 namespace {
 
 const std::string kName = "Automatic choice";
@@ -77,8 +78,9 @@ std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& c
       std::count_if(scores.begin(), scores.end(), [](const InnerScore& score) { return !score.skipped; });
   // Every other model says so itself.
   const std::string plane = chosen == 0 ? planeNote(data, "nothing is claimed off it") : "";
-  std::string note = plane + (plane.empty() ? "" : " ") + "Chosen: " + candidates[chosen].text + ", held-out RMS " +
-                     inMm(scores[chosen].rms_m());
+  std::string note = plane + (plane.empty() ? "" : " ") +
+                     "Chosen: " + positionLabel(candidates[chosen].method->id, candidates[chosen].settings) +
+                     ", held-out RMS " + inMm(scores[chosen].rms_m());
   note += chosen == 0 ? ", since nothing else lowers it clearly"
                       : " against " + inMm(scores.front().rms_m(&scores[chosen])) + " without correction";
   return note + "; " + std::to_string(n_scored) + " candidates scored over the same " + std::to_string(n_folds) +
@@ -142,6 +144,7 @@ Result<std::unique_ptr<PositionModel>> loadAutomatic(const nlohmann::json& param
 
 }  // namespace
 
+/// Chooses method and settings by cross-validation on the data it is fitted to.
 PositionMethod automaticPosition() {
   PositionMethod method;
   method.id = "auto";
@@ -160,7 +163,8 @@ PositionMethod automaticPosition() {
   method.fit = fitAutomatic;
   method.load = loadAutomatic;
   method.most_folds = 5;
+  method.origin = MethodOrigin::kLater;
   return method;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::correctors

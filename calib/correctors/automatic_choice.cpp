@@ -7,7 +7,10 @@
 #include <numeric>
 #include <random>
 
-namespace fieldtrue {
+#include "calib/correctors/base/fit_rows.h"
+#include "calib/correctors/base/method.h"
+
+namespace fieldtrue::correctors {
 namespace {
 
 constexpr std::size_t kFolds = 5;
@@ -15,44 +18,6 @@ constexpr double kDroppedFrom = 2.0;  ///< Standard errors.
 constexpr std::size_t kPlacesForFolds = 20;
 constexpr double kLeastGain = 0.05;
 constexpr double kOneSided95 = 1.645;
-
-enum class Origin { kBaseline, kSurvey, kOurs };
-
-struct ListedCandidate {
-  const char* text;
-  Origin origin;
-  int complexity;
-};
-
-constexpr int kPhysical = 9;
-constexpr int kSmoothing = 10;
-constexpr int kInterpolating = 20;
-
-constexpr std::array<ListedCandidate, 23> kListed = {{
-    {"none", Origin::kBaseline, 0},
-    {"rigid", Origin::kBaseline, 1},
-    {"affine", Origin::kBaseline, 2},
-    {"polynomial:degree=2", Origin::kSurvey, 3},
-    {"polynomial:degree=3", Origin::kSurvey, 4},
-    {"polynomial:degree=4", Origin::kSurvey, 5},
-    {"polynomial:degree=5", Origin::kSurvey, 6},
-    {"polynomial:degree=6", Origin::kSurvey, 7},
-    {"gaussian_process", Origin::kOurs, kSmoothing},
-    {"bspline", Origin::kOurs, kSmoothing},
-    {"rbf", Origin::kOurs, kSmoothing},
-    {"rbf:kernel=thin_plate", Origin::kOurs, kSmoothing},
-    {"harmonic_field", Origin::kOurs, kPhysical},
-    {"hmq:r2_cm2=10", Origin::kSurvey, kInterpolating},
-    {"hmq:r2_cm2=100", Origin::kSurvey, kInterpolating},
-    {"hmq:r2_cm2=1000", Origin::kSurvey, kInterpolating},
-    {"trilinear", Origin::kSurvey, kInterpolating},
-    {"hexahedral_shape", Origin::kSurvey, kInterpolating},
-    {"tetrahedral", Origin::kSurvey, kInterpolating},
-    {"local_linear", Origin::kSurvey, kInterpolating},
-    {"local_bump", Origin::kSurvey, kInterpolating},
-    {"local_kindratenko", Origin::kSurvey, kInterpolating},
-    {"local_briggs", Origin::kSurvey, kInterpolating},
-}};
 
 /// Mean of a - b over the places that both were scored on, and its standard error.
 struct PairedDifference {
@@ -123,25 +88,27 @@ InnerScore skippedScore(std::string why) {
   return score;
 }
 
-bool isIn(Origin origin, CandidateSet set) {
-  if (origin == Origin::kBaseline || set == CandidateSet::kAll) return true;
-  return (origin == Origin::kSurvey) == (set == CandidateSet::kSurvey);
+bool isIn(MethodOrigin origin, CandidateSet set) {
+  if (origin == MethodOrigin::kBaseline || set == CandidateSet::kAll) return true;
+  return (origin == MethodOrigin::kSurvey) == (set == CandidateSet::kSurvey);
 }
 
 }  // namespace
 
 std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set) {
   std::vector<AutomaticCandidate> candidates;
-  for (const ListedCandidate& listed : kListed) {
-    if (!isIn(listed.origin, set)) continue;
-    const auto text = parseMethodText(listed.text);
-    FT_CHECK(text.has_value());
-    const auto method = findPositionMethod(text->id);
-    if (!method) continue;
-    auto settings = resolveSettings(text->id, (*method)->settings, text->given);
-    FT_CHECK(settings.has_value());
-    candidates.push_back({*method, *std::move(settings), listed.text, listed.complexity});
+  for (const PositionMethod& method : positionMethods()) {
+    if (!isIn(method.origin, set)) continue;
+    for (const AutomaticTry& tried : method.tries) {
+      const std::string text = method.id + (tried.settings.empty() ? "" : ":" + tried.settings);
+      auto settings = resolveSettings(method.id, method.settings, parseMethodText(text).value().given);
+      FT_CHECK(settings.has_value());
+      candidates.push_back({&method, *std::move(settings), text, tried.rank});
+    }
   }
+  std::stable_sort(candidates.begin(), candidates.end(), [](const AutomaticCandidate& a, const AutomaticCandidate& b) {
+    return a.complexity < b.complexity;
+  });
   return candidates;
 }
 
@@ -168,22 +135,6 @@ std::vector<std::vector<std::size_t>> innerFolds(const FitData& data) {
   std::vector<std::vector<std::size_t>> folds(n_folds);
   for (std::size_t row = 0; row < data.size(); ++row) folds[fold_of_place[slots[row]]].push_back(row);
   return folds;
-}
-
-FitData rowsOfFitData(const FitData& data, const std::vector<std::size_t>& rows) {
-  FitData part;
-  part.jig_sd_m = data.jig_sd_m;
-  part.dimension = data.dimension;
-  for (const std::size_t row : rows) {
-    part.p_tracked_m.push_back(data.p_tracked_m[row]);
-    part.p_true_m.push_back(data.p_true_m[row]);
-    part.node.push_back(data.node[row]);
-    if (!data.q_tracked.empty()) part.q_tracked.push_back(data.q_tracked[row]);
-    if (!data.q_true.empty()) part.q_true.push_back(data.q_true[row]);
-    if (!data.index.empty()) part.index.push_back(data.index[row]);
-    if (!data.noise_m2.empty()) part.noise_m2.push_back(data.noise_m2[row]);
-  }
-  return part;
 }
 
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
@@ -265,4 +216,4 @@ std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, c
   return is_worth_it ? chosen : 0;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::correctors

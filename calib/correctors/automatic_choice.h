@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "calib/core/run_control.h"
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 
-namespace fieldtrue {
+namespace fieldtrue::correctors {
 
 /// Which methods an automatic choice looks at.
 enum class CandidateSet {
@@ -21,12 +22,10 @@ struct AutomaticCandidate {
   const PositionMethod* method = nullptr;
   Settings settings;
   std::string text;    ///< As a person writes it, settings that differ from the defaults only.
-  int complexity = 0;  ///< Rank: none, rigid, affine, polynomials by degree, fields that obey the physics, smoothing
-                       ///< fits that follow any field, interpolations.
+  int complexity = 0;  ///< The rank that its method states.
 };
 
-/// The candidates of a set that the registry has; the baselines none, rigid and affine are in every set. A method that
-/// chooses by itself is never one.
+/// What the rows of a set want tried, simplest first; the baselines none, rigid and affine are in every set.
 std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set);
 
 /// What inner cross-validation found about one candidate.
@@ -63,7 +62,4 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
 /// @source the one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984, section 3.4.3
 std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores);
 
-/// The rows of fit data that are wanted. @param rows ascending
-FitData rowsOfFitData(const FitData& data, const std::vector<std::size_t>& rows);
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::correctors

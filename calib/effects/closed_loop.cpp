@@ -7,9 +7,10 @@
 #include "calib/core/file_io.h"
 #include "calib/effects/parameters.h"
 #include "calib/effects/room_search.h"
+#include "calib/effects/rows.h"
 #include "calib/field/metal_response.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -46,7 +47,7 @@ double fromWire_m(const Eigen::Vector3d& from_center_m, const Eigen::Vector3d& a
   return std::hypot(rho_m - radius_m, z_m);
 }
 
-class ClosedLoop final : public CouplingDistortion {
+class ClosedLoop final : public field::CouplingDistortion {
  public:
   ClosedLoop(const Eigen::Vector3d& center_m, const Eigen::Vector3d& axis, double radius_m, double wire_radius_m,
              double strength)
@@ -75,10 +76,11 @@ class ClosedLoop final : public CouplingDistortion {
 /// R/L of a ring of round wire: R = 2 pi radius/(sigma pi a^2), L = mu_0 radius (ln(8 radius/a) - 2).
 double decayRate_per_s(double radius_m, double wire_radius_m, double conductivity_s_per_m) {
   const double resistance_ohm = 2.0 * radius_m / (conductivity_s_per_m * wire_radius_m * wire_radius_m);
-  return resistance_ohm / (kMu0_h_per_m * radius_m * (std::log(8.0 * radius_m / wire_radius_m) - 2.0));
+  return resistance_ohm / (field::kMu0_h_per_m * radius_m * (std::log(8.0 * radius_m / wire_radius_m) - 2.0));
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& excitation) {
   const Eigen::Vector3d center_m = vectorOf(parameters, "center_m");
   const Eigen::Vector3d normal = vectorOf(parameters, "normal");
   const double radius_m = scalarOf(parameters, "radius_m");
@@ -100,7 +102,7 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
   double strength = scalarOf(parameters, "strength");
   const nlohmann::json& conductivity = parameters.at("conductivity_s_per_m");
   if (!conductivity.is_null()) {
-    strength *= inductiveShare(decayRate_per_s(radius_m, wire_radius_m, conductivity.get<double>()), excitation);
+    strength *= field::inductiveShare(decayRate_per_s(radius_m, wire_radius_m, conductivity.get<double>()), excitation);
   }
   return std::make_unique<ClosedLoop>(center_m, axis, radius_m, wire_radius_m, strength);
 }
@@ -116,6 +118,7 @@ class ClosedLoopFit final : public EffectFit {
 
   std::string name() const override { return "loop"; }
 
+  bool searchesPlace() const override { return true; }
   std::vector<FitParameter> searched() const override {
     std::vector<FitParameter> parameters = search_.centerParameters();
     for (FitParameter& angle : DirectionChart::parameters()) parameters.push_back(std::move(angle));
@@ -157,8 +160,8 @@ class ClosedLoopFit final : public EffectFit {
            std::all_of(search_.places_m().begin(), search_.places_m().end(), isOffWire);
   }
 
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
-               std::span<EffectResponse> responses) const override {
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<field::EffectResponse> responses) const override {
     const ClosedLoop loop(searched.head<3>(), chart_.direction(searched[3], searched[4]), searched[5], kWireRadius_m,
                           1.0);
     for (std::size_t i = 0; i < at.size(); ++i) responses[i] = loop.at(at[i]);
@@ -221,50 +224,70 @@ Eigen::Vector3d ringField_per_m(const Eigen::Vector3d& from_center_m, const Eige
   return along * axis + outward / rho_m * across_m;
 }
 
+/// A closed conducting ring (a cable with both ends joined, a window frame, a coil of copper) in which the transmitter
+/// induces a current.
+///
+/// Convention: in a field H the transmitter's coil k has the moment 4 pi C e_k. With h(p) the field at p of unit
+/// current in the ring, the flux of a moment m at t through it is mu_0 h(t) . m (reciprocity), and where inductance
+/// limits the current, as it does in copper at an AC tracker's carrier, the ring keeps the flux out: L I = -flux, so
+///   dG = -strength 4 pi C h(p) h(t)^T / (R (ln(8 R/a) - 2)),
+/// R and a the radii of ring and wire. Below the carrier at which the ring's resistance equals its reactance only a
+/// part of that current flows, which `strength` says; what is left is in quadrature and not seen by the tracker. With
+/// the wire's conductivity given, that part is (w L)^2/(R^2 + (w L)^2) at a carrier and exp(-t R/L) at a sampling
+/// delay, R at direct current.
+/// @source Jackson 1999, Classical Electrodynamics, section 5.5 (field of a current ring); L: Maxwell 1873, art. 704
 Effect closedLoopEffect() {
   Effect effect;
   effect.id = "closed_loop";
   effect.label = "Closed conducting loop";
   effect.source = "Jackson 1999, Classical Electrodynamics, section 5.5; inductance: Maxwell 1873, art. 704";
   effect.parameters = {
-      {"center_m",
-       "m",
-       "vector3",
-       {1.0, 0.0, -1.0},
-       -100.0,
-       100.0,
-       "Middle of the loop, tracker frame.",
-       {},
-       -10.0,
-       10.0},
-      {"normal", "", "vector3", {0.0, 0.0, 1.0}, 0.0, 0.0, "Axis of the loop, tracker frame; any length.", {}},
-      {"radius_m", "m", "scalar", 0.3, 0.01, 10.0, "Of the loop.", {}, 0.05, 2.0},
-      {"wire_radius_m", "m", "scalar", 0.005, 1e-4, 0.5, "Of the wire or tube it is made of.", {}, 5e-4, 0.02},
-      {"conductivity_s_per_m",
-       "S/m",
-       "scalar",
-       nullptr,
-       1.0,
-       1e8,
-       "Of the wire: copper 5.8e7, aluminium 3.5e7, steel 6e6. When given, its resistance and the tracker's carrier or "
-       "sampling delay decide how much of the current is left; null is a loop without resistance.",
-       {},
-       5e6,
-       6e7},
-      {"strength",
-       "",
-       "scalar",
-       1.0,
-       -100.0,
-       100.0,
-       "Share of the current a loop without resistance would carry; below 1 for thin wire, bad joints or a low "
-       "carrier. No real loop has more than 1 or less than 0.",
-       {},
-       0.0,
-       1.0}};
+      centerParameter("Middle of the loop, tracker frame."),
+      {.name = "normal",
+       .shape = "vector3",
+       .default_value = {0.0, 0.0, 1.0},
+       .help = "Axis of the loop, tracker frame; any length."},
+      {.name = "radius_m",
+       .unit = "m",
+       .shape = "scalar",
+       .default_value = 0.3,
+       .min = 0.01,
+       .max = 10.0,
+       .help = "Of the loop.",
+       .plausible_min = 0.05,
+       .plausible_max = 2.0},
+      {.name = "wire_radius_m",
+       .unit = "m",
+       .shape = "scalar",
+       .default_value = 0.005,
+       .min = 1e-4,
+       .max = 0.5,
+       .help = "Of the wire or tube it is made of.",
+       .plausible_min = 5e-4,
+       .plausible_max = 0.02},
+      {.name = "conductivity_s_per_m",
+       .unit = "S/m",
+       .shape = "scalar",
+       .min = 1.0,
+       .max = 1e8,
+       .help = "Of the wire: copper 5.8e7, aluminium 3.5e7, steel 6e6. When given, its resistance and the tracker's "
+               "carrier or "
+               "sampling delay decide how much of the current is left; null is a loop without resistance.",
+       .plausible_min = 5e6,
+       .plausible_max = 6e7},
+      {.name = "strength",
+       .shape = "scalar",
+       .default_value = 1.0,
+       .min = -100.0,
+       .max = 100.0,
+       .help = "Share of the current a loop without resistance would carry; below 1 for thin wire, bad joints or a low "
+               "carrier. No real loop has more than 1 or less than 0.",
+       .plausible_min = 0.0,
+       .plausible_max = 1.0}};
   effect.make = make;
   effect.fits = fits;
+  effect.body = loopOf;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

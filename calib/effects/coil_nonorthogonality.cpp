@@ -1,20 +1,19 @@
-#include "calib/effects/coil_nonorthogonality.h"
-
 #include <array>
 #include <utility>
 
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kPlausible_rad = 0.05;
 constexpr std::array<std::pair<int, int>, 3> kPairs{{{0, 1}, {0, 2}, {1, 2}}};
 
-void transmitterResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
-  const Eigen::Matrix3d G = dipoleField(setting.tracker_from_sensor.position_m, 1.0);
+void transmitterResponses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
+  const Eigen::Matrix3d G = field::dipoleField(setting.tracker_from_sensor.position_m, 1.0);
   for (std::size_t i = 0; i < kPairs.size(); ++i) {
     const auto [a, b] = kPairs[i];
     responses[i].field_per_m3.col(a) = G.col(b);
@@ -22,8 +21,8 @@ void transmitterResponses(const SensorSetting& setting, std::span<EffectResponse
   }
 }
 
-void receiverResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
-  const Eigen::Matrix3d G = dipoleField(setting.tracker_from_sensor.position_m, 1.0);
+void receiverResponses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
+  const Eigen::Matrix3d G = field::dipoleField(setting.tracker_from_sensor.position_m, 1.0);
   const Eigen::Matrix3d R = setting.tracker_from_sensor.orientation.toRotationMatrix();
   for (std::size_t i = 0; i < kPairs.size(); ++i) {
     const auto [a, b] = kPairs[i];
@@ -31,12 +30,13 @@ void receiverResponses(const SensorSetting& setting, std::span<EffectResponse> r
   }
 }
 
-void allResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+void allResponses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   transmitterResponses(setting, responses.first(3));
   receiverResponses(setting, responses.subspan(3));
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   Eigen::VectorXd angles_rad(6);
   angles_rad << vectorOf(parameters, "transmitter_rad"), vectorOf(parameters, "receiver_rad");
   return linearEffect(allResponses, std::move(angles_rad));
@@ -65,36 +65,42 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 
 }  // namespace
 
+/// Coils that do not stand at right angles to each other though the tracker believes so.
+///
+/// Convention: the couplings become S' = (1 + E_rx) S (1 + E_tx) with E symmetric and zero on the diagonal: E_xy is the
+/// angle by which coil x leans toward y and coil y toward x, so the angle between them is 90 deg - 2 E_xy. (The
+/// antisymmetric part is a rotation of the whole set of coils.) To first order
+///   dG = G E_tx + R E_rx R^T G,   R = tracker_from_sensor.
+/// @source coupling matrix: Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; its change to first order by hand
 Effect coilNonorthogonalityEffect() {
   Effect effect;
   effect.id = "coil_nonorthogonality";
   effect.label = "Coils not at right angles";
   effect.source = "Coupling matrix: Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; first order";
-  effect.parameters = {{"transmitter_rad",
-                        "rad",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "How far the transmitter's coils lean toward each other, pairs xy, xz, yz; the angle between "
-                        "two coils is 90 deg "
-                        "less twice this.",
-                        {},
-                        -kPlausible_rad,
-                        kPlausible_rad},
-                       {"receiver_rad",
-                        "rad",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "Likewise the receiver's coils.",
-                        {},
-                        -kPlausible_rad,
-                        kPlausible_rad}};
+  effect.parameters = {
+      {.name = "transmitter_rad",
+       .unit = "rad",
+       .shape = "vector3",
+       .default_value = {0.0, 0.0, 0.0},
+       .min = -100.0,
+       .max = 100.0,
+       .help = "How far the transmitter's coils lean toward each other, pairs xy, xz, yz; the angle between "
+               "two coils is 90 deg "
+               "less twice this.",
+       .plausible_min = -kPlausible_rad,
+       .plausible_max = kPlausible_rad},
+      {.name = "receiver_rad",
+       .unit = "rad",
+       .shape = "vector3",
+       .default_value = {0.0, 0.0, 0.0},
+       .min = -100.0,
+       .max = 100.0,
+       .help = "Likewise the receiver's coils.",
+       .plausible_min = -kPlausible_rad,
+       .plausible_max = kPlausible_rad}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

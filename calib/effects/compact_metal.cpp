@@ -3,23 +3,24 @@
 #include <numbers>
 
 #include "calib/effects/metal_body.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kFourPi = 4.0 * std::numbers::pi;
 
-class CompactMetal final : public CouplingDistortion {
+class CompactMetal final : public field::CouplingDistortion {
  public:
   explicit CompactMetal(const MetalBody& body)
       : center_m_(body.center_m),
         radius_m_(body.radius_m),
-        moment_m3_(body.polarizability_m3 * dipoleField(body.center_m, 1.0 / kFourPi)) {}
+        moment_m3_(body.polarizability_m3 * field::dipoleField(body.center_m, 1.0 / kFourPi)) {}
 
   Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
                               double /*time_s*/) const override {
-    return dipoleField(p_sensor_m - center_m_, dipole_constant_m3) * moment_m3_;
+    return field::dipoleField(p_sensor_m - center_m_, dipole_constant_m3) * moment_m3_;
   }
 
   bool admits(const Eigen::Vector3d& p_sensor_m) const override { return (p_sensor_m - center_m_).norm() > radius_m_; }
@@ -30,7 +31,8 @@ class CompactMetal final : public CouplingDistortion {
   Eigen::Matrix3d moment_m3_;  ///< A G(b) / (4 pi) for C = 1.
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& excitation) {
   const Result<MetalBody> body = bodyOf(parameters, excitation, "compact_metal");
   if (!body) return tl::unexpected<Error>(body.error());
   return std::make_unique<CompactMetal>(*body);
@@ -41,6 +43,7 @@ class CompactMetalFit final : public EffectFit {
   CompactMetalFit(const FitDesign& design, BodyShape shape) : search_(design), shape_(shape) {}
 
   std::string name() const override { return shape_ == BodyShape::kSphere ? "sphere" : "tensor"; }
+  bool searchesPlace() const override { return true; }
   std::vector<FitParameter> searched() const override { return search_.centerParameters(); }
   std::vector<FitParameter> linear() const override { return polarizabilityParameters(shape_); }
 
@@ -53,10 +56,10 @@ class CompactMetalFit final : public EffectFit {
 
   bool allows(const Eigen::VectorXd& searched) const override { return search_.allowsCenter(searched.head<3>()); }
 
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
-               std::span<EffectResponse> responses) const override {
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<field::EffectResponse> responses) const override {
     const Eigen::Vector3d center_m = searched.head<3>();
-    const Eigen::Matrix3d field_of_transmitter = dipoleField(center_m, 1.0 / kFourPi);
+    const Eigen::Matrix3d field_of_transmitter = field::dipoleField(center_m, 1.0 / kFourPi);
     const std::size_t count = shape_ == BodyShape::kSphere ? 1 : 6;
     for (std::size_t i = 0; i < at.size(); ++i) {
       respondAsBody(shape_, center_m, field_of_transmitter, at[i].tracker_from_sensor.position_m,
@@ -88,11 +91,20 @@ double spherePolarizability_m3(double radius_m, bool is_ferromagnetic, double re
   return kFourPi * a3 * (relative_permeability - 1.0) / (relative_permeability + 2.0);
 }
 
-std::unique_ptr<CouplingDistortion> makeCompactMetal(const Eigen::Vector3d& center_m,
-                                                     const Eigen::Matrix3d& polarizability_m3, double radius_m) {
+std::unique_ptr<field::CouplingDistortion> makeCompactMetal(const Eigen::Vector3d& center_m,
+                                                            const Eigen::Matrix3d& polarizability_m3, double radius_m) {
   return std::make_unique<CompactMetal>(MetalBody{center_m, polarizability_m3, radius_m});
 }
 
+/// A metal body small against its distances to transmitter and sensor: the field there induces one dipole.
+///
+/// Convention: in a field H the body has the magnetic moment m = A H, A in m^3. A dipole m makes the field
+/// (3uu^T - I) m / (4 pi r^3), so with G of constant 1/(4 pi) from the body at b to the sensor at p
+///   dG = G(p - b; 1/(4 pi)) A G(b; C).
+/// A is then -2 pi a^3 for a perfectly conducting sphere of radius a and 4 pi a^3 (mu_r - 1)/(mu_r + 2) for a permeable
+/// one (A = V chi with chi = -3/2 and 3 (mu_r - 1)/(mu_r + 2)). Bodies do not see each other's fields.
+/// @source Raab, Blood, Steiner, Jones 1979, section on field distortion; sphere: Wait 1951, Geophysics 16 666, limits
+/// of high and zero frequency
 Effect compactMetalEffect() {
   Effect effect;
   effect.id = "compact_metal";
@@ -101,7 +113,8 @@ Effect compactMetalEffect() {
   effect.parameters = bodyParameters();
   effect.make = make;
   effect.fits = fits;
+  effect.body = ballOf;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

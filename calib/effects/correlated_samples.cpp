@@ -1,37 +1,73 @@
-#include "calib/effects/correlated_samples.h"
-
 #include <algorithm>
 
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
-class CorrelatedSamples final : public PhysicalEffect {
+/// Correlation below which 60 readings are worth 45 or more.
+constexpr double kSmallestCorrelation = 0.143;
+constexpr double kCertainSds = 5.0;
+
+class CorrelatedSamples final : public field::PhysicalEffect {
  public:
   explicit CorrelatedSamples(double correlation) : correlation_(correlation) {}
-  void disturb(SignalModel& signal) const override { signal.correlation = std::max(signal.correlation, correlation_); }
+  void disturb(field::SignalModel& signal) const override {
+    signal.correlation = std::max(signal.correlation, correlation_);
+  }
 
  private:
   double correlation_;
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   return std::make_unique<CorrelatedSamples>(scalarOf(parameters, "correlation"));
+}
+
+void addCorrelation(const recording::SampleSpectrum& spectrum, const SignalBelief& belief,
+                    std::vector<recording::GapFinding>& findings) {
+  const double rho = spectrum.correlation;
+  if (rho < kSmallestCorrelation || rho < kCertainSds * spectrum.correlation_sd) return;
+  if (rho < belief.signal.correlation + std::max(0.1, kCertainSds * spectrum.correlation_sd)) return;
+  const auto n = static_cast<double>(spectrum.readings_per_stop);
+  findings.push_back({"correlated_samples",
+                      formatted("Successive readings follow each other (correlation %.2f +- %.2f): %.0f readings at a "
+                                "place are worth %.0f independent ones.",
+                                rho, spectrum.correlation_sd, n, std::max(1.0, n * (1.0 - rho) / (1.0 + rho))),
+                      {}});
+}
+
+void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vector<recording::GapFinding>& findings) {
+  if (evidence.spectrum) addCorrelation(*evidence.spectrum, belief, findings);
 }
 
 }  // namespace
 
+/// Successive readings that are not independent, because the tracker filters them.
+///
+/// Convention: the noise of the couplings is first-order autoregressive, n' = rho n + sqrt(1 - rho^2) w. The mean of N
+/// readings is then worth N (1 - rho)/(1 + rho) independent ones. The filter's own correlation and this one do not add:
+/// the larger holds.
+/// @source Box, Jenkins, Reinsel 1994, Time Series Analysis, section 3.2
 Effect correlatedSamplesEffect() {
   Effect effect;
   effect.id = "correlated_samples";
   effect.label = "Filtered readings";
   effect.source = "First-order autoregression: Box, Jenkins, Reinsel 1994, Time Series Analysis, section 3.2";
-  effect.parameters = {
-      {"correlation", "", "scalar", 0.8, 0.0, 0.999, "Between the noise of successive readings.", {}, 0.0, 0.98}};
+  effect.parameters = {{.name = "correlation",
+                        .shape = "scalar",
+                        .default_value = 0.8,
+                        .min = 0.0,
+                        .max = 0.999,
+                        .help = "Between the noise of successive readings.",
+                        .plausible_min = 0.0,
+                        .plausible_max = 0.98}};
   effect.make = make;
+  effect.detect = detect;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -10,11 +10,11 @@
 
 #include "calib/field/effect.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 /// The readings that an effect is to be fitted to, as far as they are known before fitting.
 struct FitDesign {
-  std::span<const SensorSetting> settings;
+  std::span<const field::SensorSetting> settings;
   Eigen::AlignedBox3d places_m;  ///< Of the sensor, tracker frame.
   double pitch_m = 0.1;          ///< Median distance to the nearest other place.
   bool has_times = false;        ///< Whether the settings' times are stated.
@@ -23,7 +23,7 @@ struct FitDesign {
   bool alignment_known = false;
   bool has_orientation = true;  ///< Whether the tracker reported orientations.
   bool several_orientations = false;
-  Excitation excitation;
+  field::Excitation excitation;
 };
 
 /// One number that is fitted.
@@ -59,6 +59,8 @@ class EffectFit {
   virtual std::string name() const = 0;
   /// Empty where nothing is searched.
   virtual std::vector<FitParameter> searched() const { return {}; }
+  /// Whether the first three searched parameters are a place in the room [m], tracker frame.
+  virtual bool searchesPlace() const { return false; }
   virtual std::vector<FitParameter> linear() const = 0;
   /// Coarse grid over the searched parameters that leaves no believable value out; one empty vector where nothing is
   /// searched. At most a few hundred, coarser where fewer do.
@@ -67,9 +69,9 @@ class EffectFit {
   virtual bool allows([[maybe_unused]] const Eigen::VectorXd& searched) const { return true; }
   /// Responses per unit of each linear parameter.
   /// @param responses at.size() * linear().size(), the linear parameter running fastest; filled
-  virtual void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
-                       std::span<EffectResponse> responses) const = 0;
+  virtual void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
+                       std::span<field::EffectResponse> responses) const = 0;
   virtual FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const = 0;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -4,19 +4,21 @@
 #include <cstdio>
 #include <numbers>
 
-namespace fieldtrue {
+#include "calib/effects/registry.h"
+
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kPitch_m = 0.3;
 constexpr double kSession_s = 3600.0;
 
-std::vector<SensorSetting> exampleSettings() {
+std::vector<field::SensorSetting> exampleSettings() {
   const double quarter_rad = 0.5 * std::numbers::pi;
   const Pose tracker_from_reference{{1.2, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
   const std::array<Eigen::Vector3d, 4> turns_rad{
       {{0.0, 0.0, 0.0}, {quarter_rad, 0.0, 0.0}, {0.0, quarter_rad, 0.0}, {0.0, 0.0, quarter_rad}}};
-  std::vector<SensorSetting> settings;
+  std::vector<field::SensorSetting> settings;
   for (const Eigen::Vector3d& turn_rad : turns_rad) {
     for (int place = 0; place < 100; ++place) {
       const std::array<int, 3> index{place % 5, place / 5 % 5, place / 25};
@@ -74,10 +76,10 @@ std::string wayText(const ListedWay& way) {
 std::vector<ListedWay> waysToFit(const Effect& effect) {
   std::vector<ListedWay> ways;
   if (effect.fits == nullptr) return ways;
-  const std::vector<SensorSetting> settings = exampleSettings();
+  const std::vector<field::SensorSetting> settings = exampleSettings();
   FitDesign design;
   design.settings = settings;
-  for (const SensorSetting& setting : settings) design.places_m.extend(setting.tracker_from_sensor.position_m);
+  for (const field::SensorSetting& setting : settings) design.places_m.extend(setting.tracker_from_sensor.position_m);
   design.pitch_m = kPitch_m;
   design.has_times = true;
   design.end_s = settings.back().time_s;
@@ -111,4 +113,4 @@ std::string effectListingText() {
   return text;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

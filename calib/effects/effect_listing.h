@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "calib/effects/registry.h"
+#include "calib/effects/effect_row.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 /// One way to fit an effect, as lists show it.
 struct ListedWay {
@@ -27,4 +27,4 @@ nlohmann::json effectListing();
 /// The same for people.
 std::string effectListingText();
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

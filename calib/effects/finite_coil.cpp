@@ -1,12 +1,11 @@
-#include "calib/effects/finite_coil.h"
-
 #include <cmath>
 
 #include "calib/core/file_io.h"
 #include "calib/effects/closed_loop.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -41,18 +40,18 @@ Eigen::Matrix3d leadingTerm_per_m5(Coil coil, const Pose& tracker_from_sensor) {
 }
 
 /// Field change in the tracker frame of a leading term along the sensor's axes.
-EffectResponse leadingResponse(Coil coil, const Pose& tracker_from_sensor, double radius_squared_m2) {
-  EffectResponse response;
+field::EffectResponse leadingResponse(Coil coil, const Pose& tracker_from_sensor, double radius_squared_m2) {
+  field::EffectResponse response;
   response.field_per_m3 = radius_squared_m2 * (tracker_from_sensor.orientation.toRotationMatrix() *
                                                leadingTerm_per_m5(coil, tracker_from_sensor));
   return response;
 }
 
 /// To leading order, as it is fitted.
-class SmallCoils final : public PhysicalEffect {
+class SmallCoils final : public field::PhysicalEffect {
  public:
   SmallCoils(Coil coil, double radius_squared_m2) : coil_(coil), radius_squared_m2_(radius_squared_m2) {}
-  EffectResponse at(const SensorSetting& setting) const override {
+  field::EffectResponse at(const field::SensorSetting& setting) const override {
     return leadingResponse(coil_, setting.tracker_from_sensor, radius_squared_m2_);
   }
 
@@ -62,11 +61,11 @@ class SmallCoils final : public PhysicalEffect {
 };
 
 /// Rings as they are.
-class Rings final : public PhysicalEffect {
+class Rings final : public field::PhysicalEffect {
  public:
   Rings(Coil coil, const Eigen::Vector3d& radius_m) : coil_(coil), radius_m_(radius_m) {}
 
-  EffectResponse at(const SensorSetting& setting) const override {
+  field::EffectResponse at(const field::SensorSetting& setting) const override {
     const Eigen::Vector3d& p_m = setting.tracker_from_sensor.position_m;
     const Eigen::Matrix3d R = setting.tracker_from_sensor.orientation.toRotationMatrix();
     Eigen::Matrix3d field;
@@ -79,8 +78,8 @@ class Rings final : public PhysicalEffect {
       }
     }
     if (coil_ == Coil::kReceiver) field = R * field;
-    EffectResponse response;
-    response.field_per_m3 = field - dipoleField(p_m, 1.0);
+    field::EffectResponse response;
+    response.field_per_m3 = field - field::dipoleField(p_m, 1.0);
     return response;
   }
 
@@ -91,7 +90,8 @@ class Rings final : public PhysicalEffect {
   Eigen::Vector3d radius_m_;
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   const Coil coil = parameters.at("coil") == "transmitter" ? Coil::kTransmitter : Coil::kReceiver;
   const nlohmann::json& squared = parameters.at("radius_squared_m2");
   if (!squared.is_null()) return std::make_unique<SmallCoils>(coil, squared.get<double>());
@@ -111,8 +111,8 @@ class FiniteCoilFit final : public EffectFit {
     return {{"radius_squared_m2", "m^2", 0.0, kLargestBelievable_m * kLargestBelievable_m}};
   }
 
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& /*searched*/,
-               std::span<EffectResponse> responses) const override {
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& /*searched*/,
+               std::span<field::EffectResponse> responses) const override {
     for (std::size_t i = 0; i < at.size(); ++i) responses[i] = leadingResponse(coil_, at[i].tracker_from_sensor, 1.0);
   }
 
@@ -144,52 +144,53 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 
 }  // namespace
 
+/// Coils of real size where the tracker's electronics believe in dipoles.
+///
+/// Three concentric rings of radius a stand in for the transmitter's or the receiver's coils, each with the dipole
+/// moment (or the effective area) that the tracker was calibrated for. A transmitter ring of axis k has the field of
+/// unit current 4 h(p)/a^2 for C = 1; a receiver ring reads, by reciprocity, 4 h(t)/a^2. To leading order in a/r
+///   dS_ik = -(a^2/8) D(e_i, e_k, e_k, e_k) for transmitter rings, D(e_i, e_i, e_i, e_k) for receiver rings,
+/// with D the fourth derivative of 1/r at the sensor; a square coil of half side b acts as a = sqrt(4/3) b.
+/// @source Jackson 1999, Classical Electrodynamics, section 5.5 (ring) and its expansion in a/r; square: second moment
+/// of the wound area
 Effect finiteCoilEffect() {
   Effect effect;
   effect.id = "finite_coil";
   effect.label = "Coils of real size";
   effect.source = "Jackson 1999, Classical Electrodynamics, section 5.5 (field of a current ring), expanded in a/r";
   effect.parameters = {
-      {"coil",
-       "",
-       "text",
-       "transmitter",
-       0.0,
-       0.0,
-       "Whose coils have size, the `transmitter`'s or the `receiver`'s.",
-       {"transmitter", "receiver"}},
-      {"radius_m",
-       "m",
-       "vector3",
-       {0.05, 0.05, 0.05},
-       1e-4,
-       1.0,
-       "Of the coil about x, y and z: radius of a ring, or half the side of a square.",
-       {},
-       0.003,
-       0.15},
-      {"shape",
-       "",
-       "text",
-       "ring",
-       0.0,
-       0.0,
-       "Form of the coils, `ring` or `square`; a square acts as the ring of the same second moment of area.",
-       {"ring", "square"}},
-      {"radius_squared_m2",
-       "m^2",
-       "scalar",
-       nullptr,
-       -1.0,
-       1.0,
-       "Mean square radius of three coils alike, to leading order in radius over range; when given, radius and shape "
-       "are not used. Below 0 stands for coils wound to cancel more than their own size.",
-       {},
-       0.0,
-       0.0225}};
+      {.name = "coil",
+       .shape = "text",
+       .default_value = "transmitter",
+       .help = "Whose coils have size, the `transmitter`'s or the `receiver`'s.",
+       .choices = {"transmitter", "receiver"}},
+      {.name = "radius_m",
+       .unit = "m",
+       .shape = "vector3",
+       .default_value = {0.05, 0.05, 0.05},
+       .min = 1e-4,
+       .max = 1.0,
+       .help = "Of the coil about x, y and z: radius of a ring, or half the side of a square.",
+       .plausible_min = 0.003,
+       .plausible_max = 0.15},
+      {.name = "shape",
+       .shape = "text",
+       .default_value = "ring",
+       .help = "Form of the coils, `ring` or `square`; a square acts as the ring of the same second moment of area.",
+       .choices = {"ring", "square"}},
+      {.name = "radius_squared_m2",
+       .unit = "m^2",
+       .shape = "scalar",
+       .min = -1.0,
+       .max = 1.0,
+       .help = "Mean square radius of three coils alike, to leading order in radius over range; when given, radius and "
+               "shape "
+               "are not used. Below 0 stands for coils wound to cancel more than their own size.",
+       .plausible_min = 0.0,
+       .plausible_max = 0.0225}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,5 +1,3 @@
-#include "calib/effects/finite_plate.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -11,10 +9,11 @@
 #include "calib/core/file_io.h"
 #include "calib/effects/parameters.h"
 #include "calib/effects/room_search.h"
+#include "calib/effects/rows.h"
 #include "calib/field/metal_response.h"
 #include "calib/field/sheet_mesh.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -62,7 +61,7 @@ struct PlateAnswer {
 };
 
 /// A plate in the transmitter's field.
-class FinitePlate final : public CouplingDistortion {
+class FinitePlate final : public field::CouplingDistortion {
  public:
   FinitePlate(const PlateFrame& frame, std::span<const Eigen::Vector2d> ring_centers_m,
               std::span<const Eigen::Vector2d> charge_centers_m, double scale, const PlateAnswer& answer,
@@ -71,7 +70,7 @@ class FinitePlate final : public CouplingDistortion {
     const Eigen::Matrix3d& R = frame.tracker_from_plate;
     if (answer.moments.size() > 0) {
       const Eigen::MatrixXd field = sources(ring_centers_m, scale, [&](const Eigen::Vector3d& c_m) {
-        return Eigen::RowVector3d(R.col(2).transpose() * dipoleField(c_m, 1.0));
+        return Eigen::RowVector3d(R.col(2).transpose() * field::dipoleField(c_m, 1.0));
       });
       moments_ = -strength / kFourPi * (answer.moments * field);
       ring_centers_m_ = scaled(ring_centers_m, scale);
@@ -144,7 +143,8 @@ int cellsAlongSide(const PlateFrame& frame) {
   return static_cast<int>(std::ceil(std::clamp(wanted, double{kFewestCells}, double{kMostCells})));
 }
 
-PlateAnswer answerOf(const SheetMesh& mesh, const nlohmann::json& parameters, const Excitation& excitation) {
+PlateAnswer answerOf(const field::SheetMesh& mesh, const nlohmann::json& parameters,
+                     const field::Excitation& excitation) {
   const bool is_ferromagnetic = isFerromagnetic(parameters);
   const double mu_r = is_ferromagnetic ? scalarOf(parameters, "relative_permeability") : 1.0;
   const nlohmann::json& thickness = parameters.at("thickness_m");
@@ -159,15 +159,18 @@ PlateAnswer answerOf(const SheetMesh& mesh, const nlohmann::json& parameters, co
     answer.charges = mesh.chargeModes().answer([&](double rate) { return idealChargeShare(rate, chi_t_m); });
     return answer;
   }
-  const MetalSheet sheet{{scalarOf(parameters, "conductivity_s_per_m"), mu_r}, thickness.get<double>()};
-  answer.moments = mesh.currentModes().answer([&](double rate) { return sheetCurrentShare(sheet, rate, excitation); });
+  const field::MetalSheet sheet{{scalarOf(parameters, "conductivity_s_per_m"), mu_r}, thickness.get<double>()};
+  answer.moments =
+      mesh.currentModes().answer([&](double rate) { return field::sheetCurrentShare(sheet, rate, excitation); });
   if (is_ferromagnetic) {
-    answer.charges = mesh.chargeModes().answer([&](double rate) { return sheetChargeShare(sheet, rate, excitation); });
+    answer.charges =
+        mesh.chargeModes().answer([&](double rate) { return field::sheetChargeShare(sheet, rate, excitation); });
   }
   return answer;
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& excitation) {
   const Eigen::Vector3d normal = vectorOf(parameters, "normal");
   const Eigen::Vector3d side = vectorOf(parameters, "side");
   if (normal.cross(side).norm() < 1e-6 * std::max(1.0, normal.norm() * side.norm())) {
@@ -185,7 +188,7 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
                                           " puts the transmitter in the plate; move the plate.");
   }
   const int along = cellsAlongSide(frame);
-  const SheetMesh mesh(2.0 * frame.half_m.x(), 2.0 * frame.half_m.y(), along * along);
+  const field::SheetMesh mesh(2.0 * frame.half_m.x(), 2.0 * frame.half_m.y(), along * along);
   return std::make_unique<FinitePlate>(frame, mesh.ringCenters_m(), mesh.chargeCenters_m(), 1.0,
                                        answerOf(mesh, parameters, excitation), scalarOf(parameters, "strength"));
 }
@@ -193,7 +196,7 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
 /// Answers of a square plate of side 1 m, from which those of any square follow by size.
 struct UnitSquare {
   explicit UnitSquare(int along) : mesh(1.0, 1.0, along * along) {}
-  SheetMesh mesh;
+  field::SheetMesh mesh;
   Eigen::MatrixXd moments = mesh.currentModes().answer([](double) { return 1.0; });
   Eigen::MatrixXd charges = mesh.chargeModes().answer(
       [](double rate) { return idealChargeShare(rate, std::numeric_limits<double>::infinity()); });
@@ -215,6 +218,7 @@ class FinitePlateFit final : public EffectFit {
 
   std::string name() const override { return is_ferromagnetic_ ? "ferromagnetic" : "conductive"; }
 
+  bool searchesPlace() const override { return true; }
   std::vector<FitParameter> searched() const override {
     std::vector<FitParameter> parameters = search_.centerParameters();
     for (FitParameter& angle : DirectionChart::parameters()) parameters.push_back(std::move(angle));
@@ -246,8 +250,8 @@ class FinitePlateFit final : public EffectFit {
                        [&](const Eigen::Vector3d& p_m) { return frame.distance_m(p_m) >= least_m; });
   }
 
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
-               std::span<EffectResponse> responses) const override {
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<field::EffectResponse> responses) const override {
     const double size_m = searched[5];
     const PlateFrame frame = frameAt(searched);
     const UnitSquare& square = unitSquare(cellsAlongSide(frame));
@@ -258,7 +262,7 @@ class FinitePlateFit final : public EffectFit {
     } else {
       answer.moments = size_m * size_m * size_m * square.moments;
     }
-    const SheetMesh& mesh = square.mesh;
+    const field::SheetMesh& mesh = square.mesh;
     const FinitePlate plate(frame, mesh.ringCenters_m(), mesh.chargeCenters_m(), size_m, answer, 1.0);
     for (std::size_t i = 0; i < at.size(); ++i) responses[i] = plate.at(at[i]);
   }
@@ -314,6 +318,15 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// A flat rectangular metal plate with edges: a table top, a cabinet's side, a floor plate, a sheet of foil.
+///
+/// As a conductor it carries currents in its plane, which keep out the field normal to it; as a ferromagnet it is
+/// magnetised in its plane. Ideal, either is complete. With conductivity and thickness given, the currents' modes
+/// answer as far as the tracker's carrier or sampling delay lets them, through the sheet impedance (gamma / 2 sigma)
+/// coth(gamma d / 2), gamma^2 = s mu sigma, which is 1/(sigma d) for a thin sheet; and a permeable plate is besides
+/// magnetised with chi_t = (mu_r tanh(x)/x - 1) d, x = gamma d / 2.
+/// @source meshed sheet: calib/field/sheet_mesh.h; sheet impedance: Wait 1962, Electromagnetic Waves in Stratified
+/// Media, chapter 2; thin conducting sheet: Saslow 1992, Am. J. Phys. 60 693
 Effect finitePlateEffect() {
   Effect effect;
   effect.id = "finite_plate";
@@ -322,63 +335,59 @@ Effect finitePlateEffect() {
       "Meshed sheet: Weidelt 1975, J. Geophys. 41 85; edges: Hough 1973, J. Aircraft 10 314; sheet impedance: "
       "Wait 1962, Electromagnetic Waves in Stratified Media";
   effect.parameters = {
-      {"center_m",
-       "m",
-       "vector3",
-       {1.0, 0.0, -1.0},
-       -100.0,
-       100.0,
-       "Middle of the plate, tracker frame.",
-       {},
-       -10.0,
-       10.0},
-      {"normal",
-       "",
-       "vector3",
-       {0.0, 0.0, 1.0},
-       0.0,
-       0.0,
-       "At right angles to the plate, tracker frame; any length.",
-       {}},
-      {"side", "", "vector3", {1.0, 0.0, 0.0}, 0.0, 0.0, "Along the plate's length, tracker frame; any length.", {}},
-      {"length_m", "m", "scalar", 0.6, 0.01, 20.0, "Along `side`.", {}, 0.1, 4.0},
-      {"width_m", "m", "scalar", 0.6, 0.01, 20.0, "Across it.", {}, 0.1, 4.0},
+      centerParameter("Middle of the plate, tracker frame."),
+      {.name = "normal",
+       .shape = "vector3",
+       .default_value = {0.0, 0.0, 1.0},
+       .help = "At right angles to the plate, tracker frame; any length."},
+      {.name = "side",
+       .shape = "vector3",
+       .default_value = {1.0, 0.0, 0.0},
+       .help = "Along the plate's length, tracker frame; any length."},
+      {.name = "length_m",
+       .unit = "m",
+       .shape = "scalar",
+       .default_value = 0.6,
+       .min = 0.01,
+       .max = 20.0,
+       .help = "Along `side`.",
+       .plausible_min = 0.1,
+       .plausible_max = 4.0},
+      {.name = "width_m",
+       .unit = "m",
+       .shape = "scalar",
+       .default_value = 0.6,
+       .min = 0.01,
+       .max = 20.0,
+       .help = "Across it.",
+       .plausible_min = 0.1,
+       .plausible_max = 4.0},
       materialParameter(),
       permeabilityParameter(),
-      {"conductivity_s_per_m",
-       "S/m",
-       "scalar",
-       nullptr,
-       1.0,
-       1e8,
-       "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6; needs thickness_m. When given, the tracker's "
-       "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal.",
-       {},
-       1e6,
-       6e7},
-      {"thickness_m",
-       "m",
-       "scalar",
-       nullptr,
-       1e-6,
-       0.1,
-       "Of the plate; null is thick enough not to matter.",
-       {},
-       2e-5,
-       0.02},
-      {"strength",
-       "",
-       "scalar",
-       1.0,
-       -100.0,
-       100.0,
-       "Share of such a plate's answer; below 1 for holes and gaps. No real plate has more than 1 or less than 0.",
-       {},
-       0.0,
-       1.0}};
+      conductivityParameter(
+          "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6; needs thickness_m. When given, the tracker's "
+          "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal."),
+      {.name = "thickness_m",
+       .unit = "m",
+       .shape = "scalar",
+       .min = 1e-6,
+       .max = 0.1,
+       .help = "Of the plate; null is thick enough not to matter.",
+       .plausible_min = 2e-5,
+       .plausible_max = 0.02},
+      {.name = "strength",
+       .shape = "scalar",
+       .default_value = 1.0,
+       .min = -100.0,
+       .max = 100.0,
+       .help =
+           "Share of such a plate's answer; below 1 for holes and gaps. No real plate has more than 1 or less than 0.",
+       .plausible_min = 0.0,
+       .plausible_max = 1.0}};
   effect.make = make;
   effect.fits = fits;
+  effect.body = plateOf;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,12 +1,11 @@
-#include "calib/effects/gain_drift.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -16,7 +15,7 @@ constexpr double kShortest = 0.02;  ///< Time constant over the length of the se
 constexpr double kLongest = 2.0;
 constexpr int kStarts = 10;
 
-class GainDrift final : public PhysicalEffect {
+class GainDrift final : public field::PhysicalEffect {
  public:
   explicit GainDrift(const nlohmann::json& parameters)
       : start_s_(scalarOf(parameters, "start_s")),
@@ -26,12 +25,12 @@ class GainDrift final : public PhysicalEffect {
         slope_per_s_(scalarOf(parameters, "slope_per_s")),
         curvature_per_s2_(scalarOf(parameters, "curvature_per_s2")) {}
 
-  EffectResponse at(const SensorSetting& setting) const override {
+  field::EffectResponse at(const field::SensorSetting& setting) const override {
     const double u_s = setting.time_s - start_s_;
     double gain = gain_ + (slope_per_s_ + curvature_per_s2_ * u_s) * u_s;
     if (amplitude_ != 0.0) gain += amplitude_ * std::exp(-u_s / time_constant_s_);
-    EffectResponse response;
-    response.field_per_m3 = gain * dipoleField(setting.tracker_from_sensor.position_m, 1.0);
+    field::EffectResponse response;
+    response.field_per_m3 = gain * field::dipoleField(setting.tracker_from_sensor.position_m, 1.0);
     return response;
   }
 
@@ -44,7 +43,8 @@ class GainDrift final : public PhysicalEffect {
   double curvature_per_s2_;
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   return std::make_unique<GainDrift>(parameters);
 }
 
@@ -60,10 +60,10 @@ struct Session {
 std::unique_ptr<EffectFit> polynomialWay(const std::string& name, const Session& session, bool is_curved) {
   std::vector<FitParameter> linear{{"drift_over_session", "", -kPlausibleDrift, kPlausibleDrift}};
   if (is_curved) linear.push_back({"curvature_over_session", "", -2.0 * kPlausibleDrift, 2.0 * kPlausibleDrift});
-  const auto respond = [session](const SensorSetting& setting, std::span<EffectResponse> responses) {
+  const auto respond = [session](const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
     double power = session.share(setting.time_s);
-    for (EffectResponse& response : responses) {
-      response.field_per_m3 = power * dipoleField(setting.tracker_from_sensor.position_m, 1.0);
+    for (field::EffectResponse& response : responses) {
+      response.field_per_m3 = power * field::dipoleField(setting.tracker_from_sensor.position_m, 1.0);
       power *= session.share(setting.time_s);
     }
   };
@@ -98,13 +98,13 @@ class ExponentialFit final : public EffectFit {
   bool allows(const Eigen::VectorXd& searched) const override {
     return searched[0] >= kShortest * session_.length_s && searched[0] <= kLongest * session_.length_s;
   }
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
-               std::span<EffectResponse> responses) const override {
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<field::EffectResponse> responses) const override {
     FT_CHECK(responses.size() == at.size());
     for (std::size_t i = 0; i < at.size(); ++i) {
       const double warmed = std::expm1(-(at[i].time_s - session_.start_s) / searched[0]);
-      responses[i] = EffectResponse{};
-      responses[i].field_per_m3 = warmed * dipoleField(at[i].tracker_from_sensor.position_m, 1.0);
+      responses[i] = field::EffectResponse{};
+      responses[i].field_per_m3 = warmed * field::dipoleField(at[i].tracker_from_sensor.position_m, 1.0);
     }
   }
   FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {
@@ -133,48 +133,73 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// A gain that changes while the recording goes on: a transmitter or an amplifier that warms up.
+///
+/// Convention: dG = g(t) G with, u = t - start,
+///   g = gain + amplitude exp(-u/time_constant) + slope u + curvature u^2.
+/// A body that warms up under constant power follows the exponential (Newton's law of cooling); the straight line and
+/// the parabola are its short-time forms. Every way of fitting has its own constant, for what is stable may lie at
+/// either end of the session.
+/// @source Newton's law of cooling: Carslaw and Jaeger 1959, Conduction of Heat in Solids, section 1.9
 Effect gainDriftEffect() {
   Effect effect;
   effect.id = "gain_drift";
   effect.label = "Gain that drifts with time";
   effect.source = "Newton's law of cooling: Carslaw and Jaeger 1959, Conduction of Heat in Solids, section 1.9";
-  effect.parameters = {
-      {"gain",
-       "",
-       "scalar",
-       0.0,
-       -1e3,
-       1e3,
-       "Relative error of every coupling that stays.",
-       {},
-       -kPlausibleGain,
-       kPlausibleGain},
-      {"amplitude",
-       "",
-       "scalar",
-       0.0,
-       -1e3,
-       1e3,
-       "Relative error at the start that fades exponentially.",
-       {},
-       -kPlausibleDrift,
-       kPlausibleDrift},
-      {"time_constant_s", "s", "scalar", 1200.0, 1e-6, 1e9, "Of the fading.", {}, 60.0, 7200.0},
-      {"slope_per_s", "1/s", "scalar", 0.0, -1e6, 1e6, "Change of the relative error with time.", {}, -1e-4, 1e-4},
-      {"curvature_per_s2",
-       "1/s^2",
-       "scalar",
-       0.0,
-       -1e6,
-       1e6,
-       "Of the relative error, times the squared time.",
-       {},
-       -1e-7,
-       1e-7},
-      {"start_s", "s", "scalar", 0.0, -1e12, 1e12, "When the fading starts, on the session's clock.", {}}};
+  effect.parameters = {{.name = "gain",
+                        .shape = "scalar",
+                        .default_value = 0.0,
+                        .min = -1e3,
+                        .max = 1e3,
+                        .help = "Relative error of every coupling that stays.",
+                        .plausible_min = -kPlausibleGain,
+                        .plausible_max = kPlausibleGain},
+                       {.name = "amplitude",
+                        .shape = "scalar",
+                        .default_value = 0.0,
+                        .min = -1e3,
+                        .max = 1e3,
+                        .help = "Relative error at the start that fades exponentially.",
+                        .plausible_min = -kPlausibleDrift,
+                        .plausible_max = kPlausibleDrift},
+                       {.name = "time_constant_s",
+                        .unit = "s",
+                        .shape = "scalar",
+                        .default_value = 1200.0,
+                        .min = 1e-6,
+                        .max = 1e9,
+                        .help = "Of the fading.",
+                        .plausible_min = 60.0,
+                        .plausible_max = 7200.0},
+                       {.name = "slope_per_s",
+                        .unit = "1/s",
+                        .shape = "scalar",
+                        .default_value = 0.0,
+                        .min = -1e6,
+                        .max = 1e6,
+                        .help = "Change of the relative error with time.",
+                        .plausible_min = -1e-4,
+                        .plausible_max = 1e-4},
+                       {.name = "curvature_per_s2",
+                        .unit = "1/s^2",
+                        .shape = "scalar",
+                        .default_value = 0.0,
+                        .min = -1e6,
+                        .max = 1e6,
+                        .help = "Of the relative error, times the squared time.",
+                        .plausible_min = -1e-7,
+                        .plausible_max = 1e-7},
+                       {.name = "start_s",
+                        .unit = "s",
+                        .shape = "scalar",
+                        .default_value = 0.0,
+                        .min = -1e12,
+                        .max = 1e12,
+                        .help = "When the fading starts, on the session's clock."}};
   effect.make = make;
   effect.fits = fits;
+  effect.acts_in_time = true;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

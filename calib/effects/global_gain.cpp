@@ -1,19 +1,19 @@
-#include "calib/effects/global_gain.h"
-
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kPlausible = 0.1;
 
-void responses(const SensorSetting& setting, std::span<EffectResponse> responses) {
-  responses[0].field_per_m3 = dipoleField(setting.tracker_from_sensor.position_m, 1.0);
+void responses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
+  responses[0].field_per_m3 = field::dipoleField(setting.tracker_from_sensor.position_m, 1.0);
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   return linearEffect(responses, Eigen::VectorXd::Constant(1, scalarOf(parameters, "gain")));
 }
 
@@ -27,24 +27,28 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 
 }  // namespace
 
+/// Everything is received stronger or weaker by one factor: a wrong dipole constant, drive current or unit.
+///
+/// Convention: dG = g G. The range follows G ~ r^-3, so a sensor at p is reported at p (1 + g)^(-1/3) = p (1 - g/3) to
+/// first order; the orientation stays. An isotropic error of the rig's scale looks the same about the transmitter.
+/// @source Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709 (inverse cube law)
 Effect globalGainEffect() {
   Effect effect;
   effect.id = "global_gain";
   effect.label = "Gain of the whole tracker";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709";
-  effect.parameters = {{"gain",
-                        "",
-                        "scalar",
-                        0.0,
-                        -0.999,
-                        1e3,
-                        "Relative error of every coupling; 0.03 brings every reading 1 % nearer to the transmitter.",
-                        {},
-                        -kPlausible,
-                        kPlausible}};
+  effect.parameters = {
+      {.name = "gain",
+       .shape = "scalar",
+       .default_value = 0.0,
+       .min = -0.999,
+       .max = 1e3,
+       .help = "Relative error of every coupling; 0.03 brings every reading 1 % nearer to the transmitter.",
+       .plausible_min = -kPlausible,
+       .plausible_max = kPlausible}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,15 +1,14 @@
-#include "calib/effects/grid_scale.h"
-
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kPlausible = 0.1;
 
-void perAxisResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+void perAxisResponses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   const Eigen::Vector3d q_m = inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m;
   const Eigen::Matrix3d R = setting.tracker_from_reference.orientation.toRotationMatrix();
   for (int axis = 0; axis < 3; ++axis) {
@@ -17,11 +16,12 @@ void perAxisResponses(const SensorSetting& setting, std::span<EffectResponse> re
   }
 }
 
-void isotropicResponse(const SensorSetting& setting, std::span<EffectResponse> responses) {
+void isotropicResponse(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   responses[0].shift_m = setting.tracker_from_sensor.position_m - setting.tracker_from_reference.position_m;
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   return linearEffect(perAxisResponses, vectorOf(parameters, "scale"));
 }
 
@@ -40,24 +40,28 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 
 }  // namespace
 
+/// A rig that is larger or smaller than its drawing, along each of its axes: wrong pitch, wet wood, a tape in another
+/// unit.
+///
+/// Convention: a sensor that the rig says to be at q (rig's frame) is really at (1 + diag(s)) q. Which point stays in
+/// place does not matter where the alignment is unknown; here it is the rig's origin.
+/// @source geometry, by hand
 Effect gridScaleEffect() {
   Effect effect;
   effect.id = "grid_scale";
   effect.label = "Scale of the rig";
   effect.source = "Geometry";
-  effect.parameters = {{"scale",
-                        "",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "How much longer the rig is than it says along its own x, y, z: 0.01 is 1 %.",
-                        {},
-                        -kPlausible,
-                        kPlausible}};
+  effect.parameters = {{.name = "scale",
+                        .shape = "vector3",
+                        .default_value = {0.0, 0.0, 0.0},
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "How much longer the rig is than it says along its own x, y, z: 0.01 is 1 %.",
+                        .plausible_min = -kPlausible,
+                        .plausible_max = kPlausible}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,15 +1,14 @@
-#include "calib/effects/hemisphere_flip.h"
-
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
-class HemisphereFlip final : public PhysicalEffect {
+class HemisphereFlip final : public field::PhysicalEffect {
  public:
   explicit HemisphereFlip(double probability) : probability_(probability) {}
-  void disturb(SignalModel& signal) const override {
+  void disturb(field::SignalModel& signal) const override {
     signal.flip_probability = 1.0 - (1.0 - signal.flip_probability) * (1.0 - probability_);
   }
 
@@ -17,21 +16,33 @@ class HemisphereFlip final : public PhysicalEffect {
   double probability_;
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   return std::make_unique<HemisphereFlip>(scalarOf(parameters, "probability"));
 }
 
 }  // namespace
 
+/// Visits at which the tracker reports the other of the two positions that its signals allow.
+///
+/// Convention: the field of dipoles is even, S(p) = S(-p), so a tracker that lost its hemisphere reports -p with the
+/// right orientation; each visit does so, all its readings together, with this probability.
+/// @source Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709 (hemisphere ambiguity)
 Effect hemisphereFlipEffect() {
   Effect effect;
   effect.id = "hemisphere_flip";
   effect.label = "Lost hemisphere";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709";
-  effect.parameters = {
-      {"probability", "", "scalar", 0.02, 0.0, 1.0, "That a visit is reported on the other side.", {}, 0.0, 0.2}};
+  effect.parameters = {{.name = "probability",
+                        .shape = "scalar",
+                        .default_value = 0.02,
+                        .min = 0.0,
+                        .max = 1.0,
+                        .help = "That a visit is reported on the other side.",
+                        .plausible_min = 0.0,
+                        .plausible_max = 0.2}};
   effect.make = make;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

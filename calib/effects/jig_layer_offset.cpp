@@ -1,5 +1,3 @@
-#include "calib/effects/jig_layer_offset.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,8 +8,9 @@
 #include "calib/core/file_io.h"
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -34,7 +33,7 @@ class Layers {
 
   double reach_m() const { return reach_m_; }
 
-  void respond(const SensorSetting& setting, std::span<EffectResponse> responses) const {
+  void respond(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) const {
     const Eigen::Vector3d q_m = inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m;
     if (const auto layer = layerOf(q_m[axis_])) {
       responses[*layer].shift_m = setting.tracker_from_reference.orientation * Eigen::Vector3d::Unit(axis_);
@@ -56,7 +55,7 @@ class Layers {
 };
 
 UnitResponses responsesOf(const Layers& layers) {
-  return [layers](const SensorSetting& setting, std::span<EffectResponse> responses) {
+  return [layers](const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
     layers.respond(setting, responses);
   };
 }
@@ -66,7 +65,8 @@ int axisOf(const nlohmann::json& parameters) {
   return axis == "x" ? 0 : axis == "y" ? 1 : 2;
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   const std::vector<double> heights_m = numbersOf(parameters, "heights_m");
   const std::vector<double> offsets_m = numbersOf(parameters, "offsets_m");
   if (heights_m.size() != offsets_m.size()) {
@@ -146,7 +146,7 @@ std::unique_ptr<EffectFit> wayAlong(int axis, const std::vector<Layer>& layers) 
 
 std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
   std::vector<Eigen::Vector3d> places_m;
-  for (const SensorSetting& setting : design.settings) {
+  for (const field::SensorSetting& setting : design.settings) {
     places_m.push_back(inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m);
   }
   std::vector<std::unique_ptr<EffectFit>> ways;
@@ -163,40 +163,40 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// Layers of a rig that are too high or too low: pipes cut to the wrong length, a shelf on another peg.
+///
+/// Convention: a sensor in the layer at the height h along one of the rig's axes is really at h + offset. It belongs to
+/// the nearest layer of the list, and to none where that is farther than half the smallest spacing of the list.
+/// @source geometry, by hand
 Effect jigLayerOffsetEffect() {
   Effect effect;
   effect.id = "jig_layer_offset";
   effect.label = "Layers of the rig at a wrong height";
   effect.source = "Geometry";
-  effect.parameters = {{"axis",
-                        "",
-                        "text",
-                        "z",
-                        0.0,
-                        0.0,
-                        "Axis of the rig across which the layers lie and along which they are displaced.",
-                        {"x", "y", "z"}},
-                       {"heights_m",
-                        "m",
-                        "list",
-                        {-0.4572, -0.1524, 0.1524, 0.4572},
-                        -100.0,
-                        100.0,
-                        "Where the rig says the layers are along that axis, rig's frame.",
-                        {}},
-                       {"offsets_m",
-                        "m",
-                        "list",
-                        {0.0, 0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "How far each layer really is beyond that.",
-                        {},
-                        -kPlausible_m,
-                        kPlausible_m}};
+  effect.parameters = {{.name = "axis",
+                        .shape = "text",
+                        .default_value = "z",
+                        .help = "Axis of the rig across which the layers lie and along which they are displaced.",
+                        .choices = {"x", "y", "z"}},
+                       {.name = "heights_m",
+                        .unit = "m",
+                        .shape = "list",
+                        .default_value = {-0.4572, -0.1524, 0.1524, 0.4572},
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "Where the rig says the layers are along that axis, rig's frame."},
+                       {.name = "offsets_m",
+                        .unit = "m",
+                        .shape = "list",
+                        .default_value = {0.0, 0.0, 0.0, 0.0},
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "How far each layer really is beyond that.",
+                        .plausible_min = -kPlausible_m,
+                        .plausible_max = kPlausible_m}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,9 +1,8 @@
-#include "calib/effects/jig_tilt.h"
-
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -11,7 +10,7 @@ constexpr double kPlausible_rad = 0.1;
 
 /// Responses to the shears xz and yz, and xy where there is room for it.
 /// @param turns share of the pipe's lean that the sensor follows
-void shearResponses(double turns, const SensorSetting& setting, std::span<EffectResponse> responses) {
+void shearResponses(double turns, const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   const Eigen::Vector3d q_m = inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m;
   const Eigen::Matrix3d R = setting.tracker_from_reference.orientation.toRotationMatrix();
   responses[0].shift_m = R.col(0) * q_m.z();
@@ -22,12 +21,13 @@ void shearResponses(double turns, const SensorSetting& setting, std::span<Effect
 }
 
 UnitResponses shears(double turns) {
-  return [turns](const SensorSetting& setting, std::span<EffectResponse> responses) {
+  return [turns](const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
     shearResponses(turns, setting, responses);
   };
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   return linearEffect(shears(scalarOf(parameters, "turns_sensor")), vectorOf(parameters, "shear_rad"));
 }
 
@@ -51,34 +51,40 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// A rig that leans: its pipes do not stand at right angles to its base, or its rows not to each other.
+///
+/// Convention: a sensor that the rig says to be at q (rig's frame) is really at q plus the shear
+///   (xz q_z + xy q_y, yz q_z, 0),
+/// each shear an angle for small angles. With turns_sensor = 1 a sensor fixed to the leaning pipe leans with it, by the
+/// rotation vector (-yz, xz, 0) of the rig's frame, which takes the upright z axis to (xz, yz, 1); with 0 it stays
+/// level. The shear xy of the rows does not turn it.
+/// @source geometry, the rotation to first order by hand
 Effect jigTiltEffect() {
   Effect effect;
   effect.id = "jig_tilt";
   effect.label = "Leaning rig";
   effect.source = "Geometry";
-  effect.parameters = {{"shear_rad",
-                        "rad",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "Shears xz, yz, xy of the rig in its own frame: x shifts with height z, y with z, x with y.",
-                        {},
-                        -kPlausible_rad,
-                        kPlausible_rad},
-                       {"turns_sensor",
-                        "",
-                        "scalar",
-                        0.0,
-                        0.0,
-                        1.0,
-                        "1 where the sensor leans with the pipe it is fixed to, 0 where it stays level.",
-                        {},
-                        0.0,
-                        1.0}};
+  effect.parameters = {
+      {.name = "shear_rad",
+       .unit = "rad",
+       .shape = "vector3",
+       .default_value = {0.0, 0.0, 0.0},
+       .min = -100.0,
+       .max = 100.0,
+       .help = "Shears xz, yz, xy of the rig in its own frame: x shifts with height z, y with z, x with y.",
+       .plausible_min = -kPlausible_rad,
+       .plausible_max = kPlausible_rad},
+      {.name = "turns_sensor",
+       .shape = "scalar",
+       .default_value = 0.0,
+       .min = 0.0,
+       .max = 1.0,
+       .help = "1 where the sensor leans with the pipe it is fixed to, 0 where it stays level.",
+       .plausible_min = 0.0,
+       .plausible_max = 1.0}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

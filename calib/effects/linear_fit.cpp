@@ -7,12 +7,12 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
-EffectResponse weightedSum(std::span<const EffectResponse> responses, const Eigen::VectorXd& weights) {
-  EffectResponse sum;
+field::EffectResponse weightedSum(std::span<const field::EffectResponse> responses, const Eigen::VectorXd& weights) {
+  field::EffectResponse sum;
   for (std::size_t i = 0; i < responses.size(); ++i) {
     const double weight = weights[static_cast<Eigen::Index>(i)];
     sum.shift_m += weight * responses[i].shift_m;
@@ -22,13 +22,13 @@ EffectResponse weightedSum(std::span<const EffectResponse> responses, const Eige
   return sum;
 }
 
-class LinearEffect final : public PhysicalEffect {
+class LinearEffect final : public field::PhysicalEffect {
  public:
   LinearEffect(UnitResponses respond, Eigen::VectorXd values)
       : respond_(std::move(respond)), values_(std::move(values)) {}
 
-  EffectResponse at(const SensorSetting& setting) const override {
-    std::vector<EffectResponse> responses(static_cast<std::size_t>(values_.size()));
+  field::EffectResponse at(const field::SensorSetting& setting) const override {
+    std::vector<field::EffectResponse> responses(static_cast<std::size_t>(values_.size()));
     respond_(setting, responses);
     return weightedSum(responses, values_);
   }
@@ -43,13 +43,13 @@ class LinearFit final : public EffectFit {
   explicit LinearFit(LinearWay way) : way_(std::move(way)) {}
   std::string name() const override { return way_.name; }
   std::vector<FitParameter> linear() const override { return way_.linear; }
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& /*searched*/,
-               std::span<EffectResponse> responses) const override {
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& /*searched*/,
+               std::span<field::EffectResponse> responses) const override {
     const std::size_t count = way_.linear.size();
     FT_CHECK(responses.size() == at.size() * count);
     for (std::size_t i = 0; i < at.size(); ++i) {
-      const std::span<EffectResponse> own = responses.subspan(i * count, count);
-      std::fill(own.begin(), own.end(), EffectResponse{});
+      const std::span<field::EffectResponse> own = responses.subspan(i * count, count);
+      std::fill(own.begin(), own.end(), field::EffectResponse{});
       way_.respond(at[i], own);
     }
   }
@@ -91,7 +91,7 @@ std::string spoken(const FitParameter& parameter) {
 
 }  // namespace
 
-std::unique_ptr<PhysicalEffect> linearEffect(UnitResponses respond, Eigen::VectorXd values) {
+std::unique_ptr<field::PhysicalEffect> linearEffect(UnitResponses respond, Eigen::VectorXd values) {
   return std::make_unique<LinearEffect>(std::move(respond), std::move(values));
 }
 
@@ -124,4 +124,4 @@ FittedEffect described(const std::vector<FitParameter>& parameters, const Eigen:
   return fitted;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -7,13 +7,14 @@
 
 #include "calib/effects/effect_fit.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 /// Fills in what one reading answers per unit of each of an effect's linear parameters.
-using UnitResponses = std::function<void(const SensorSetting& setting, std::span<EffectResponse> responses)>;
+using UnitResponses =
+    std::function<void(const field::SensorSetting& setting, std::span<field::EffectResponse> responses)>;
 
 /// An effect that answers with the sum of its unit responses, each times its value.
-std::unique_ptr<PhysicalEffect> linearEffect(UnitResponses respond, Eigen::VectorXd values);
+std::unique_ptr<field::PhysicalEffect> linearEffect(UnitResponses respond, Eigen::VectorXd values);
 
 /// A way of fitting in which nothing is searched.
 struct LinearWay {
@@ -31,4 +32,4 @@ std::vector<FitParameter> vectorParameters(const std::string& prefix, const std:
 FittedEffect described(const std::vector<FitParameter>& parameters, const Eigen::VectorXd& values,
                        nlohmann::json scene_parameters);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,17 +1,17 @@
-#include "calib/effects/mains_interference.h"
-
 #include <cmath>
 #include <numbers>
 
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
+#include "calib/recording/line_sources.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 
-class MainsInterference final : public PhysicalEffect {
+class MainsInterference final : public field::PhysicalEffect {
  public:
   MainsInterference(std::vector<double> line_hz, std::vector<double> amplitude_per_m3, const Eigen::Vector3d& direction,
                     double phase_rad)
@@ -40,7 +40,8 @@ class MainsInterference final : public PhysicalEffect {
   double phase_rad_;
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   std::vector<double> line_hz = numbersOf(parameters, "line_hz");
   std::vector<double> amplitude_per_m3 = numbersOf(parameters, "amplitude_per_m3");
   const Eigen::Vector3d direction = vectorOf(parameters, "direction");
@@ -57,44 +58,81 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
                                              scalarOf(parameters, "phase_rad"));
 }
 
+std::string sourcesText(const std::vector<recording::LineSource>& sources) {
+  std::string text;
+  const std::size_t named = std::min<std::size_t>(sources.size(), 3);
+  for (std::size_t i = 0; i < named; ++i) text += (i == 0 ? "" : i + 1 == named ? " or " : ", ") + sources[i].name;
+  return text;
+}
+
+void addLines(const recording::SampleSpectrum& spectrum, const SignalBelief& belief,
+              std::vector<recording::GapFinding>& findings) {
+  const double resolution_hz = spectrum.rate_hz / static_cast<double>(spectrum.readings_per_stop);
+  for (const recording::SpectralLine& line : spectrum.lines) {
+    const double tolerance_hz = std::max(0.15 * resolution_hz, 3.0 * line.error_hz) + 0.002 * spectrum.rate_hz;
+    const auto sources = recording::lineSources(line.frequency_hz, spectrum.rate_hz, tolerance_hz);
+    std::string text =
+        formatted("A line at %.1f Hz of %.2g times a reading's noise", line.frequency_hz, line.amplitude_sd);
+    text += sources.empty() ? ": no alias of the mains or of a monitor, so a motor, a fan or another transmitter; "
+                            : ": " + sourcesText(sources) + ", ";
+    text += formatted("seen at %.4g readings a second.", spectrum.rate_hz);
+    const bool is_new = !sources.empty() && !belief.has_effect;
+    findings.push_back({is_new ? "mains_interference" : "", text, {}});
+  }
+}
+
+void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vector<recording::GapFinding>& findings) {
+  if (evidence.spectrum) addLines(*evidence.spectrum, belief, findings);
+}
+
 }  // namespace
 
+/// Mains wiring or a monitor whose magnetic field the receiver picks up beside the transmitter's.
+///
+/// Convention: a line of frequency f adds to the couplings, at the time t of a reading,
+///   dS_ik = amplitude d_i cos(2 pi f t + phase + 2 pi k/3),
+/// d the direction in the sensor's axes, of length 1, and k the transmitter's coil: the three are told apart one after
+/// the other within a cycle, so each meets the line at another phase. Aliasing follows from when readings are taken: at
+/// the rate fs a line shows at |f - n fs|. Where that is 0 it is a constant during a visit. Mains and tracker run on
+/// clocks of their own, so between two visits the phase is lost.
+/// @source Oppenheim and Schafer 1989, Discrete-Time Signal Processing, section 3.2 (aliasing)
 Effect mainsInterferenceEffect() {
   Effect effect;
   effect.id = "mains_interference";
   effect.label = "Mains or monitor";
   effect.source = "Aliasing: Oppenheim and Schafer 1989, Discrete-Time Signal Processing, section 3.2";
-  effect.parameters = {{"line_hz",
-                        "Hz",
-                        "list",
-                        {50.0, 150.0},
-                        0.0,
-                        1e6,
-                        "Frequencies of the lines, harmonics each for itself.",
-                        {},
-                        15.0,
-                        1000.0},
-                       {"amplitude_per_m3",
-                        "1/m^3",
-                        "list",
-                        {4.0e-4, 2.0e-4},
-                        0.0,
-                        1e6,
-                        "Of each line in the couplings, where the transmitter's are (3uu^T - 1)/r^3.",
-                        {},
-                        0.0,
-                        0.01},
-                       {"direction",
-                        "",
-                        "vector3",
-                        {1.0, 1.0, 1.0},
-                        0.0,
-                        0.0,
-                        "How strongly each coil of the receiver picks the lines up; any length.",
-                        {}},
-                       {"phase_rad", "rad", "scalar", 0.0, -100.0, 100.0, "Of every line at time 0.", {}}};
+  effect.parameters = {{.name = "line_hz",
+                        .unit = "Hz",
+                        .shape = "list",
+                        .default_value = {50.0, 150.0},
+                        .min = 0.0,
+                        .max = 1e6,
+                        .help = "Frequencies of the lines, harmonics each for itself.",
+                        .plausible_min = 15.0,
+                        .plausible_max = 1000.0},
+                       {.name = "amplitude_per_m3",
+                        .unit = "1/m^3",
+                        .shape = "list",
+                        .default_value = {4.0e-4, 2.0e-4},
+                        .min = 0.0,
+                        .max = 1e6,
+                        .help = "Of each line in the couplings, where the transmitter's are (3uu^T - 1)/r^3.",
+                        .plausible_min = 0.0,
+                        .plausible_max = 0.01},
+                       {.name = "direction",
+                        .shape = "vector3",
+                        .default_value = {1.0, 1.0, 1.0},
+                        .help = "How strongly each coil of the receiver picks the lines up; any length."},
+                       {.name = "phase_rad",
+                        .unit = "rad",
+                        .shape = "scalar",
+                        .default_value = 0.0,
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "Of every line at time 0."}};
   effect.make = make;
+  effect.detect = detect;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -10,7 +10,7 @@
 #include "calib/effects/parameters.h"
 #include "calib/field/metal_response.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -35,13 +35,13 @@ Eigen::Matrix3d matrixOf(const nlohmann::json& list) {
   return matrix;
 }
 
-double sphereOf(const nlohmann::json& parameters, const Excitation& excitation, double radius_m) {
+double sphereOf(const nlohmann::json& parameters, const field::Excitation& excitation, double radius_m) {
   const double mu_r = scalarOf(parameters, "relative_permeability");
   const bool is_ferromagnetic = isFerromagnetic(parameters);
   const nlohmann::json& conductivity = parameters.at("conductivity_s_per_m");
   if (conductivity.is_null()) return spherePolarizability_m3(radius_m, is_ferromagnetic, mu_r);
-  const Metal metal{conductivity.get<double>(), is_ferromagnetic ? mu_r : 1.0};
-  return kFourPi / 3.0 * radius_m * radius_m * radius_m * sphereSusceptibility(radius_m, metal, excitation);
+  const field::Metal metal{conductivity.get<double>(), is_ferromagnetic ? mu_r : 1.0};
+  return kFourPi / 3.0 * radius_m * radius_m * radius_m * field::sphereSusceptibility(radius_m, metal, excitation);
 }
 
 Eigen::Matrix3d tensorOf(BodyShape shape, const Eigen::VectorXd& linear) {
@@ -74,49 +74,41 @@ std::string doubtOf(double radius_m, double clearance_m) {
 }  // namespace
 
 Eigen::Matrix3d MetalBody::fieldChange_per_m3(const Eigen::Vector3d& p_sensor_m) const {
-  return dipoleField(p_sensor_m - center_m, 1.0) * polarizability_m3 * dipoleField(center_m, 1.0 / kFourPi);
+  return field::dipoleField(p_sensor_m - center_m, 1.0) * polarizability_m3 *
+         field::dipoleField(center_m, 1.0 / kFourPi);
 }
 
 std::vector<EffectParameter> bodyParameters() {
   return {
-      {"center_m",
-       "m",
-       "vector3",
-       {1.0, 0.0, -1.0},
-       -100.0,
-       100.0,
-       "Middle of the body, tracker frame.",
-       {},
-       -10.0,
-       10.0},
-      {"radius_m", "m", "scalar", 0.1, 0.001, 10.0, "Radius of a sphere that answers as the body does.", {}, 0.02, 0.5},
+      centerParameter("Middle of the body, tracker frame."),
+      {.name = "radius_m",
+       .unit = "m",
+       .shape = "scalar",
+       .default_value = 0.1,
+       .min = 0.001,
+       .max = 10.0,
+       .help = "Radius of a sphere that answers as the body does.",
+       .plausible_min = 0.02,
+       .plausible_max = 0.5},
       materialParameter(),
       permeabilityParameter(),
-      {"conductivity_s_per_m",
-       "S/m",
-       "scalar",
-       nullptr,
-       1.0,
-       1e8,
-       "Of a solid sphere: aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's "
-       "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal.",
-       {},
-       1e6,
-       6e7},
-      {"polarizability_m3",
-       "m^3",
-       "matrix3",
-       nullptr,
-       -1e4,
-       1e4,
-       "Induced moment per field, tracker axes; when given, radius, material, permeability and conductivity are "
-       "not used.",
-       {},
-       -0.8,
-       1.6}};
+      conductivityParameter(
+          "Of a solid sphere: aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's "
+          "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal."),
+      {.name = "polarizability_m3",
+       .unit = "m^3",
+       .shape = "matrix3",
+       .min = -1e4,
+       .max = 1e4,
+       .help =
+           "Induced moment per field, tracker axes; when given, radius, material, permeability and conductivity are "
+           "not used.",
+       .plausible_min = -0.8,
+       .plausible_max = 1.6}};
 }
 
-Result<MetalBody> bodyOf(const nlohmann::json& parameters, const Excitation& excitation, const std::string& effect_id) {
+Result<MetalBody> bodyOf(const nlohmann::json& parameters, const field::Excitation& excitation,
+                         const std::string& effect_id) {
   MetalBody body;
   body.center_m = vectorOf(parameters, "center_m");
   body.radius_m = scalarOf(parameters, "radius_m");
@@ -147,9 +139,9 @@ std::vector<FitParameter> polarizabilityParameters(BodyShape shape) {
 }
 
 void respondAsBody(BodyShape shape, const Eigen::Vector3d& center_m, const Eigen::Matrix3d& field_of_transmitter,
-                   const Eigen::Vector3d& p_sensor_m, std::span<EffectResponse> responses) {
-  const Eigen::Matrix3d from_body = dipoleField(p_sensor_m - center_m, 1.0);
-  for (EffectResponse& response : responses) response = {};
+                   const Eigen::Vector3d& p_sensor_m, std::span<field::EffectResponse> responses) {
+  const Eigen::Matrix3d from_body = field::dipoleField(p_sensor_m - center_m, 1.0);
+  for (field::EffectResponse& response : responses) response = {};
   if (shape == BodyShape::kSphere) {
     responses[0].field_per_m3 = from_body * field_of_transmitter;
     return;
@@ -190,4 +182,4 @@ FittedEffect describeBody(BodyShape shape, const Eigen::Vector3d& center_m, cons
   return fitted;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

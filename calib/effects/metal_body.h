@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "calib/effects/registry.h"
+#include "calib/effects/effect_row.h"
 #include "calib/effects/room_search.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 /// A compact metal body as the effects with one know it.
 struct MetalBody {
@@ -27,7 +27,8 @@ std::vector<EffectParameter> bodyParameters();
 
 /// @param effect_id stands in the message
 /// @error kBadInput when the transmitter would be inside the body
-Result<MetalBody> bodyOf(const nlohmann::json& parameters, const Excitation& excitation, const std::string& effect_id);
+Result<MetalBody> bodyOf(const nlohmann::json& parameters, const field::Excitation& excitation,
+                         const std::string& effect_id);
 
 /// The ways a body can answer: alike in all directions, or as a general symmetric tensor.
 enum class BodyShape { kSphere, kTensor };
@@ -39,11 +40,11 @@ std::vector<FitParameter> polarizabilityParameters(BodyShape shape);
 /// @param field_of_transmitter G(center; 1/(4 pi))
 /// @param responses one per linear parameter, overwritten
 void respondAsBody(BodyShape shape, const Eigen::Vector3d& center_m, const Eigen::Matrix3d& field_of_transmitter,
-                   const Eigen::Vector3d& p_sensor_m, std::span<EffectResponse> responses);
+                   const Eigen::Vector3d& p_sensor_m, std::span<field::EffectResponse> responses);
 
 /// A fitted body in scene parameters, with its material from the sign of its polarizability.
 /// @param linear in the order of polarizabilityParameters
 FittedEffect describeBody(BodyShape shape, const Eigen::Vector3d& center_m, const Eigen::VectorXd& linear,
                           const RoomSearch& search);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,14 +1,17 @@
-#include "calib/effects/metal_moved.h"
-
 #include <algorithm>
 #include <numbers>
 
 #include "calib/effects/metal_body.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
+
+/// A body that is there for part of the time only is also freer to fit what a standing one leaves over; it has to win
+/// by this share of what it explains.
+constexpr double kShareForMoved = 0.06;
 
 constexpr double kFourPi = 4.0 * std::numbers::pi;
 /// A change that fewer readings than this on one side of it speak for is not looked for.
@@ -20,7 +23,7 @@ bool isPresent(Presence presence, double change_s, double time_s) {
   return presence == Presence::kAfter ? time_s >= change_s : time_s < change_s;
 }
 
-class MetalMoved final : public CouplingDistortion {
+class MetalMoved final : public field::CouplingDistortion {
  public:
   MetalMoved(const MetalBody& body, double change_s, Presence presence)
       : body_(body), change_s_(change_s), presence_(presence) {}
@@ -41,7 +44,8 @@ class MetalMoved final : public CouplingDistortion {
   Presence presence_;
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& excitation) {
   const Result<MetalBody> body = bodyOf(parameters, excitation, "metal_moved");
   if (!body) return tl::unexpected<Error>(body.error());
   const Presence presence = parameters.at("present") == "after" ? Presence::kAfter : Presence::kBefore;
@@ -52,7 +56,7 @@ class MetalMovedFit final : public EffectFit {
  public:
   MetalMovedFit(const FitDesign& design, BodyShape shape, Presence presence)
       : search_(design), shape_(shape), presence_(presence), start_s_(design.start_s), end_s_(design.end_s) {
-    for (const SensorSetting& setting : design.settings) times_s_.push_back(setting.time_s);
+    for (const field::SensorSetting& setting : design.settings) times_s_.push_back(setting.time_s);
     std::sort(times_s_.begin(), times_s_.end());
   }
 
@@ -61,6 +65,7 @@ class MetalMovedFit final : public EffectFit {
     return presence_ == Presence::kAfter ? shape : shape + " before";
   }
 
+  bool searchesPlace() const override { return true; }
   std::vector<FitParameter> searched() const override {
     std::vector<FitParameter> parameters = search_.centerParameters();
     parameters.push_back({"change_s", "s", start_s_, end_s_});
@@ -89,17 +94,17 @@ class MetalMovedFit final : public EffectFit {
     return searched[3] > start_s_ && searched[3] < end_s_ && share >= kLeastShare && share <= 1.0 - kLeastShare;
   }
 
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
-               std::span<EffectResponse> responses) const override {
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<field::EffectResponse> responses) const override {
     const Eigen::Vector3d center_m = searched.head<3>();
-    const Eigen::Matrix3d field_of_transmitter = dipoleField(center_m, 1.0 / kFourPi);
+    const Eigen::Matrix3d field_of_transmitter = field::dipoleField(center_m, 1.0 / kFourPi);
     const std::size_t count = shape_ == BodyShape::kSphere ? 1 : 6;
     for (std::size_t i = 0; i < at.size(); ++i) {
       const auto own = responses.subspan(i * count, count);
       if (isPresent(presence_, searched[3], at[i].time_s)) {
         respondAsBody(shape_, center_m, field_of_transmitter, at[i].tracker_from_sensor.position_m, own);
       } else {
-        std::fill(own.begin(), own.end(), EffectResponse{});
+        std::fill(own.begin(), own.end(), field::EffectResponse{});
       }
     }
   }
@@ -141,33 +146,38 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// A compact metal body that is in the room only from a time on, or only until then: a chair, a tool, a trolley.
+///
+/// While it is there it answers as `compact_metal` does; at other times it does nothing. Only a recording in which the
+/// places were not all visited on one side of the change, and whose times are stated, can show it.
+/// @source Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709 (the body)
 Effect metalMovedEffect() {
   Effect effect;
   effect.id = "metal_moved";
   effect.label = "Metal that came or went";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; sphere: Wait 1951, Geophysics 16 666";
   effect.parameters = bodyParameters();
-  effect.parameters.push_back({"change_s",
-                               "s",
-                               "scalar",
-                               0.0,
-                               0.0,
-                               1e6,
-                               "When it came or went, from the start of the session.",
-                               {},
-                               0.0,
-                               36000.0});
-  effect.parameters.push_back({"present",
-                               "",
-                               "text",
-                               "after",
-                               0.0,
-                               0.0,
-                               "Whether it stands there `after` the change, having come, or `before` it, having gone.",
-                               {"after", "before"}});
+  effect.parameters.push_back({.name = "change_s",
+                               .unit = "s",
+                               .shape = "scalar",
+                               .default_value = 0.0,
+                               .min = 0.0,
+                               .max = 1e6,
+                               .help = "When it came or went, from the start of the session.",
+                               .plausible_min = 0.0,
+                               .plausible_max = 36000.0});
+  effect.parameters.push_back(
+      {.name = "present",
+       .shape = "text",
+       .default_value = "after",
+       .help = "Whether it stands there `after` the change, having come, or `before` it, having gone.",
+       .choices = {"after", "before"}});
   effect.make = make;
   effect.fits = fits;
+  effect.body = ballOf;
+  effect.acts_in_time = true;
+  effect.share_to_win = kShareForMoved;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,23 +1,22 @@
-#include "calib/effects/metal_plane.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "calib/core/file_io.h"
 #include "calib/effects/parameters.h"
 #include "calib/effects/room_search.h"
+#include "calib/effects/rows.h"
 #include "calib/field/plane_images.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
-class MetalPlane final : public CouplingDistortion {
+class MetalPlane final : public field::CouplingDistortion {
  public:
   /// @param toward unit, from the transmitter straight to the plane
   /// @param images of the transmitter; 1 is that of a perfect conductor, -(mu_r - 1)/(mu_r + 1) of a permeable
   /// half-space
-  MetalPlane(const Eigen::Vector3d& toward, double distance_m, std::vector<PlaneImage> images)
+  MetalPlane(const Eigen::Vector3d& toward, double distance_m, std::vector<field::PlaneImage> images)
       : toward_(toward),
         distance_m_(distance_m),
         images_(std::move(images)),
@@ -26,9 +25,9 @@ class MetalPlane final : public CouplingDistortion {
   Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
                               double /*time_s*/) const override {
     Eigen::Matrix3d field = Eigen::Matrix3d::Zero();
-    for (const PlaneImage& image : images_) {
+    for (const field::PlaneImage& image : images_) {
       const Eigen::Vector3d from_image_m = p_sensor_m - (2.0 * distance_m_ + image.deeper_m) * toward_;
-      field += dipoleField(from_image_m, image.strength * dipole_constant_m3);
+      field += field::dipoleField(from_image_m, image.strength * dipole_constant_m3);
     }
     return field * mirror_;
   }
@@ -38,22 +37,23 @@ class MetalPlane final : public CouplingDistortion {
  private:
   Eigen::Vector3d toward_;
   double distance_m_;
-  std::vector<PlaneImage> images_;
+  std::vector<field::PlaneImage> images_;
   Eigen::Matrix3d mirror_;  ///< Moment of a perfect conductor's image per moment of the transmitter.
 };
 
 /// The images of a plane of full strength.
-std::vector<PlaneImage> imagesOf(const nlohmann::json& parameters, const Excitation& excitation) {
+std::vector<field::PlaneImage> imagesOf(const nlohmann::json& parameters, const field::Excitation& excitation) {
   const bool is_ferromagnetic = isFerromagnetic(parameters);
   const double mu_r = is_ferromagnetic ? scalarOf(parameters, "relative_permeability") : 1.0;
   const nlohmann::json& conductivity = parameters.at("conductivity_s_per_m");
   if (conductivity.is_null()) return {{0.0, is_ferromagnetic ? -(mu_r - 1.0) / (mu_r + 1.0) : 1.0}};
   const nlohmann::json& thickness = parameters.at("thickness_m");
   const std::optional<double> thickness_m = thickness.is_null() ? std::nullopt : std::optional(thickness.get<double>());
-  return planeImages({conductivity.get<double>(), mu_r}, thickness_m, excitation);
+  return field::planeImages({conductivity.get<double>(), mu_r}, thickness_m, excitation);
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& excitation) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& excitation) {
   const Eigen::Vector3d toward = vectorOf(parameters, "toward");
   if (toward.norm() < 1e-6) {
     return fail(ErrorCode::kBadInput, "metal_plane: toward is " + textOf(toward) +
@@ -63,8 +63,8 @@ Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, c
     return fail(ErrorCode::kBadInput,
                 "metal_plane: thickness_m is given and conductivity_s_per_m is not; a plane of real metal needs both.");
   }
-  std::vector<PlaneImage> images = imagesOf(parameters, excitation);
-  for (PlaneImage& image : images) image.strength *= scalarOf(parameters, "strength");
+  std::vector<field::PlaneImage> images = imagesOf(parameters, excitation);
+  for (field::PlaneImage& image : images) image.strength *= scalarOf(parameters, "strength");
   return std::make_unique<MetalPlane>(toward.normalized(), scalarOf(parameters, "distance_m"), std::move(images));
 }
 
@@ -108,9 +108,9 @@ class MetalPlaneFit final : public EffectFit {
            searched[2] <= kFarthest_m;
   }
 
-  void respond(std::span<const SensorSetting> at, const Eigen::VectorXd& searched,
-               std::span<EffectResponse> responses) const override {
-    const MetalPlane plane(chart_.direction(searched[0], searched[1]), searched[2], {PlaneImage{}});
+  void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
+               std::span<field::EffectResponse> responses) const override {
+    const MetalPlane plane(chart_.direction(searched[0], searched[1]), searched[2], {field::PlaneImage{}});
     for (std::size_t i = 0; i < at.size(); ++i) responses[i] = plane.at(at[i]);
   }
 
@@ -153,58 +153,62 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// A flat metal floor, wall or ceiling much larger than the distances: an image of the transmitter stands behind it.
+///
+/// A dipole m in front of the plane has the image I m at the mirrored point. A perfect conductor lets no field through
+/// it (normal field zero on it): I = 1 - 2nn^T. A permeable half-space: I = -(mu_r - 1)/(mu_r + 1) (1 - 2nn^T), in the
+/// limit with the tangential field zero on it. With the image at b
+///   dG = strength G(p - b; C) I.
+/// A plane of given conductivity, and thickness unless it is solid, has several images further behind it, which
+/// together reflect as the tracker's carrier or sampling delay makes it (calib/field/plane_images.h). Edges are not
+/// modelled and planes do not mirror each other.
+/// @source Jackson 1999, Classical Electrodynamics, problem 5.17 (images in a permeable half-space); perfect conductor:
+/// the same with mu_r -> 0; sheet: Saslow 1992, Am. J. Phys. 60 693
 Effect metalPlaneEffect() {
   Effect effect;
   effect.id = "metal_plane";
   effect.label = "Metal floor, wall or ceiling";
   effect.source = "Jackson 1999, Classical Electrodynamics, problem 5.17 (method of images)";
   effect.parameters = {
-      {"toward",
-       "",
-       "vector3",
-       {0.0, 0.0, -1.0},
-       0.0,
-       0.0,
-       "Direction from the transmitter straight to the plane, tracker frame; any length.",
-       {}},
-      {"distance_m", "m", "scalar", 1.5, 0.05, 100.0, "From the transmitter to the plane.", {}, 0.3, 5.0},
+      {.name = "toward",
+       .shape = "vector3",
+       .default_value = {0.0, 0.0, -1.0},
+       .help = "Direction from the transmitter straight to the plane, tracker frame; any length."},
+      {.name = "distance_m",
+       .unit = "m",
+       .shape = "scalar",
+       .default_value = 1.5,
+       .min = 0.05,
+       .max = 100.0,
+       .help = "From the transmitter to the plane.",
+       .plausible_min = 0.3,
+       .plausible_max = 5.0},
       materialParameter(),
       permeabilityParameter(),
-      {"conductivity_s_per_m",
-       "S/m",
-       "scalar",
-       nullptr,
-       1.0,
-       1e8,
-       "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's carrier "
-       "or sampling delay decides how the plane reflects; null is an ideal metal.",
-       {},
-       1e6,
-       6e7},
-      {"thickness_m",
-       "m",
-       "scalar",
-       nullptr,
-       1e-6,
-       10.0,
-       "Of a sheet of that conductivity; null is a solid metal without end.",
-       {},
-       1e-5,
-       0.05},
-      {"strength",
-       "",
-       "scalar",
-       1.0,
-       0.0,
-       100.0,
-       "Share of such a plane's image; below 1 for mesh, reinforcement or panels with gaps. No real "
-       "plane has more than 1.",
-       {},
-       0.0,
-       1.0}};
+      conductivityParameter(
+          "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's carrier "
+          "or sampling delay decides how the plane reflects; null is an ideal metal."),
+      {.name = "thickness_m",
+       .unit = "m",
+       .shape = "scalar",
+       .min = 1e-6,
+       .max = 10.0,
+       .help = "Of a sheet of that conductivity; null is a solid metal without end.",
+       .plausible_min = 1e-5,
+       .plausible_max = 0.05},
+      {.name = "strength",
+       .shape = "scalar",
+       .default_value = 1.0,
+       .min = 0.0,
+       .max = 100.0,
+       .help = "Share of such a plane's image; below 1 for mesh, reinforcement or panels with gaps. No real "
+               "plane has more than 1.",
+       .plausible_min = 0.0,
+       .plausible_max = 1.0}};
   effect.make = make;
   effect.fits = fits;
+  effect.body = planeOf;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -6,7 +6,7 @@
 
 #include "calib/core/file_io.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -173,4 +173,4 @@ Result<void> ObjectReader::finish() const {
   return {};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -10,7 +10,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 /// The known name that takes the fewest single-letter changes (Levenshtein 1966), or of which only the end is missing;
 /// empty when none is known.
@@ -63,4 +63,4 @@ class ObjectReader {
   std::optional<Error> error_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

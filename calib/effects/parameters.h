@@ -5,14 +5,19 @@
 #include <string>
 #include <vector>
 
-#include "calib/effects/registry.h"
+#include "calib/effects/effect_row.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 /// What metal does to a quasi-static field: as a conductor it keeps the field out, as a ferromagnet it draws it in.
 EffectParameter materialParameter();
 /// Used only where the material is ferromagnetic.
 EffectParameter permeabilityParameter();
+
+/// Where a body in the room stands. @param help a sentence
+EffectParameter centerParameter(std::string help);
+/// Null is an ideal metal. @param help a sentence
+EffectParameter conductivityParameter(std::string help);
 
 /// Typed access to resolved parameters.
 double scalarOf(const nlohmann::json& parameters, const std::string& name);
@@ -26,4 +31,4 @@ nlohmann::json listOf(const Eigen::Vector3d& v);
 /// "(1, 0, -0.5)"
 std::string textOf(const Eigen::Vector3d& v);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -1,17 +1,19 @@
-#include "calib/effects/quantization.h"
-
 #include <algorithm>
 
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
-class Quantization final : public PhysicalEffect {
+/// Share of a reading's variance above which the lattice is felt.
+constexpr double kSmallestShare = 0.1;
+
+class Quantization final : public field::PhysicalEffect {
  public:
   Quantization(double quantum_m, double quantum_rad) : quantum_m_(quantum_m), quantum_rad_(quantum_rad) {}
-  void disturb(SignalModel& signal) const override {
+  void disturb(field::SignalModel& signal) const override {
     signal.quantum_m = std::max(signal.quantum_m, quantum_m_);
     signal.quantum_rad = std::max(signal.quantum_rad, quantum_rad_);
   }
@@ -21,22 +23,66 @@ class Quantization final : public PhysicalEffect {
   double quantum_rad_;
 };
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   return std::make_unique<Quantization>(scalarOf(parameters, "quantum_m"), scalarOf(parameters, "quantum_rad"));
+}
+
+std::string stepText(double quantum_m) { return formatted("%.3g mm", 1000.0 * quantum_m); }
+
+void addLattice(const recording::ReadingLattice& lattice, const SignalBelief& belief, const PlaceNames& names,
+                std::vector<recording::GapFinding>& findings) {
+  const bool is_felt = lattice.share >= kSmallestShare || 5 * lattice.biased.size() >= lattice.stops;
+  if (!is_felt) return;
+  const bool is_known = lattice.quantum_m < 1.2 * belief.signal.quantum_m;
+  if (is_known && lattice.biased.empty()) return;
+  std::string text = "Positions are reported in steps of " + stepText(lattice.quantum_m) +
+                     formatted(", %.0f %% of the variance of a reading", 100.0 * lattice.share);
+  if (!lattice.biased.empty()) {
+    text += "; at " + names.list(lattice.biased) +
+            " the noise is below half a step, so averaging does not remove the rounding";
+  }
+  findings.push_back({is_known ? "" : "quantization", text + ".", is_known ? std::vector<int>() : lattice.biased});
+}
+
+void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vector<recording::GapFinding>& findings) {
+  if (evidence.lattice) addLattice(*evidence.lattice, belief, evidence.names, findings);
 }
 
 }  // namespace
 
+/// Readings reported in coarse steps: ASCII with few digits, short binary words.
+///
+/// Convention: each component of the position is rounded to a multiple of quantum_m, each component of the rotation
+/// vector to a multiple of quantum_rad. The coarser of this and the tracker's own step holds. Where the noise is more
+/// than half a step the error is uniform, SD step/sqrt(12); below, the mean of a place is biased.
+/// @source Widrow and Kollar 2008, Quantization Noise
 Effect quantizationEffect() {
   Effect effect;
   effect.id = "quantization";
   effect.label = "Coarse steps";
   effect.source = "Widrow and Kollar 2008, Quantization Noise";
-  effect.parameters = {
-      {"quantum_m", "m", "scalar", 0.00127, 0.0, 1.0, "Step of reported positions; 0 = none.", {}, 0.0, 0.01},
-      {"quantum_rad", "rad", "scalar", 0.0, 0.0, 1.0, "Step of reported rotation vectors; 0 = none.", {}, 0.0, 0.02}};
+  effect.parameters = {{.name = "quantum_m",
+                        .unit = "m",
+                        .shape = "scalar",
+                        .default_value = 0.00127,
+                        .min = 0.0,
+                        .max = 1.0,
+                        .help = "Step of reported positions; 0 = none.",
+                        .plausible_min = 0.0,
+                        .plausible_max = 0.01},
+                       {.name = "quantum_rad",
+                        .unit = "rad",
+                        .shape = "scalar",
+                        .default_value = 0.0,
+                        .min = 0.0,
+                        .max = 1.0,
+                        .help = "Step of reported rotation vectors; 0 = none.",
+                        .plausible_min = 0.0,
+                        .plausible_max = 0.02}};
   effect.make = make;
+  effect.detect = detect;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

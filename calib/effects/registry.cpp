@@ -1,18 +1,17 @@
 // To add an effect:
-// 1. Write calib/effects/<id>.h and <id>.cpp: a PhysicalEffect (a CouplingDistortion where it is metal in the room),
-// and
-//    a function that returns its Effect row. The header states the formula, its convention and its source.
+// 1. Write calib/effects/<id>.cpp: a PhysicalEffect (a CouplingDistortion where it is metal in the room), and a
+//    function that returns its Effect row, declared in rows.h. Its comment states formula, convention and source.
 // 2. Give every parameter a name that ends in its unit, a shape, a range, a default, one sentence of help and, where
-// one
-//    is known, the range met in practice. `make` receives them resolved; it only refuses what makes no sense together.
+//    one is known, the range met in practice. `make` receives them resolved; it only refuses what makes no sense
+//    together.
 // 3. Say in `admits` where a sensor cannot be.
 // 4. Write `fits` (effect_fit.h): the ways it is looked for in a recording. Where nothing is searched, linear_fit.h
-// makes
-//    both the effect and its ways from one function. Null where only the raw samples show it.
+//    makes both the effect and its ways from one function. Null where only the raw samples show it.
 // 5. Add the row to the table below and its defaults to resources/scenes/example.scene.json. Scenes, command line,
 //    diagnosis, reports and the contract tests (tests/calib/effects/effect_registry_test.cpp,
 //    effect_fit_contract_test.cpp) loop over it.
-// 6. Test the physics in tests/calib/effects/<id>_test.cpp against a boundary condition, a limit or a published figure.
+// 6. Test the physics in tests/calib/effects/<id>_test.cpp against a boundary condition, a limit or a published
+//    figure.
 
 #include "calib/effects/registry.h"
 
@@ -22,28 +21,12 @@
 
 #include "calib/core/file_io.h"
 #include "calib/effects/closed_loop.h"
-#include "calib/effects/coil_gain.h"
-#include "calib/effects/coil_nonorthogonality.h"
 #include "calib/effects/compact_metal.h"
-#include "calib/effects/correlated_samples.h"
-#include "calib/effects/finite_coil.h"
-#include "calib/effects/finite_plate.h"
-#include "calib/effects/gain_drift.h"
-#include "calib/effects/global_gain.h"
-#include "calib/effects/grid_scale.h"
-#include "calib/effects/hemisphere_flip.h"
-#include "calib/effects/jig_layer_offset.h"
-#include "calib/effects/jig_tilt.h"
-#include "calib/effects/mains_interference.h"
-#include "calib/effects/metal_moved.h"
-#include "calib/effects/metal_plane.h"
+#include "calib/effects/effect_row.h"
 #include "calib/effects/object_reader.h"
-#include "calib/effects/quantization.h"
-#include "calib/effects/range_noise.h"
-#include "calib/effects/sensor_offset.h"
-#include "calib/effects/transmitter_misalignment.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -155,6 +138,11 @@ Result<const Effect*> findEffect(std::string_view id) {
   return fail(ErrorCode::kBadInput, "Effect " + unknownName(id, known));
 }
 
+std::string labelOf(const std::string& id) {
+  const auto effect = findEffect(id);
+  return effect ? (*effect)->label : id;
+}
+
 Result<nlohmann::json> resolveEffectParameters(const Effect& effect, const nlohmann::json& given) {
   if (given.is_null()) return resolveEffectParameters(effect, nlohmann::json::object());
   if (!given.is_object()) {
@@ -182,8 +170,8 @@ Result<nlohmann::json> resolveEffectParameters(const Effect& effect, const nlohm
   return resolved;
 }
 
-Result<std::unique_ptr<PhysicalEffect>> makeEffect(std::string_view id, const nlohmann::json& given,
-                                                   const Excitation& excitation) {
+Result<std::unique_ptr<field::PhysicalEffect>> makeEffect(std::string_view id, const nlohmann::json& given,
+                                                          const field::Excitation& excitation) {
   const Result<const Effect*> effect = findEffect(id);
   if (!effect) return tl::unexpected<Error>(effect.error());
   const Result<nlohmann::json> parameters = resolveEffectParameters(**effect, given);
@@ -201,4 +189,4 @@ nlohmann::json toJson(std::span<const Effect> rows) {
   return list;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
@@ -22,7 +22,7 @@ bool isOnSurface(const Eigen::Vector3i& at, const Eigen::Vector3i& counts) {
 }  // namespace
 
 RoomSearch::RoomSearch(const FitDesign& design) : box_m_(design.places_m) {
-  for (const SensorSetting& setting : design.settings) {
+  for (const field::SensorSetting& setting : design.settings) {
     places_m_.push_back(setting.tracker_from_sensor.position_m);
     box_m_.extend(places_m_.back());
   }
@@ -130,4 +130,4 @@ Eigen::VectorXd joined(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return both;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -6,7 +6,7 @@
 
 #include "calib/effects/effect_fit.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 /// Where a fit may look for a thing that stands in the room: around the places of the sensor and about the
 /// transmitter, never on one of them.
@@ -68,4 +68,4 @@ class DirectionChart {
 /// A searched vector from its parts.
 Eigen::VectorXd joined(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

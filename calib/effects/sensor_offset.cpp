@@ -1,26 +1,25 @@
-#include "calib/effects/sensor_offset.h"
-
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kPlausible_m = 0.2;
 constexpr double kPlausible_rad = 0.2;
 
-void offsetResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+void offsetResponses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   const Eigen::Matrix3d R = setting.tracker_from_sensor.orientation.toRotationMatrix();
   for (int axis = 0; axis < 3; ++axis) responses[static_cast<std::size_t>(axis)].shift_m = R.col(axis);
 }
 
-void turnResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+void turnResponses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   const Eigen::Matrix3d R = setting.tracker_from_sensor.orientation.toRotationMatrix();
   for (int axis = 0; axis < 3; ++axis) responses[static_cast<std::size_t>(axis)].turn_rad = R.col(axis);
 }
 
-void allResponses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+void allResponses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   offsetResponses(setting, responses.first(3));
   turnResponses(setting, responses.subspan(3));
 }
@@ -29,7 +28,8 @@ nlohmann::json sceneParameters(const Eigen::Vector3d& offset_m, const Eigen::Vec
   return {{"offset_m", listOf(offset_m)}, {"turn_rad", listOf(turn_rad)}};
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   Eigen::VectorXd values(6);
   values << vectorOf(parameters, "offset_m"), vectorOf(parameters, "turn_rad");
   return linearEffect(allResponses, std::move(values));
@@ -56,34 +56,38 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// A sensor whose magnetic centre is not where the rig says, or that is mounted turned.
+///
+/// Convention: with o and w in the sensor's frame and R = tracker_from_sensor as stated, the centre is really at p + R
+/// o and the orientation R exp(w). With one orientation the first is the same as a shift of the transmitter; where the
+/// alignment is unknown a constant mounting rotation is a part of it.
+/// @source Tsai and Lenz 1989, IEEE Trans. RA-5 345 (sensor to mount transform)
 Effect sensorOffsetEffect() {
   Effect effect;
   effect.id = "sensor_offset";
   effect.label = "Sensor off its mark";
   effect.source = "Tsai and Lenz 1989, IEEE Trans. RA-5 345";
-  effect.parameters = {{"offset_m",
-                        "m",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "From the point the rig states to the sensor's magnetic centre, sensor frame.",
-                        {},
-                        -kPlausible_m,
-                        kPlausible_m},
-                       {"turn_rad",
-                        "rad",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "Rotation vector from the stated mounting to the real one, sensor frame.",
-                        {},
-                        -kPlausible_rad,
-                        kPlausible_rad}};
+  effect.parameters = {{.name = "offset_m",
+                        .unit = "m",
+                        .shape = "vector3",
+                        .default_value = {0.0, 0.0, 0.0},
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "From the point the rig states to the sensor's magnetic centre, sensor frame.",
+                        .plausible_min = -kPlausible_m,
+                        .plausible_max = kPlausible_m},
+                       {.name = "turn_rad",
+                        .unit = "rad",
+                        .shape = "vector3",
+                        .default_value = {0.0, 0.0, 0.0},
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "Rotation vector from the stated mounting to the real one, sensor frame.",
+                        .plausible_min = -kPlausible_rad,
+                        .plausible_max = kPlausible_rad}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

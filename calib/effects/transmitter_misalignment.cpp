@@ -1,16 +1,15 @@
-#include "calib/effects/transmitter_misalignment.h"
-
 #include "calib/effects/linear_fit.h"
 #include "calib/effects/parameters.h"
+#include "calib/effects/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::effects {
 
 namespace {
 
 constexpr double kPlausible_m = 0.2;
 constexpr double kPlausible_rad = 0.2;
 
-void responses(const SensorSetting& setting, std::span<EffectResponse> responses) {
+void responses(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) {
   const Eigen::Vector3d& p_m = setting.tracker_from_sensor.position_m;
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
@@ -20,7 +19,8 @@ void responses(const SensorSetting& setting, std::span<EffectResponse> responses
   }
 }
 
-Result<std::unique_ptr<PhysicalEffect>> make(const nlohmann::json& parameters, const Excitation& /*excitation*/) {
+Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
+                                                    const field::Excitation& /*excitation*/) {
   Eigen::VectorXd values(6);
   values << vectorOf(parameters, "shift_m"), vectorOf(parameters, "turn_rad");
   return linearEffect(responses, std::move(values));
@@ -40,34 +40,37 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 }  // namespace
 
+/// A transmitter that does not stand where the rig says.
+///
+/// Convention: it is shifted by d and turned by the rotation vector w, both in the frame of the transmitter as stated.
+/// Seen from the real transmitter a sensor at p then stands, to first order, at p - d - w x p and is turned by -w.
+/// @source Horn 1987, J. Opt. Soc. Am. A 4 629 (rigid transform); first order by hand
 Effect transmitterMisalignmentEffect() {
   Effect effect;
   effect.id = "transmitter_misalignment";
   effect.label = "Transmitter out of place";
   effect.source = "Horn 1987, J. Opt. Soc. Am. A 4 629";
-  effect.parameters = {{"shift_m",
-                        "m",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "From where the rig says to where it stands, frame of the transmitter as stated.",
-                        {},
-                        -kPlausible_m,
-                        kPlausible_m},
-                       {"turn_rad",
-                        "rad",
-                        "vector3",
-                        {0.0, 0.0, 0.0},
-                        -100.0,
-                        100.0,
-                        "Small rotation vector from the stated orientation to the real one, same frame.",
-                        {},
-                        -kPlausible_rad,
-                        kPlausible_rad}};
+  effect.parameters = {{.name = "shift_m",
+                        .unit = "m",
+                        .shape = "vector3",
+                        .default_value = {0.0, 0.0, 0.0},
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "From where the rig says to where it stands, frame of the transmitter as stated.",
+                        .plausible_min = -kPlausible_m,
+                        .plausible_max = kPlausible_m},
+                       {.name = "turn_rad",
+                        .unit = "rad",
+                        .shape = "vector3",
+                        .default_value = {0.0, 0.0, 0.0},
+                        .min = -100.0,
+                        .max = 100.0,
+                        .help = "Small rotation vector from the stated orientation to the real one, same frame.",
+                        .plausible_min = -kPlausible_rad,
+                        .plausible_max = kPlausible_rad}};
   effect.make = make;
   effect.fits = fits;
   return effect;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::effects

@@ -2,19 +2,24 @@
 
 #include <algorithm>
 
-namespace fieldtrue {
+#include "calib/calibration/alignment.h"
+#include "calib/correctors/base/method.h"
+
+namespace fieldtrue::evaluation {
 namespace {
 
 constexpr double kDegreesPerRadian = 57.29577951308232;
 
-RowScore positionScore(const Eigen::Vector3d& p_corrected_m, const Node& node, const Alignment& alignment) {
+RowScore positionScore(const Eigen::Vector3d& p_corrected_m, const Node& node,
+                       const calibration::Alignment& alignment) {
   RowScore score;
   score.residual_m = alignment.reference_from_tracker * p_corrected_m - node.reference_from_sensor.position_m;
   score.error = 1000.0 * score.residual_m.norm();
   return score;
 }
 
-RowScore orientationScore(const Eigen::Quaterniond& q_corrected, const Node& node, const Alignment& alignment) {
+RowScore orientationScore(const Eigen::Quaterniond& q_corrected, const Node& node,
+                          const calibration::Alignment& alignment) {
   const Eigen::Quaterniond reference_from_mount =
       alignment.reference_from_tracker.orientation * q_corrected * alignment.sensor_from_mount;
   RowScore score;
@@ -22,7 +27,7 @@ RowScore orientationScore(const Eigen::Quaterniond& q_corrected, const Node& nod
   return score;
 }
 
-RowScore scoreOf(const PositionModel& model, const Node& node, const Alignment& alignment) {
+RowScore scoreOf(const correctors::PositionModel& model, const Node& node, const calibration::Alignment& alignment) {
   const Eigen::Vector3d& p_tracked_m = node.tracker_from_sensor.position_m;
   const bool covered = model.covers(p_tracked_m);
   const Eigen::Vector3d p_true_m = covered ? p_tracked_m + model.displacement_m(p_tracked_m) : p_tracked_m;
@@ -31,7 +36,7 @@ RowScore scoreOf(const PositionModel& model, const Node& node, const Alignment& 
   return score;
 }
 
-RowScore scoreOf(const OrientationModel& model, const Node& node, const Alignment& alignment) {
+RowScore scoreOf(const correctors::OrientationModel& model, const Node& node, const calibration::Alignment& alignment) {
   const Pose& tracked = node.tracker_from_sensor;
   const bool covered = model.covers(tracked.position_m);
   const Eigen::Quaterniond q_true =
@@ -41,28 +46,29 @@ RowScore scoreOf(const OrientationModel& model, const Node& node, const Alignmen
   return score;
 }
 
-double evaluateOnce(const PositionModel& model, const Pose& tracked) {
+double evaluateOnce(const correctors::PositionModel& model, const Pose& tracked) {
   return model.displacement_m(tracked.position_m).x();
 }
 
-double evaluateOnce(const OrientationModel& model, const Pose& tracked) {
+double evaluateOnce(const correctors::OrientationModel& model, const Pose& tracked) {
   return model.correct(tracked.position_m, tracked.orientation).w();
 }
 
 template <class Model>
 FittedCandidate fittedCandidate(std::unique_ptr<Model> owned) {
   const std::shared_ptr<const Model> model = std::move(owned);
-  return {[model](const Node& node, const Alignment& alignment) { return scoreOf(*model, node, alignment); },
-          [model](const Node& node) {
-            return model->covers(node.tracker_from_sensor.position_m) ? evaluateOnce(*model, node.tracker_from_sensor)
-                                                                      : 0.0;
-          },
-          model->note()};
+  return {
+      [model](const Node& node, const calibration::Alignment& alignment) { return scoreOf(*model, node, alignment); },
+      [model](const Node& node) {
+        return model->covers(node.tracker_from_sensor.position_m) ? evaluateOnce(*model, node.tracker_from_sensor)
+                                                                  : 0.0;
+      },
+      model->note()};
 }
 
 template <class Model>
-FitWithout fitWithout(std::unique_ptr<HoldOutFits<Model>> owned) {
-  const std::shared_ptr<const HoldOutFits<Model>> fits = std::move(owned);
+FitWithout fitWithout(std::unique_ptr<correctors::HoldOutFits<Model>> owned) {
+  const std::shared_ptr<const correctors::HoldOutFits<Model>> fits = std::move(owned);
   return [fits](std::span<const std::size_t> rows, const Pose& fold_from_data) {
     return fits->without(rows, fold_from_data).map(fittedCandidate<Model>);
   };
@@ -74,31 +80,32 @@ bool isAuto(const SettingValue& value) {
 }
 
 template <class Model>
-Candidate makeCandidate(const CorrectionMethod<Model>& method, Settings settings) {
+Candidate makeCandidate(const correctors::CorrectionMethod<Model>& method, Settings settings) {
   Candidate candidate;
   candidate.id = method.id;
   candidate.settings = settings;
-  candidate.is_position = std::is_same_v<Model, PositionModel>;
+  candidate.is_position = std::is_same_v<Model, correctors::PositionModel>;
   candidate.most_folds = method.most_folds;
   candidate.chooses_settings =
       std::any_of(settings.begin(), settings.end(), [](const auto& setting) { return isAuto(setting.second); });
   if (method.hold_out)
-    candidate.hold_out = [&method, settings](const FitData& data, const RunControl& control) {
+    candidate.hold_out = [&method, settings](const correctors::FitData& data, const RunControl& control) {
       return method.hold_out(data, settings, control).map(fitWithout<Model>);
     };
-  candidate.fit = [&method, settings = std::move(settings)](const FitData& data, const RunControl& control) {
+  candidate.fit = [&method, settings = std::move(settings)](const correctors::FitData& data,
+                                                            const RunControl& control) {
     return method.fit(data, settings, control).map(fittedCandidate<Model>);
   };
   return candidate;
 }
 
 template <class Model>
-Result<std::vector<Candidate>> makeCandidates(const std::vector<MethodText>& methods,
-                                              std::span<const CorrectionMethod<Model>> registry,
-                                              Result<const CorrectionMethod<Model>*> (*find)(std::string_view)) {
+Result<std::vector<Candidate>> makeCandidates(
+    const std::vector<MethodText>& methods, std::span<const correctors::CorrectionMethod<Model>> registry,
+    Result<const correctors::CorrectionMethod<Model>*> (*find)(std::string_view)) {
   std::vector<MethodText> wanted = methods;
   if (wanted.empty())
-    for (const CorrectionMethod<Model>& method : registry) wanted.push_back({method.id, {}});
+    for (const correctors::CorrectionMethod<Model>& method : registry) wanted.push_back({method.id, {}});
   std::vector<Candidate> candidates;
   for (const MethodText& text : wanted) {
     const auto method = find(text.id);
@@ -113,19 +120,21 @@ Result<std::vector<Candidate>> makeCandidates(const std::vector<MethodText>& met
 }  // namespace
 
 Result<std::vector<Candidate>> positionCandidates(const std::vector<MethodText>& methods) {
-  return makeCandidates<PositionModel>(methods, positionMethods(), findPositionMethod);
+  return makeCandidates<correctors::PositionModel>(methods, correctors::positionMethods(),
+                                                   correctors::findPositionMethod);
 }
 
 Result<std::vector<Candidate>> orientationCandidates(const std::vector<MethodText>& methods) {
-  return makeCandidates<OrientationModel>(methods, orientationMethods(), findOrientationMethod);
+  return makeCandidates<correctors::OrientationModel>(methods, correctors::orientationMethods(),
+                                                      correctors::findOrientationMethod);
 }
 
-RowScore alignedPositionScore(const Node& node, const Alignment& alignment) {
+RowScore alignedPositionScore(const Node& node, const calibration::Alignment& alignment) {
   return positionScore(node.tracker_from_sensor.position_m, node, alignment);
 }
 
-RowScore alignedOrientationScore(const Node& node, const Alignment& alignment) {
+RowScore alignedOrientationScore(const Node& node, const calibration::Alignment& alignment) {
   return orientationScore(node.tracker_from_sensor.orientation, node, alignment);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

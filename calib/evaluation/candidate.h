@@ -5,11 +5,12 @@
 #include <span>
 #include <string>
 
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/core/run_control.h"
-#include "calib/correctors/corrector.h"
 #include "calib/correctors/registry.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// How one corrected row differs from the truth.
 struct RowScore {
@@ -20,7 +21,7 @@ struct RowScore {
 
 /// A fitted model of either kind, seen only through what a comparison asks of it.
 struct FittedCandidate {
-  std::function<RowScore(const Node&, const Alignment&)> score;
+  std::function<RowScore(const Node&, const calibration::Alignment&)> score;
   std::function<double(const Node&)> evaluate;  ///< One evaluation, for timing; the value means nothing.
   std::string note;
 };
@@ -34,9 +35,10 @@ struct Candidate {
   std::string id;
   Settings settings;
   bool is_position = true;
-  std::function<Result<FittedCandidate>(const FitData&, const RunControl&)> fit;
-  std::function<Result<FitWithout>(const FitData&, const RunControl&)> hold_out;  ///< Empty without a closed form.
-  int most_folds = 0;                                                             ///< @see CorrectionMethod::most_folds
+  std::function<Result<FittedCandidate>(const correctors::FitData&, const RunControl&)> fit;
+  std::function<Result<FitWithout>(const correctors::FitData&, const RunControl&)>
+      hold_out;                   ///< Empty without a closed form.
+  int most_folds = 0;             ///< @see CorrectionMethod::most_folds
   bool chooses_settings = false;  ///< One of its settings is found from the data it is fitted to.
 };
 
@@ -46,7 +48,7 @@ Result<std::vector<Candidate>> positionCandidates(const std::vector<MethodText>&
 Result<std::vector<Candidate>> orientationCandidates(const std::vector<MethodText>& methods);
 
 /// The score of a row that only the alignment touches.
-RowScore alignedPositionScore(const Node& node, const Alignment& alignment);
-RowScore alignedOrientationScore(const Node& node, const Alignment& alignment);
+RowScore alignedPositionScore(const Node& node, const calibration::Alignment& alignment);
+RowScore alignedOrientationScore(const Node& node, const calibration::Alignment& alignment);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -2,16 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
+#include "calib/correctors/method_label.h"
+#include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/held_out.h"
+#include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/limits.h"
 #include "calib/evaluation/noise_floor.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/evaluation/resampling.h"
 #include "calib/evaluation/surroundings.h"
 #include "calib/evaluation/verdict.h"
+#include "calib/tables/true_box.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 tl::unexpected<Error> stoppedError() { return fail(ErrorCode::kCancelled, "The comparison was stopped on request"); }
@@ -76,14 +81,27 @@ void scoreBefore(const HeldOutJob& job, const HeldOutScores& held_out, const std
   comparison.before_place_deg = std::move(orientation.errors);
 }
 
+/// Volume of the box around some rows' true positions, of that around all of them; axes along which all lie together
+/// do not count.
+double shareOfBox(const std::vector<Node>& some, const std::vector<Node>& all) {
+  const Eigen::Vector3d whole_m = trueBox_m(all).sizes(), part_m = trueBox_m(some).sizes();
+  double share = 1.0;
+  for (int axis = 0; axis < 3; ++axis)
+    if (whole_m[axis] > 1e-3 * whole_m.maxCoeff()) share *= part_m[axis] / whole_m[axis];
+  return share;
+}
+
 /// What the job itself tells, before anything is scored.
 Comparison begin(const HeldOutJob& job, const std::vector<Node>& scored) {
   Comparison comparison;
   comparison.validation = job.validation;
   comparison.align = job.align;
   comparison.places = placesOf(scored);
+  comparison.names = PlaceNames(job.nodes);
   comparison.n_places = static_cast<int>(placesOf(job.nodes).size());
   comparison.validation_places = static_cast<int>(comparison.places.size());
+  comparison.validated_share = shareOfBox(scored, job.nodes);
+  comparison.notes = job.notes;
   const NoiseFloor floor = noiseFloor(scored, job.metadata);
   comparison.floor_position_mm = floor.position_mm;
   comparison.floor_orientation_deg = floor.orientation_deg;
@@ -93,11 +111,15 @@ Comparison begin(const HeldOutJob& job, const std::vector<Node>& scored) {
 
 /// Which methods were held out from one fit, and what that means for what their fits choose.
 void noteClosedForm(Comparison& comparison) {
+  std::vector<std::string> labels;
+  for (const MethodScore& score : comparison.position)
+    if (score.closed_form) labels.push_back(correctors::positionLabel(score.method));
+  for (const MethodScore& score : comparison.orientation)
+    if (score.closed_form) labels.push_back(correctors::orientationLabel(score.method));
   std::string names;
-  for (const auto* scores : {&comparison.position, &comparison.orientation})
-    for (const MethodScore& score : *scores)
-      if (score.closed_form && names.find(score.method) == std::string::npos)
-        names += (names.empty() ? "" : ", ") + score.method;
+  std::set<std::string> named;
+  for (const std::string& label : labels)
+    if (named.insert(label).second) names += (names.empty() ? "" : ", ") + label;
   if (!names.empty())
     comparison.notes.push_back("Held out in closed form, from one fit to all places: " + names +
                                ". What such a fit chooses from the data (automatic settings, scales, knots) was "
@@ -140,4 +162,4 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
   return comparison;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

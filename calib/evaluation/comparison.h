@@ -6,24 +6,18 @@
 #include <string>
 #include <vector>
 
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
+#include "calib/core/place_name.h"
 #include "calib/core/run_control.h"
-#include "calib/correctors/corrector.h"
 #include "calib/evaluation/coverage.h"
+#include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/fold_back.h"
 #include "calib/evaluation/orientation_dependence.h"
 
-namespace fieldtrue {
-
-/// Statistics of per-place errors, in mm or degrees; the error of a place is the RMS over its rows. The 90 % interval
-/// of the RMS is a percentile bootstrap over places.
-struct ErrorStats {
-  double mean = 0, median = 0, rms = 0, p95 = 0, max = 0, rms_low90 = 0, rms_high90 = 0;
-};
-
-/// @param seed of the bootstrap
-ErrorStats errorStats(const std::vector<double>& place_errors, std::uint64_t seed = 1);
+namespace fieldtrue::evaluation {
 
 enum class ValidationKind { kRole, kLeaveOneOut, kFolds, kBlocks };
 struct Validation {
@@ -41,7 +35,7 @@ struct ComparisonOptions {
   std::vector<MethodText> position_methods;     ///< Empty = all of the registry with default settings.
   std::vector<MethodText> orientation_methods;  ///< Empty = all.
   std::optional<Validation> validation;         ///< None = defaultValidation.
-  std::optional<AlignMode> align;               ///< None = defaultAlignMode.
+  std::optional<calibration::AlignMode> align;  ///< None = defaultAlignMode.
   std::uint64_t seed = 1;                       ///< Of folds and bootstrap.
   /// Coverage, fold-back, dependence on orientation and what limits the best method, beside the scores. Without them
   /// only the scores and the rule of application are found.
@@ -91,6 +85,7 @@ GainTest testGain(const std::vector<int>& places, const std::vector<double>& bef
 struct Verdict {
   bool apply_position = false;
   bool apply_orientation = false;
+  bool is_inside_out = false;  ///< Much of the volume is: axes or places of the readings are wrong. Nothing applies.
   double gain_low90 = 0;  ///< Of the best position method: 1 - RMS after / RMS before, paired bootstrap over places.
   double gain_high90 = 0;
   double gain_without_worst_place = 0;
@@ -129,8 +124,10 @@ double excessError(double rms, double floor);
 
 struct Comparison {
   Validation validation;
-  AlignMode align = AlignMode::kNone;
+  calibration::AlignMode align = calibration::AlignMode::kNone;
   std::vector<int> places;       ///< Node numbers scored.
+  PlaceNames names;              ///< What the places of the table are called.
+  double validated_share = 1.0;  ///< Volume of the box around the scored places, of that around all places.
   int n_places = 0;              ///< In the table, skipped ones left out.
   int validation_places = 0;     ///< Scored by fits that did not see them; the size of `places`.
   double floor_position_mm = 0;  ///< 0 = the table states neither noise nor tolerance.
@@ -164,4 +161,4 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
 /// `fieldtrue.compare/1`.
 nlohmann::json toJson(const Comparison& comparison);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -1,8 +1,10 @@
 #include <nlohmann/json.hpp>
 
+#include "calib/calibration/alignment.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/error_stats.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 using nlohmann::json;
@@ -25,7 +27,7 @@ json optionalToJson(const std::optional<double>& value) { return value ? json(*v
 json scoreToJson(const MethodScore& score, const char* stats_key, bool is_position) {
   const bool used = !score.skipped;
   json to = {{"method", score.method},
-             {"settings", toJson(score.settings)},
+             {"settings", fieldtrue::toJson(score.settings)},
              {stats_key, nullUnless(used, statsToJson(score.stats))},
              {"n_uncovered", nullUnless(used, score.n_uncovered)},
              {"fit_s", nullUnless(used, score.fit_s)},
@@ -54,6 +56,7 @@ json testToJson(const GainTest& test) {
 json verdictToJson(const Verdict& verdict) {
   return {{"apply_position", verdict.apply_position},
           {"apply_orientation", verdict.apply_orientation},
+          {"inside_out", verdict.is_inside_out},
           {"gain_low90", verdict.gain_low90},
           {"gain_high90", verdict.gain_high90},
           {"gain_without_worst_place", verdict.gain_without_worst_place},
@@ -109,9 +112,10 @@ json toJson(const Comparison& comparison) {
   return {{"schema", "fieldtrue.compare/1"},
           {"software", "Fieldtrue " FIELDTRUE_VERSION},
           {"validate", toText(comparison.validation)},
-          {"align", comparison.align == AlignMode::kRigid ? "rigid" : "none"},
+          {"align", comparison.align == calibration::AlignMode::kRigid ? "rigid" : "none"},
           {"places", comparison.n_places},
           {"validation_places", comparison.validation_places},
+          {"validated_share", comparison.validated_share},
           {"floor",
            {{"position_mm", nullUnless(comparison.floor_position_mm > 0.0, comparison.floor_position_mm)},
             {"orientation_deg", nullUnless(comparison.floor_orientation_deg > 0.0, comparison.floor_orientation_deg)},
@@ -130,4 +134,4 @@ json toJson(const Comparison& comparison) {
           {"notes", comparison.notes}};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -8,14 +8,18 @@
 #include <numeric>
 #include <set>
 
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/core/convex_hull.h"
+#include "calib/core/number_text.h"
+#include "calib/core/place_name.h"
+#include "calib/core/spacing.h"
 #include "calib/core/statistics.h"
-#include "calib/correctors/corrector.h"
-#include "calib/correctors/fit_checks.h"
+#include "calib/correctors/base/fit_checks.h"
 #include "calib/evaluation/figures.h"
 #include "calib/evaluation/region_lattice.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 using nlohmann::json;
@@ -27,7 +31,7 @@ constexpr double kHoleRatio = 1.5;
 constexpr double kMarginOfSpacing = 0.25;
 
 /// Median distance between neighbours along each axis of a grid [m]; none where an axis has no neighbours.
-std::optional<Eigen::Vector3d> gridPitch_m(const Places& places) {
+std::optional<Eigen::Vector3d> gridPitch_m(const correctors::Places& places) {
   if (places.index.empty()) return std::nullopt;
   std::map<std::array<int, 3>, std::size_t> at;
   for (std::size_t i = 0; i < places.size(); ++i) at.emplace(places.index[i], i);
@@ -47,7 +51,7 @@ std::optional<Eigen::Vector3d> gridPitch_m(const Places& places) {
 }
 
 /// Distance from the middle of a cell to its corners, of a full grid as the places stand.
-double fullGridGap_m(const Places& places, int dimension, double spacing_m) {
+double fullGridGap_m(const correctors::Places& places, int dimension, double spacing_m) {
   if (const auto pitch_m = gridPitch_m(places); dimension == 3 && pitch_m) return 0.5 * pitch_m->norm();
   return 0.5 * std::sqrt(static_cast<double>(dimension)) * spacing_m;
 }
@@ -94,7 +98,7 @@ double hullVolume_m3(std::span<const Eigen::Vector3d> points_m, const PointSprea
 /// along which a gradient would stall.
 class GapSearch {
  public:
-  GapSearch(const Places& places, const Region& region, const RegionLattice& lattice)
+  GapSearch(const correctors::Places& places, const Region& region, const RegionLattice& lattice)
       : places_(places), region_(region), lattice_(lattice) {}
 
   Hole from(const Eigen::Vector3d& start_m) const {
@@ -119,12 +123,12 @@ class GapSearch {
     return best.radius_m > before.radius_m;
   }
 
-  const Places& places_;
+  const correctors::Places& places_;
   const Region& region_;
   const RegionLattice& lattice_;
 };
 
-void findHoles(const Places& places, const Region& hull, const RegionLattice& lattice, double threshold_m,
+void findHoles(const correctors::Places& places, const Region& hull, const RegionLattice& lattice, double threshold_m,
                Coverage& coverage) {
   std::vector<double> distance_m;
   for (const Eigen::Vector3d& p : lattice.points_m) distance_m.push_back(nearestDistance_m(places.p_true_m, p));
@@ -163,7 +167,7 @@ std::vector<int> skippedPlaces(const CalibrationTable& table) {
   return {skipped.begin(), skipped.end()};
 }
 
-std::string sentence(const Coverage& coverage, int dimension) {
+std::string sentence(const Coverage& coverage, int dimension, const PlaceNames& names) {
   std::string text = countText(static_cast<std::size_t>(coverage.n_places), "place", "places");
   const Eigen::Vector3d extent_m = coverage.high_m - coverage.low_m;
   const std::string box =
@@ -179,9 +183,7 @@ std::string sentence(const Coverage& coverage, int dimension) {
                       fixedText(coverage.holes.front().radius_m, 2) + " m from the nearest place around " +
                       pointText(coverage.holes.front().center_m);
   }
-  if (!coverage.missing.empty())
-    text += "; planned but skipped: " + std::string(coverage.missing.size() == 1 ? "place " : "places ") +
-            listText(coverage.missing);
+  if (!coverage.missing.empty()) text += "; planned but skipped: " + names.list(coverage.missing);
   return text + ".";
 }
 
@@ -194,8 +196,8 @@ Coverage coverageOf(const CalibrationTable& table) {
   });
   Coverage coverage;
   coverage.missing = skippedPlaces(table);
-  const FitData data = makeFitData(nodes, table.metadata, Alignment{});
-  const Places places = mergePlaces(data);
+  const correctors::FitData data = calibration::makeFitData(nodes, table.metadata, calibration::Alignment{});
+  const correctors::Places places = correctors::mergePlaces(data);
   coverage.n_places = static_cast<int>(places.size());
   if (places.size() > 0) {
     coverage.low_m = coverage.high_m = places.p_true_m.front();
@@ -211,9 +213,9 @@ Coverage coverageOf(const CalibrationTable& table) {
     const RegionLattice lattice = latticeInside(places.p_true_m, spread.dimension, hull, kLatticePoints);
     findHoles(places, hull, lattice, kHoleRatio * fullGridGap_m(places, spread.dimension, coverage.spacing_m),
               coverage);
-    coverage.text = sentence(coverage, spread.dimension);
+    coverage.text = sentence(coverage, spread.dimension, PlaceNames(table.nodes));
   } else {
-    coverage.text = sentence(coverage, 0);
+    coverage.text = sentence(coverage, 0, PlaceNames(table.nodes));
   }
   return coverage;
 }
@@ -230,4 +232,4 @@ json toJson(const Coverage& coverage) {
           {"region", coverage.region.toJson()}, {"text", coverage.text}};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -9,7 +9,7 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/geometry.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// A part of the region where no place is near.
 struct Hole {
@@ -36,4 +36,4 @@ Coverage coverageOf(const CalibrationTable& table);
 
 nlohmann::json toJson(const Coverage& coverage);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

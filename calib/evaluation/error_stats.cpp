@@ -1,3 +1,5 @@
+#include "calib/evaluation/error_stats.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -6,7 +8,7 @@
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/resampling.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 ErrorStats errorStats(const std::vector<double>& place_errors, std::uint64_t seed) {
   ErrorStats stats;
@@ -27,4 +29,4 @@ ErrorStats errorStats(const std::vector<double>& place_errors, std::uint64_t see
   return stats;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

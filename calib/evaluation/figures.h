@@ -6,9 +6,7 @@
 
 /// Numbers as sentences show them, independent of the locale, which a desktop program sets and which may write a
 /// decimal comma.
-namespace fieldtrue {
-
-std::string fixedText(double value, int decimals);
+namespace fieldtrue::evaluation {
 
 /// An error in mm or degrees: three significant digits or so.
 std::string errorText(double value);
@@ -19,10 +17,7 @@ std::string percentText(double fraction);
 /// "(0.10, -0.25, 1.30) m".
 std::string pointText(const Eigen::Vector3d& point_m);
 
-/// "3, 8, 12 and 9 more".
-std::string listText(const std::vector<int>& numbers, std::size_t most = 8);
-
 /// "1 place", "3 places".
 std::string countText(std::size_t count, const std::string& one, const std::string& several);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -7,11 +7,14 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "calib/correctors/fit_checks.h"
+#include "calib/calibration/alignment.h"
+#include "calib/core/number_text.h"
+#include "calib/core/place_name.h"
+#include "calib/correctors/base/fit_checks.h"
 #include "calib/evaluation/figures.h"
 #include "calib/evaluation/region_lattice.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 using nlohmann::json;
@@ -24,7 +27,7 @@ constexpr double kSignificant = 3.0;
 /// A cell of the grid: places at its eight corners, corner c at (c & 1, c >> 1 & 1, c >> 2).
 using Corners = std::array<std::size_t, 8>;
 
-std::vector<Corners> gridCells(const Places& places) {
+std::vector<Corners> gridCells(const correctors::Places& places) {
   std::map<std::array<int, 3>, std::size_t> at;
   for (std::size_t i = 0; i < places.index.size(); ++i) at.emplace(places.index[i], i);
   std::vector<Corners> cells;
@@ -80,7 +83,7 @@ struct PlaceNoise {
   double jig_m2 = 0.0;                      ///< Variance of placing per axis.
 };
 
-PlaceNoise noiseOf(const FitData& data, const Places& places) {
+PlaceNoise noiseOf(const correctors::FitData& data, const correctors::Places& places) {
   PlaceNoise noise;
   noise.jig_m2 = data.jig_sd_m * data.jig_sd_m;
   for (const std::vector<std::size_t>& rows : places.rows) {
@@ -101,7 +104,7 @@ struct CellPoint {
 };
 
 /// @return none where the true cell itself has no volume
-std::optional<CellPoint> cellPoint(const Corners& corners, const Places& places, const PlaceNoise& noise,
+std::optional<CellPoint> cellPoint(const Corners& corners, const correctors::Places& places, const PlaceNoise& noise,
                                    const Eigen::Vector3d& u) {
   const Eigen::Matrix3d true_jacobian = trilinearJacobian(corners, places.p_true_m, u);
   const double size = true_jacobian.cwiseAbs().maxCoeff();
@@ -134,8 +137,8 @@ struct GridVerdict {
   std::size_t n_doubtful = 0;  ///< Folded, but by no more than jig and noise explain.
 };
 
-GridVerdict judgeGrid(const FitData& data, const Pose& reference_from_tracker) {
-  const Places places = mergePlaces(data);
+GridVerdict judgeGrid(const correctors::FitData& data, const Pose& reference_from_tracker) {
+  const correctors::Places places = correctors::mergePlaces(data);
   const PlaceNoise noise = noiseOf(data, places);
   GridVerdict verdict;
   for (const Corners& corners : gridCells(places)) {
@@ -165,7 +168,7 @@ GridVerdict judgeGrid(const FitData& data, const Pose& reference_from_tracker) {
 }
 
 /// The corrector's own Jacobian between the nodes.
-std::vector<FoldBackCell> judgeCorrector(const Corrector& corrector, const FitData& data) {
+std::vector<FoldBackCell> judgeCorrector(const calibration::Corrector& corrector, const correctors::FitData& data) {
   const RegionLattice lattice = latticeInside(data.p_tracked_m, data.dimension, corrector.region(), kProbes);
   std::vector<FoldBackCell> cells;
   for (const Eigen::Vector3d& p_tracked_m : lattice.points_m) {
@@ -183,12 +186,12 @@ std::vector<FoldBackCell> judgeCorrector(const Corrector& corrector, const FitDa
   return cells;
 }
 
-std::string whereText(const FoldBackCell& cell) {
-  return (cell.nodes.empty() ? std::string() : "between places " + listText(cell.nodes) + ", ") + "around " +
+std::string whereText(const FoldBackCell& cell, const PlaceNames& names) {
+  return (cell.nodes.empty() ? std::string() : "between " + names.list(cell.nodes, 8) + ", ") + "around " +
          pointText(cell.center_m);
 }
 
-std::string sentence(const FoldBack& fold_back, std::size_t n_grid, std::size_t n_doubtful) {
+std::string sentence(const FoldBack& fold_back, std::size_t n_grid, std::size_t n_doubtful, const PlaceNames& names) {
   const std::size_t n_probes = fold_back.cells.size() - n_grid;
   if (fold_back.cells.empty())
     return "Whether the field folds back cannot be told: the places make no cell of a grid and enclose no region.";
@@ -208,19 +211,20 @@ std::string sentence(const FoldBack& fold_back, std::size_t n_grid, std::size_t 
                                   [](const FoldBackCell& cell) { return !cell.one_to_one; });
   if (folded_cells == 0)
     return "The measured places do not fold back, but the correction does at " + std::to_string(folded_probes) +
-           " of " + std::to_string(n_probes) + " points between them, worst " + whereText(*worst) +
+           " of " + std::to_string(n_probes) + " points between them, worst " + whereText(*worst, names) +
            ": it sends different readings to one place there" + doubtful + ".";
   return "The field folds back in " + std::to_string(folded_cells) + " of " + std::to_string(n_grid) +
          " cells of the grid and at " + std::to_string(folded_probes) + " of " + std::to_string(n_probes) +
-         " points between the places, worst " + whereText(*worst) +
+         " points between the places, worst " + whereText(*worst, names) +
          ": a reading there stands for more than one place and no correction is unique" + doubtful + ".";
 }
 
 }  // namespace
 
-FoldBack foldBackOf(const Corrector& corrector) {
+FoldBack foldBackOf(const calibration::Corrector& corrector) {
   const Pose& reference_from_tracker = corrector.alignment().reference_from_tracker;
-  const FitData data = makeFitData(corrector.table().nodes, corrector.table().metadata, corrector.alignment());
+  const correctors::FitData data =
+      calibration::makeFitData(corrector.table().nodes, corrector.table().metadata, corrector.alignment());
   GridVerdict grid = judgeGrid(data, reference_from_tracker);
   std::vector<FoldBackCell> probes = judgeCorrector(corrector, data);
   // Worst first, so that whoever lists cells names the worst.
@@ -240,7 +244,7 @@ FoldBack foldBackOf(const Corrector& corrector) {
         is_first ? cell.determinant : std::min(fold_back.smallest_determinant, cell.determinant);
     is_first = false;
   }
-  fold_back.text = sentence(fold_back, n_grid, grid.n_doubtful);
+  fold_back.text = sentence(fold_back, n_grid, grid.n_doubtful, PlaceNames(corrector.table().nodes));
   return fold_back;
 }
 
@@ -263,4 +267,4 @@ json toJson(const FoldBack& fold_back) {
       {"text", fold_back.text}};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

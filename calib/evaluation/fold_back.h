@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/corrector.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// One probe of the map over the calibrated volume.
 struct FoldBackCell {
@@ -32,8 +32,8 @@ struct FoldBack {
 /// Grid cells judged by the measured nodes themselves (sign of the Jacobian of true to tracked at the eight corners and
 /// the centre); and, between the nodes, the corrector's Jacobian on a lattice.
 /// @param corrector its table is what is judged
-FoldBack foldBackOf(const Corrector& corrector);
+FoldBack foldBackOf(const calibration::Corrector& corrector);
 
 nlohmann::json toJson(const FoldBack& fold_back);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -5,10 +5,10 @@
 #include <map>
 #include <set>
 
-#include "calib/core/geometry.h"
 #include "calib/evaluation/resampling.h"
+#include "calib/tables/true_box.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 constexpr int kOctants = 8;
@@ -35,13 +35,7 @@ std::map<int, std::size_t> shuffledGroups(std::vector<int> places, std::size_t n
 
 /// Octants about the middle of the box of true positions; of each place its first row.
 std::map<int, std::size_t> octantGroups(std::span<const Node> nodes) {
-  Eigen::Vector3d low_m = nodes.front().reference_from_sensor.position_m;
-  Eigen::Vector3d high_m = low_m;
-  for (const Node& node : nodes) {
-    low_m = low_m.cwiseMin(node.reference_from_sensor.position_m);
-    high_m = high_m.cwiseMax(node.reference_from_sensor.position_m);
-  }
-  const Eigen::Vector3d middle_m = 0.5 * (low_m + high_m);
+  const Eigen::Vector3d middle_m = trueBox_m(nodes).center();
   std::map<int, std::size_t> groups;
   for (const Node& node : nodes) {
     const Eigen::Vector3d offset_m = node.reference_from_sensor.position_m - middle_m;
@@ -149,4 +143,4 @@ Result<std::vector<Fold>> makeFolds(std::span<const Node> nodes, const Validatio
   return foldsOfGroups(nodes, own_group, places.size());
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -6,7 +6,7 @@
 
 #include "calib/evaluation/comparison.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// One hold-out: the rows fitted to, and the rows scored. No place is in both.
 struct Fold {
@@ -23,4 +23,4 @@ Result<std::vector<Fold>> makeFolds(std::span<const Node> nodes, const Validatio
 /// Place numbers in order of first appearance.
 std::vector<int> placesOf(std::span<const Node> nodes);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "calib/calibration/alignment.h"
+#include "calib/core/place_name.h"
+#include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/in_sample.h"
 #include "calib/evaluation/progress_meter.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 /// Shares of the whole that the stages take, for the progress told.
@@ -26,9 +29,9 @@ struct Run {
   const HeldOutJob& job;
   const RunControl& control;
   std::vector<std::size_t> slots;
-  Alignment all_alignment;
-  FitData all_data;
-  std::vector<Alignment> fold_alignments;
+  calibration::Alignment all_alignment;
+  correctors::FitData all_data;
+  std::vector<calibration::Alignment> fold_alignments;
   HeldOutScores& scores;
   std::vector<std::vector<std::optional<std::string>>> why_not;  ///< Of each candidate and fold.
 
@@ -41,8 +44,8 @@ struct Run {
   }
 };
 
-FitData foldData(const Run& run, const Fold& fold, const Alignment& alignment) {
-  FitData data = makeFitData(rowsOf(run.job, fold.fitted), run.job.metadata, alignment);
+correctors::FitData foldData(const Run& run, const Fold& fold, const calibration::Alignment& alignment) {
+  correctors::FitData data = calibration::makeFitData(rowsOf(run.job, fold.fitted), run.job.metadata, alignment);
   // Places that span a volume are not fitted in a plane only because the few of this fold lie in one.
   if (data.dimension == 2) data.dimension = run.scores.dimension;
   return data;
@@ -52,18 +55,19 @@ std::string heldOutText(const HeldOutJob& job, const Fold& fold) {
   std::size_t n_others = 0;
   const int first = job.nodes[fold.scored.front()].node;
   for (const int place : placesOf(rowsOf(job, fold.scored))) n_others += place != first;
-  return " (with place " + std::to_string(first) +
+  return " (with " + PlaceNames(job.nodes).of(first) +
          (n_others > 0 ? " and " + std::to_string(n_others) + " others" : std::string()) + " held out)";
 }
 
-void keepScores(const Run& run, std::size_t i, const Fold& fold, const Alignment& alignment,
+void keepScores(const Run& run, std::size_t i, const Fold& fold, const calibration::Alignment& alignment,
                 const FittedCandidate& model) {
   for (const std::size_t row : fold.scored)
     run.scores.candidates[i].held_out[run.slots[row]] = model.score(run.job.nodes[row], alignment);
 }
 
 /// One refit of one candidate.
-void refit(Run& run, std::size_t i, std::size_t k, const Fold& fold, const FitData& data, const Alignment& alignment) {
+void refit(Run& run, std::size_t i, std::size_t k, const Fold& fold, const correctors::FitData& data,
+           const calibration::Alignment& alignment) {
   const auto model = run.job.candidates[i].fit(data, run.inner());
   if (model)
     keepScores(run, i, fold, alignment, *model);
@@ -78,7 +82,7 @@ void runClosedForm(Run& run, std::size_t i, ProgressMeter& meter, double share) 
   const Pose tracker_from_all = run.all_alignment.reference_from_tracker;
   for (std::size_t k = 0; k < run.job.folds.size() && !run.stopped(); ++k) {
     const Fold& fold = run.job.folds[k];
-    const Alignment& alignment = run.fold_alignments[k];
+    const calibration::Alignment& alignment = run.fold_alignments[k];
     if (fits) {
       const auto model = (*fits)(fold.scored, inverse(alignment.reference_from_tracker) * tracker_from_all);
       if (model)
@@ -96,7 +100,7 @@ void runClosedForm(Run& run, std::size_t i, ProgressMeter& meter, double share) 
 /// Whether the closed form can follow the alignment of each fold: it moves the true positions, while an orientation's
 /// truth is turned by the mounting too.
 bool hasClosedForm(const HeldOutJob& job, const Candidate& candidate) {
-  return candidate.hold_out && (candidate.is_position || job.align == AlignMode::kNone);
+  return candidate.hold_out && (candidate.is_position || job.align == calibration::AlignMode::kNone);
 }
 
 bool isTooCostly(const HeldOutJob& job, const Candidate& candidate) {
@@ -154,7 +158,7 @@ Result<std::vector<Task>> makeTasks(Run& run, ProgressMeter& meter) {
   for (std::size_t k = 0; k < run.job.folds.size() && !plain.empty(); ++k)
     tasks.push_back({[&run, k, plain, &meter] {
       const Fold& fold = run.job.folds[k];
-      const FitData data = foldData(run, fold, run.fold_alignments[k]);
+      const correctors::FitData data = foldData(run, fold, run.fold_alignments[k]);
       for (const std::size_t i : plain) {
         if (run.stopped()) return;
         refit(run, i, k, fold, data, run.fold_alignments[k]);
@@ -244,7 +248,8 @@ Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& cont
   const std::vector<Node> fitted = rowsOf(job, job.fitted);
   const auto alignment = alignmentOf(job, fitted);
   if (!alignment) return tl::unexpected(alignment.error());
-  Run run{job, control, slotsOf(job), *alignment, makeFitData(fitted, job.metadata, *alignment), {}, scores, {}};
+  Run run{job,    control, slotsOf(job), *alignment, calibration::makeFitData(fitted, job.metadata, *alignment), {},
+          scores, {}};
   scores.dimension = run.all_data.dimension;
   scores.candidates.resize(job.candidates.size());
   run.why_not.resize(job.candidates.size());
@@ -269,4 +274,4 @@ Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& cont
   return scores;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

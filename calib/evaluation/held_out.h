@@ -5,38 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "calib/calibration/alignment.h"
 #include "calib/evaluation/candidate.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/folds.h"
+#include "calib/evaluation/held_out_job.h"
 
-namespace fieldtrue {
-
-/// What is to be scored by fits that do not see it; fixed before anything runs.
-struct HeldOutJob {
-  std::vector<Node> nodes;  ///< Rows that count.
-  TableMetadata metadata;
-  AlignMode align = AlignMode::kRigid;
-  Validation validation;
-  std::uint64_t seed = 1;
-  std::vector<Fold> folds;
-  std::vector<std::size_t> fitted;  ///< Rows that a fit may see when nothing is held out.
-  std::vector<std::size_t> scored;  ///< Rows that the folds score, ascending.
-  std::vector<Candidate> candidates;
-  bool has_orientation = false;
-};
-
-/// @param nodes rows that count
-/// @param table for its metadata and the default validation
-/// @error kTooFewNodes, kBadInput as makeFolds and the candidates' settings
-Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOptions& options);
-
-std::vector<Node> rowsOf(const HeldOutJob& job, std::span<const std::size_t> rows);
-
-/// The rigid part of these rows, where the job fits one.
-Result<Alignment> alignmentOf(const HeldOutJob& job, std::span<const Node> nodes);
-
-std::vector<RowScore> scoreRows(std::span<const Node> nodes, const Alignment& alignment,
-                                const std::function<RowScore(const Node&, const Alignment&)>& score);
+namespace fieldtrue::evaluation {
 
 /// One candidate fitted to all rows it may see, and scored on those it was not fitted to.
 struct CandidateScores {
@@ -62,4 +37,4 @@ struct HeldOutScores {
 /// @error kTooFewNodes, kDegenerate, kBadInput of the alignment; kCancelled
 Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& control);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

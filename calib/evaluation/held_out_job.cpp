@@ -1,9 +1,13 @@
+#include "calib/evaluation/held_out_job.h"
+
 #include <algorithm>
 #include <numeric>
 
+#include "calib/calibration/alignment.h"
+#include "calib/evaluation/coincident_places.h"
 #include "calib/evaluation/held_out.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 Result<std::vector<Candidate>> candidatesOf(const ComparisonOptions& options) {
@@ -28,17 +32,22 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
     return fail(ErrorCode::kTooFewNodes, table.nodes.empty()
                                              ? "The table has no rows to compare methods on"
                                              : "Every row of the table is skipped; nothing is left to compare");
+  if (std::string note = joinCoincidentPlaces(job.nodes); !note.empty()) job.notes.push_back(std::move(note));
   auto candidates = candidatesOf(options);
   if (!candidates) return tl::unexpected(candidates.error());
   job.candidates = *std::move(candidates);
   for (Candidate& candidate : job.candidates)
     if (!options.closed_form) candidate.hold_out = nullptr;
   job.validation = options.validation.value_or(defaultValidation(table));
-  job.align = options.align.value_or(defaultAlignMode(table.metadata));
+  job.align = options.align.value_or(calibration::defaultAlignMode(table.metadata));
   job.has_orientation =
       std::all_of(job.nodes.begin(), job.nodes.end(), [](const Node& node) { return node.has_orientation; });
   auto folds = makeFolds(job.nodes, job.validation, options.seed);
-  if (!folds) return tl::unexpected(folds.error());
+  if (!folds) {
+    Error error = folds.error();
+    for (const std::string& note : job.notes) error.message += ". " + note;
+    return tl::unexpected(error);
+  }
   job.folds = *std::move(folds);
   if (job.validation.kind == ValidationKind::kRole) {
     job.fitted = job.folds.front().fitted;
@@ -58,16 +67,17 @@ std::vector<Node> rowsOf(const HeldOutJob& job, std::span<const std::size_t> row
   return nodes;
 }
 
-Result<Alignment> alignmentOf(const HeldOutJob& job, std::span<const Node> nodes) {
-  return job.align == AlignMode::kRigid ? fitAlignment(nodes) : Result<Alignment>(Alignment{});
+Result<calibration::Alignment> alignmentOf(const HeldOutJob& job, std::span<const Node> nodes) {
+  return job.align == calibration::AlignMode::kRigid ? calibration::fitAlignment(nodes)
+                                                     : Result<calibration::Alignment>(calibration::Alignment{});
 }
 
-std::vector<RowScore> scoreRows(std::span<const Node> nodes, const Alignment& alignment,
-                                const std::function<RowScore(const Node&, const Alignment&)>& score) {
+std::vector<RowScore> scoreRows(std::span<const Node> nodes, const calibration::Alignment& alignment,
+                                const std::function<RowScore(const Node&, const calibration::Alignment&)>& score) {
   std::vector<RowScore> scores;
   scores.reserve(nodes.size());
   for (const Node& node : nodes) scores.push_back(score(node, alignment));
   return scores;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

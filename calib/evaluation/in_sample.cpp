@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <chrono>
 
+#include "calib/calibration/alignment.h"
+#include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/evaluation/resampling.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
@@ -37,8 +39,8 @@ std::string noOrientationText(const HeldOutJob& job) {
 
 }  // namespace
 
-CandidateScores fitInSample(const HeldOutJob& job, const Candidate& candidate, const FitData& data,
-                            const Alignment& alignment, const RunControl& control) {
+CandidateScores fitInSample(const HeldOutJob& job, const Candidate& candidate, const correctors::FitData& data,
+                            const calibration::Alignment& alignment, const RunControl& control) {
   CandidateScores scores;
   if (!candidate.is_position && !job.has_orientation) {
     scores.skipped = noOrientationText(job);
@@ -63,4 +65,4 @@ CandidateScores fitInSample(const HeldOutJob& job, const Candidate& candidate, c
   return scores;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -6,13 +6,15 @@
 #include <numeric>
 #include <set>
 
+#include "calib/calibration/alignment.h"
 #include "calib/core/statistics.h"
 #include "calib/evaluation/held_out.h"
+#include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/evaluation/progress_meter.h"
 #include "calib/evaluation/resampling.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 constexpr std::array<double, 5> kShares = {0.125, 0.25, 0.5, 0.75, 1.0};
@@ -74,7 +76,7 @@ std::optional<double> heldOutRms(const HeldOutJob& job, const Candidate& candida
   const std::vector<Node> fitted = rowsOf(job, draw.fitted);
   const auto alignment = alignmentOf(job, fitted);
   if (!alignment) return std::nullopt;
-  FitData data = makeFitData(fitted, job.metadata, *alignment);
+  correctors::FitData data = calibration::makeFitData(fitted, job.metadata, *alignment);
   if (data.dimension == 2) data.dimension = dimension;
   const auto model = candidate.fit(data, control);
   if (!model) return std::nullopt;
@@ -120,7 +122,7 @@ Result<std::vector<LearningCurve>> learningCurves(const CalibrationTable& table,
   const std::vector<Node> all = rowsOf(*job, job->fitted);
   const auto alignment = alignmentOf(*job, all);
   if (!alignment) return tl::unexpected(alignment.error());
-  const int dimension = makeFitData(all, job->metadata, *alignment).dimension;
+  const int dimension = calibration::makeFitData(all, job->metadata, *alignment).dimension;
 
   std::vector<LearningPoint> points;
   const std::vector<Draw> draws = drawParts(*job, split.pool, points);
@@ -151,7 +153,7 @@ nlohmann::json toJson(const LearningCurve& curve) {
   for (const LearningPoint& point : curve.points)
     points.push_back(
         {{"places", point.n_places}, {"rms_mm", point.rms}, {"low_mm", point.low}, {"high_mm", point.high}});
-  return {{"method", curve.method}, {"settings", toJson(curve.settings)}, {"points", std::move(points)}};
+  return {{"method", curve.method}, {"settings", fieldtrue::toJson(curve.settings)}, {"points", std::move(points)}};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

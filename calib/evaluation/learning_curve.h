@@ -6,7 +6,7 @@
 
 #include "calib/evaluation/comparison.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// Held-out error of a method fitted on a part of the places.
 struct LearningPoint {
@@ -29,4 +29,4 @@ Result<std::vector<LearningCurve>> learningCurves(const CalibrationTable& table,
 
 nlohmann::json toJson(const LearningCurve& curve);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -7,12 +7,15 @@
 #include <set>
 
 #include "calib/core/convex_hull.h"
+#include "calib/core/spacing.h"
 #include "calib/evaluation/figures.h"
+#include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/evaluation/region_lattice.h"
 #include "calib/evaluation/resampling.h"
+#include "calib/evaluation/verdict.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 /// An error up to this much above the floor is explained by it.
@@ -114,8 +117,8 @@ std::optional<std::string> onePlace(const Comparison& comparison, const std::vec
   rest.erase(std::max_element(rest.begin(), rest.end()));
   const double without_mm = rootMeanSquare(rest);
   if (without_mm > (1.0 - kAlone) * rms_mm) return std::nullopt;
-  return "place " + std::to_string(comparison.verdict.worst_node) + " alone (without it " + errorText(without_mm) +
-         " mm)";
+  return comparison.names.of(comparison.verdict.worst_node) + " alone (the others, fitted with it, " +
+         errorText(without_mm) + " mm)";
 }
 
 /// What only some of the places show.
@@ -185,7 +188,8 @@ std::string limitedBy(const Comparison& comparison, const HeldOutJob& job, std::
   const std::vector<double>& errors = recommendedErrors(comparison);
   const double rms_mm = rootMeanSquare(errors);
   const double floor_mm = comparison.floor_position_mm;
-  if (floor_mm > 0.0 && rms_mm <= kNearFloor * floor_mm)
+  const bool is_floor_true = floor_mm <= kOverstatedFloor * rms_mm;
+  if (floor_mm > 0.0 && is_floor_true && rms_mm <= kNearFloor * floor_mm)
     return "how exactly the places themselves are known (" + comparison.floor_from + ": " + errorText(floor_mm) +
            " mm)";
   if (auto one = onePlace(comparison, errors, rms_mm)) return *one;
@@ -203,4 +207,4 @@ std::string limitedBy(const Comparison& comparison, const HeldOutJob& job, std::
          "the method's own";
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -5,8 +5,9 @@
 #include <vector>
 
 #include "calib/evaluation/held_out.h"
+#include "calib/evaluation/held_out_job.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// Which of the places the fits may not see on all sides: those less than half a spacing inside the hull of the places
 /// fitted, or outside it.
@@ -27,4 +28,4 @@ Result<std::optional<double>> rmsWithHalf_mm(const Comparison& comparison, const
 /// One phrase, by evidence: what keeps the error of what the verdict recommends from being smaller.
 std::string limitedBy(const Comparison& comparison, const HeldOutJob& job, std::optional<double> with_half_mm);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 /// Mean over places of the mean over the rows of a place.
@@ -51,4 +51,4 @@ NoiseFloor noiseFloor(std::span<const Node> nodes, const TableMetadata& metadata
   return floor;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -5,7 +5,7 @@
 
 #include "calib/core/calibration_table.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// The error that is left when the tracker's mean error is corrected perfectly: noise of the means and tolerance of the
 /// jig.
@@ -20,4 +20,4 @@ struct NoiseFloor {
 /// @param nodes the scored rows
 NoiseFloor noiseFloor(std::span<const Node> nodes, const TableMetadata& metadata);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

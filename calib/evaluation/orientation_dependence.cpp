@@ -3,10 +3,12 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/evaluation/figures.h"
+#include "calib/evaluation/orientation_models.h"
+#include "calib/evaluation/orientation_neighbours.h"
 #include "calib/evaluation/orientation_rows.h"
 #include "calib/evaluation/resampling.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 using Answer = OrientationDependence::Answer;
@@ -102,4 +104,4 @@ nlohmann::json toJson(const OrientationDependence& dependence) {
           {"text", dependence.text}};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

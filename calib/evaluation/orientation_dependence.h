@@ -8,7 +8,7 @@
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// Whether the orientation error depends on the sensor's orientation as well as on its place.
 /// @source the question is the survey's (Kindratenko, section 4, about Livingston and State 1997)
@@ -30,4 +30,4 @@ Result<OrientationDependence> orientationDependence(const CalibrationTable& tabl
 
 nlohmann::json toJson(const OrientationDependence& dependence);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

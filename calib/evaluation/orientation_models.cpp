@@ -1,3 +1,5 @@
+#include "calib/evaluation/orientation_models.h"
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -8,7 +10,7 @@
 #include "calib/evaluation/orientation_rows.h"
 #include "calib/evaluation/resampling.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 /// Three families of error rotations that depend on the orientation, each held back by the same ridge:
@@ -290,4 +292,4 @@ NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orient
   return squares.errors();
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -1,14 +1,18 @@
+#include "calib/evaluation/orientation_neighbours.h"
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
+#include "calib/core/spacing.h"
+#include "calib/evaluation/orientation_models.h"
 #include "calib/evaluation/orientation_rows.h"
 #include "calib/evaluation/region_lattice.h"
 #include "calib/evaluation/resampling.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 constexpr std::size_t kNeighbours = 6;
@@ -89,4 +93,4 @@ NestedErrors neighbourErrors(const OrientationRows& rows, std::uint64_t seed) {
   return errors;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

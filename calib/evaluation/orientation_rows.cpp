@@ -4,9 +4,10 @@
 #include <map>
 #include <numbers>
 
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
@@ -44,13 +45,13 @@ Result<OrientationRows> orientationRows(const CalibrationTable& table) {
     return fail(ErrorCode::kUnsupported,
                 "Whether orientation errors depend on orientation needs an orientation in every row, and " +
                     std::to_string(n_without) + " of " + std::to_string(nodes.size()) + " rows have none");
-  Alignment alignment;
-  if (defaultAlignMode(table.metadata) == AlignMode::kRigid) {
-    const auto fitted = fitAlignment(nodes);
+  calibration::Alignment alignment;
+  if (calibration::defaultAlignMode(table.metadata) == calibration::AlignMode::kRigid) {
+    const auto fitted = calibration::fitAlignment(nodes);
     if (!fitted) return tl::unexpected(fitted.error());
     alignment = *fitted;
   }
-  FitData data = makeFitData(nodes, table.metadata, alignment);
+  correctors::FitData data = calibration::makeFitData(nodes, table.metadata, alignment);
   OrientationRows rows;
   std::map<int, std::size_t> number_of_place;
   for (std::size_t i = 0; i < data.size(); ++i) {
@@ -79,4 +80,4 @@ int placesWithThreeOrientations(const OrientationRows& rows) {
   return static_cast<int>(std::count_if(distinct.begin(), distinct.end(), [](const auto& q) { return q.size() >= 3; }));
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

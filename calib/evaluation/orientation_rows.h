@@ -9,7 +9,7 @@
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// The rows of a table as the question needs them: where, how turned, how wrong.
 struct OrientationRows {
@@ -33,21 +33,4 @@ Result<OrientationRows> orientationRows(const CalibrationTable& table);
 /// Number of places at which the sensor was held in at least three orientations, more than 10 degrees apart.
 int placesWithThreeOrientations(const OrientationRows& rows);
 
-/// Errors of the held-out rows, by place, of a model without and with terms in the orientation.
-struct NestedErrors {
-  std::vector<double> place_only_deg;
-  std::vector<double> with_orientation_deg;
-};
-
-/// Within each place the mean error is free (any function of the place); the larger model adds functions of the true
-/// orientation up to degree 2, held back by a ridge that is chosen inside the training rows and may be infinite.
-/// @param hold_out_orientations leaves out whole orientations too: rows are scored by fits that saw neither their place
-///        nor their orientation
-NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orientations, std::uint64_t seed,
-                               const RunControl& control);
-
-/// What the nearest other places tell about each row, near in position, or in position and orientation. The scale
-/// between the two is chosen on the other half of the places.
-NestedErrors neighbourErrors(const OrientationRows& rows, std::uint64_t seed);
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 PlaceScores gatherByPlace(const std::vector<int>& places, std::span<const Node> nodes,
                           std::span<const RowScore> scores) {
@@ -31,4 +31,4 @@ PlaceScores gatherByPlace(const std::vector<int>& places, std::span<const Node> 
   return gathered;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -6,7 +6,7 @@
 
 #include "calib/evaluation/candidate.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// Scores and coverage of rows, gathered by place.
 struct PlaceScores {
@@ -20,4 +20,4 @@ struct PlaceScores {
 PlaceScores gatherByPlace(const std::vector<int>& places, std::span<const Node> nodes,
                           std::span<const RowScore> scores);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -4,7 +4,7 @@
 #include <functional>
 #include <mutex>
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// Adds up the shares of tasks that end on any thread, so that the fraction told never falls.
 class ProgressMeter {
@@ -29,4 +29,4 @@ class ProgressMeter {
   std::mutex mutex_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

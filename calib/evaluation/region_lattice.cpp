@@ -5,7 +5,7 @@
 
 #include "calib/core/statistics.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 /// The points' box in the lattice's own directions.
@@ -62,16 +62,4 @@ double nearestDistance_m(std::span<const Eigen::Vector3d> points_m, const Eigen:
   return std::sqrt(shortest_m2);
 }
 
-double medianSpacing_m(std::span<const Eigen::Vector3d> points_m) {
-  if (points_m.size() < 2) return 0.0;
-  std::vector<double> nearest_m2(points_m.size(), HUGE_VAL);
-  for (std::size_t i = 0; i < points_m.size(); ++i)
-    for (std::size_t j = i + 1; j < points_m.size(); ++j) {
-      const double m2 = (points_m[i] - points_m[j]).squaredNorm();
-      nearest_m2[i] = std::min(nearest_m2[i], m2);
-      nearest_m2[j] = std::min(nearest_m2[j], m2);
-    }
-  return std::sqrt(median(std::move(nearest_m2)));
-}
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

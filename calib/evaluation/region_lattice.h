@@ -6,7 +6,7 @@
 
 #include "calib/core/geometry.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// Points spread evenly over the region that places span.
 struct RegionLattice {
@@ -27,7 +27,4 @@ RegionLattice latticeInside(std::span<const Eigen::Vector3d> points_m, int dimen
 /// Distance to the nearest of the points [m].
 double nearestDistance_m(std::span<const Eigen::Vector3d> points_m, const Eigen::Vector3d& from_m);
 
-/// Median distance from a point to its nearest neighbour [m]; 0 for a single point.
-double medianSpacing_m(std::span<const Eigen::Vector3d> points_m);
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

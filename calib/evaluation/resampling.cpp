@@ -7,7 +7,7 @@
 #include "calib/core/error.h"
 #include "calib/core/statistics.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 constexpr std::size_t kResamples = 2000;
@@ -97,4 +97,4 @@ std::size_t worstPlace(std::span<const double> before, std::span<const double> a
   return worst;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// A seeded source of uniform indices, the same on every platform (std::uniform_int_distribution is not).
 class IndexSource {
@@ -55,4 +55,4 @@ PairedDifference pairedDifference(std::span<const double> errors, std::span<cons
 /// The place whose removal lowers the gain most.
 std::size_t worstPlace(std::span<const double> before, std::span<const double> after);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

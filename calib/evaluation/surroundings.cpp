@@ -1,13 +1,17 @@
 #include "calib/evaluation/surroundings.h"
 
-#include "calib/correctors/corrector.h"
-#include "calib/correctors/fit_checks.h"
-#include "calib/correctors/regrid_error.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
+#include "calib/core/spacing.h"
+#include "calib/correctors/base/fit_checks.h"
+#include "calib/correctors/regrid/regrid_error.h"
 #include "calib/evaluation/figures.h"
+#include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/limits.h"
 #include "calib/evaluation/region_lattice.h"
+#include "calib/evaluation/verdict.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 Result<void> unlessStopped(const RunControl& control, double done) {
@@ -19,12 +23,12 @@ Result<void> unlessStopped(const RunControl& control, double done) {
 /// The best position method fitted to all rows it may see; none where that fails.
 Result<std::optional<FoldBack>> foldBack(const Comparison& comparison, const HeldOutJob& job,
                                          const RunControl& control) {
-  CorrectorChoice choice;
+  calibration::CorrectorChoice choice;
   if (const auto row = comparison.best_position_row) {
     choice.position_id = comparison.position[*row].method;
     choice.position_settings = comparison.position[*row].settings;
   }
-  const auto corrector = Corrector::fit(rowsOf(job, job.fitted), job.metadata, choice, job.align, control);
+  const auto corrector = calibration::Corrector::fit(rowsOf(job, job.fitted), job.metadata, choice, job.align, control);
   if (!corrector && corrector.error().code == ErrorCode::kCancelled) return tl::unexpected(corrector.error());
   if (!corrector) return std::optional<FoldBack>();
   return std::optional(foldBackOf(*corrector));
@@ -36,16 +40,18 @@ std::vector<ResamplingError> resamplingErrors(const Comparison& comparison, cons
   const std::vector<Node> fitted = rowsOf(job, job.fitted);
   const auto alignment = alignmentOf(job, fitted);
   if (!alignment) return {};
-  const FitData data = makeFitData(fitted, job.metadata, *alignment);
+  const correctors::FitData data = calibration::makeFitData(fitted, job.metadata, *alignment);
   if (data.dimension < 3) return {};
   std::vector<ResamplingError> errors;
-  for (const RegridMethod method : {RegridMethod::kBriggs, RegridMethod::kLivingston, RegridMethod::kCzernuszenko}) {
-    RegridOptions options;
+  for (const correctors::RegridMethod method :
+       {correctors::RegridMethod::kBriggs, correctors::RegridMethod::kLivingston,
+        correctors::RegridMethod::kCzernuszenko}) {
+    correctors::RegridOptions options;
     options.method = method;
-    options.pitch_m = medianSpacing_m(mergePlaces(data).p_tracked_m);
-    const RegridError error = regridError(data, options, control);
+    options.pitch_m = medianSpacing_m(correctors::mergePlaces(data).p_tracked_m);
+    const correctors::RegridError error = correctors::regridError(data, options, control);
     if (control.stop.stop_requested()) return {};
-    errors.push_back({regridMethodId(method), error.rms_mm, static_cast<int>(error.n_scored),
+    errors.push_back({correctors::regridMethodId(method), error.rms_mm, static_cast<int>(error.n_scored),
                       static_cast<int>(error.n_without_support),
                       excessError(error.rms_mm, comparison.floor_position_mm)});
   }
@@ -63,6 +69,8 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   auto fold_back = foldBack(comparison, job, quiet);
   if (!fold_back) return tl::unexpected(fold_back.error());
   comparison.fold_back = *std::move(fold_back);
+  refuseInsideOut(comparison);
+  judgePlaces(comparison, job);
   if (auto going = unlessStopped(control, 0.4); !going) return going;
   if (job.has_orientation) {
     auto dependence = orientationDependence({job.metadata, job.nodes}, job.seed, quiet);
@@ -75,8 +83,8 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   const auto with_half_mm = comparison.verdict.apply_position ? rmsWithHalf_mm(comparison, job, quiet)
                                                               : Result<std::optional<double>>(std::nullopt);
   if (!with_half_mm) return tl::unexpected(with_half_mm.error());
-  comparison.verdict.limited_by = limitedBy(comparison, job, *with_half_mm);
+  if (!comparison.verdict.is_inside_out) comparison.verdict.limited_by = limitedBy(comparison, job, *with_half_mm);
   return unlessStopped(control, 1.0);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

@@ -1,8 +1,9 @@
 #pragma once
 
 #include "calib/evaluation/held_out.h"
+#include "calib/evaluation/held_out_job.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 
 /// Adds what surrounds the scores: coverage, fold-back, dependence on orientation, the cost of resampling, and what
 /// limits the recommended correction. The verdict must have been made.
@@ -10,4 +11,4 @@ namespace fieldtrue {
 Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& table, const HeldOutJob& job,
                              const RunControl& control);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

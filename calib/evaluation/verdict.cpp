@@ -3,25 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/correctors/method_text.h"
+#include "calib/calibration/alignment.h"
+#include "calib/correctors/method_label.h"
 #include "calib/evaluation/figures.h"
 #include "calib/evaluation/resampling.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
 namespace {
 
 constexpr double kNeededGain = 0.10;
 constexpr std::size_t kFewestPlaces = 3;
+/// Validation places that span less of the box around all places do not stand for the region.
+constexpr double kWholeRegion = 0.5;
 /// Differences of the last bits are not a win: a millionth of a millimetre or of a degree.
 constexpr double kTie = 1e-6;
-
-/// The id; with its settings where the same method was tried with several.
-std::string nameOf(const std::vector<MethodScore>& scores, std::size_t row) {
-  const MethodScore& score = scores[row];
-  const auto same =
-      std::count_if(scores.begin(), scores.end(), [&](const MethodScore& s) { return s.method == score.method; });
-  return same < 2 ? score.method : methodText(score.method, score.settings);
-}
 
 std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, double before_rms) {
   std::optional<std::size_t> best;
@@ -56,60 +51,97 @@ std::string intervalText(const GainTest& test) {
 }
 
 /// Why a best method fails the rule; the sentence's middle, without a full stop.
-std::string whyNot(const GainTest& test, std::size_t n_places) {
+std::string whyNot(const GainTest& test, const Comparison& comparison) {
+  const std::size_t n_places = comparison.places.size();
   if (n_places < kFewestPlaces) return ", and " + std::to_string(n_places) + " places are too few to judge by";
   if (test.gain < kNeededGain) return ", and at least 10 % is needed";
   if (test.low90 <= 0.0) return ", and the interval does not exclude zero";
-  const std::string without = ", and without place " + std::to_string(test.worst_place) + " it is " +
+  const std::string without = ", and without " + comparison.names.of(test.worst_place) + " it is " +
                               percentText(test.gain_without_worst_place) + " %";
   return test.gain_without_worst_place < kNeededGain ? without + " where 10 % is needed"
                                                      : without + " with an interval that does not exclude zero";
 }
 
-std::string placesText(std::size_t n_places) {
-  return "on " + std::to_string(n_places) + " places the fits did not see";
+std::string placesText(const Comparison& comparison) {
+  const std::string text = "on " + std::to_string(comparison.places.size()) + " places the fits did not see";
+  return comparison.validated_share < kWholeRegion
+             ? text + ", which span only " + percentText(comparison.validated_share) + " % of the region"
+             : text;
+}
+
+/// Cells of the grid, or points between the places where the correction was asked.
+struct FoldCount {
+  std::size_t n_folded = 0;
+  std::size_t n_judged = 0;
+  /// No room of known physics and no real recording comes near a quarter.
+  bool isTooMany() const { return 4 * n_folded > n_judged; }
+};
+
+FoldCount countFolds(const FoldBack& fold_back, bool of_grid) {
+  FoldCount count;
+  for (const FoldBackCell& cell : fold_back.cells) {
+    if (cell.nodes.empty() == of_grid) continue;
+    ++count.n_judged;
+    count.n_folded += cell.one_to_one ? 0 : 1;
+  }
+  return count;
+}
+
+/// What a map that turns much of the volume inside out means. A distorted field folds back near metal at most.
+std::string insideOutText(const FoldBack& fold_back) {
+  const bool of_grid = countFolds(fold_back, true).isTooMany();
+  const FoldCount count = countFolds(fold_back, of_grid);
+  return "the readings are turned inside out in " + std::to_string(count.n_folded) + " of " +
+         std::to_string(count.n_judged) + (of_grid ? " cells of the grid" : " points between the places") +
+         ", far more than a field does: axes are swapped or mirrored, readings stand at places that are not theirs, or "
+         "rig or "
+         "transmitter was moved on the way";
 }
 
 std::string positionText(const Comparison& comparison, const std::string& do_not_apply) {
   const GainTest& test = comparison.verdict.position;
-  const std::size_t n_places = comparison.places.size();
   const std::string before = errorText(comparison.before_position_mm.rms) + " mm";
   if (!comparison.best_position_row)
-    return do_not_apply + "no method does better than " +
-           (comparison.align == AlignMode::kRigid ? "the rigid alignment alone" : "the tracker as it is") + " (" +
-           before + ") " + placesText(n_places);
+    return do_not_apply + (comparison.verdict.is_inside_out ? insideOutText(*comparison.fold_back) + "; " : "") +
+           "no method does better than " +
+           (comparison.align == calibration::AlignMode::kRigid ? "the rigid alignment alone" : "the tracker as it is") +
+           " (" + before + ") " + placesText(comparison);
   const MethodScore& best = comparison.position[*comparison.best_position_row];
-  const std::string name = nameOf(comparison.position, *comparison.best_position_row);
+  const std::string name = correctors::positionLabel(best.method, best.settings);
   const std::string after = errorText(best.stats.rms) + " mm";
+  if (comparison.verdict.is_inside_out)
+    return do_not_apply + name + " would take the error from " + before + " to " + after + " (" +
+           placesText(comparison) + "), but " + insideOutText(*comparison.fold_back);
   if (test.apply)
-    return "Apply " + name + ": error before " + before + ", after " + after + " (" + placesText(n_places) +
+    return "Apply " + name + ": error before " + before + ", after " + after + " (" + placesText(comparison) +
            "), gain " + percentText(test.gain) + " % (" + intervalText(test) + ")";
   return do_not_apply + "the best method, " + name + ", takes the error from " + before + " to " + after + " (" +
-         placesText(n_places) + "), a gain of " + percentText(test.gain) + " % (" + intervalText(test) + ")" +
-         whyNot(test, n_places);
+         placesText(comparison) + "), a gain of " + percentText(test.gain) + " % (" + intervalText(test) + ")" +
+         whyNot(test, comparison);
 }
 
-/// "; expect 1.2 mm inside the region and 3.4 mm near its edge, 5.6 mm at worst (place 17), limited by ..."
+/// "; expect 1.2 mm inside the region and 3.4 mm near its edge, 5.6 mm at worst (C4, pipe 3), limited by ..."
 std::string expectationText(const Comparison& comparison) {
   const Verdict& verdict = comparison.verdict;
-  if (verdict.worst_node < 0) return {};
+  if (verdict.worst_node < 0 || verdict.is_inside_out) return {};
   std::string text = "; expect ";
   if (verdict.inside_mm) text += errorText(*verdict.inside_mm) + " mm inside the region";
   if (verdict.edge_mm) text += (verdict.inside_mm ? " and " : "") + errorText(*verdict.edge_mm) + " mm near its edge";
-  text += ", " + errorText(verdict.worst_mm) + " mm at worst (place " + std::to_string(verdict.worst_node) + ")";
+  text += ", " + errorText(verdict.worst_mm) + " mm at worst (" + comparison.names.of(verdict.worst_node) + ")";
   return verdict.limited_by.empty() ? text : text + ", limited by " + verdict.limited_by;
 }
 
 std::string orientationText(const Comparison& comparison) {
-  if (!comparison.before_orientation_deg) return {};
+  if (!comparison.before_orientation_deg || comparison.verdict.is_inside_out) return {};
   const GainTest& test = comparison.verdict.orientation;
   const std::string before = errorText(comparison.before_orientation_deg->rms);
   if (!comparison.best_orientation_row) return "; orientation stays as it is (" + before + " degrees)";
-  const std::string name = nameOf(comparison.orientation, *comparison.best_orientation_row);
-  const std::string after = errorText(comparison.orientation[*comparison.best_orientation_row].stats.rms);
+  const MethodScore& best = comparison.orientation[*comparison.best_orientation_row];
+  const std::string name = correctors::orientationLabel(best.method, best.settings);
+  const std::string after = errorText(best.stats.rms);
   if (test.apply) return "; for orientation apply " + name + ": " + before + " degrees before, " + after + " after";
   return "; orientation stays as it is (" + before + " degrees; the best method, " + name + ", gains " +
-         percentText(test.gain) + " %" + whyNot(test, comparison.places.size()) + ")";
+         percentText(test.gain) + " %" + whyNot(test, comparison) + ")";
 }
 
 }  // namespace
@@ -172,6 +204,21 @@ void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& cont
   verdict.gain_without_worst_place = verdict.position.gain_without_worst_place;
   if (comparison.before_position_mm.rms <= comparison.floor_position_mm)
     comparison.notes.push_back("The position error before correction is no larger than noise and jig tolerance make.");
+  if (const auto row = comparison.best_position_row;
+      row && kOverstatedFloor * comparison.position[*row].stats.rms < comparison.floor_position_mm)
+    comparison.notes.push_back("The noise floor, " + errorText(comparison.floor_position_mm) + " mm from " +
+                               comparison.floor_from + ", is far above what is left after correction, " +
+                               errorText(comparison.position[*row].stats.rms) +
+                               " mm: what the table states is too large or in another unit than metres.");
+}
+
+void refuseInsideOut(Comparison& comparison) {
+  const auto& fold_back = comparison.fold_back;
+  if (!fold_back || !(countFolds(*fold_back, true).isTooMany() || countFolds(*fold_back, false).isTooMany())) return;
+  Verdict& verdict = comparison.verdict;
+  verdict.is_inside_out = true;
+  verdict.apply_position = verdict.position.apply = false;
+  verdict.apply_orientation = verdict.orientation.apply = false;
 }
 
 void writeVerdictText(Comparison& comparison) {
@@ -182,4 +229,4 @@ void writeVerdictText(Comparison& comparison) {
       positionText(comparison, do_not_apply) + expectationText(comparison) + orientationText(comparison) + ".";
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

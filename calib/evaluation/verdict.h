@@ -4,13 +4,22 @@
 
 #include "calib/evaluation/comparison.h"
 
-namespace fieldtrue {
+namespace fieldtrue::evaluation {
+
+/// What is left after correction cannot be this many times smaller than what noise and jig make at every place: a
+/// larger floor is overstated.
+constexpr double kOverstatedFloor = 3.0;
 
 /// Picks the best methods by held-out RMS (nothing wins unless it beats the error before), tests their gain, and tells
 /// how far the others are from the best.
 void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& control = {});
 
+/// Nothing is applied where more than a quarter of the grid's cells fold back, or the correction does at more than a
+/// quarter of the points between the places: the axes or the places of the readings are wrong then, and a correction
+/// that hides it must not be believed.
+void refuseInsideOut(Comparison& comparison);
+
 /// Puts the verdict into one sentence.
 void writeVerdictText(Comparison& comparison);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::evaluation

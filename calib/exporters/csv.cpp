@@ -1,12 +1,13 @@
-#include "calib/exporters/csv.h"
-
 #include <sstream>
 
+#include "calib/calibration/alignment.h"
 #include "calib/core/file_io.h"
-#include "calib/core/table_io.h"
-#include "calib/correctors/method_text.h"
+#include "calib/correctors/base/method_text.h"
+#include "calib/exporters/rows.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 
-namespace fieldtrue {
+namespace fieldtrue::exporters {
 namespace {
 
 constexpr const char* kAddedColumns =
@@ -14,16 +15,16 @@ constexpr const char* kAddedColumns =
     "error_before_m,error_after_m,error_before_rad,error_after_rad,uncertainty_m,covered";
 
 /// The table that was fitted, with what a reader must know about this file among its metadata.
-CalibrationTable describedTable(const Corrector& corrector) {
+CalibrationTable describedTable(const calibration::Corrector& corrector) {
   CalibrationTable table = corrector.table();
-  const CorrectorChoice& choice = corrector.choice();
-  const bool aligned = corrector.align() == AlignMode::kRigid;
+  const calibration::CorrectorChoice& choice = corrector.choice();
+  const bool aligned = corrector.align() == calibration::AlignMode::kRigid;
   std::map<std::string, std::string>& other = table.metadata.other;
   other["unit"] = "metres, radians, seconds; quaternions w x y z";
   other["handedness"] = "right-handed";
   other["direction"] = "measured (x_m, tracker frame) to true (x_true_m, frame stated here)";
-  other["fit_position"] = methodText(choice.position_id, choice.position_settings);
-  other["fit_orientation"] = methodText(choice.orientation_id, choice.orientation_settings);
+  other["fit_position"] = correctors::methodText(choice.position_id, choice.position_settings);
+  other["fit_orientation"] = correctors::methodText(choice.orientation_id, choice.orientation_settings);
   other["fit_alignment"] = aligned ? "rigid, fitted to these rows" : "none";
   other["fit_rows"] = std::to_string(corrector.report().n_nodes);
   other["errors"] = aligned ? "in-sample; before = after the rigid alignment alone, after = with the correction"
@@ -32,8 +33,8 @@ CalibrationTable describedTable(const Corrector& corrector) {
   return table;
 }
 
-std::string addedFields(const Corrector& corrector, const Node& node) {
-  const Alignment& alignment = corrector.alignment();
+std::string addedFields(const calibration::Corrector& corrector, const Node& node) {
+  const calibration::Alignment& alignment = corrector.alignment();
   const Pose& tracked = node.tracker_from_sensor;
   const Pose corrected = corrector.correct(tracked);
   const Pose& truth = node.reference_from_sensor;
@@ -57,7 +58,7 @@ std::string addedFields(const Corrector& corrector, const Node& node) {
 }
 
 /// A node table that any reader of node tables takes, with columns added at the end of each line.
-std::string csvText(const Corrector& corrector) {
+std::string csvText(const calibration::Corrector& corrector) {
   const CalibrationTable table = describedTable(corrector);
   std::stringstream lines;
   writeNodeTable(lines, table);
@@ -76,7 +77,7 @@ std::string csvText(const Corrector& corrector) {
   return text;
 }
 
-Result<void> write(const Corrector& corrector, const std::filesystem::path& path) {
+Result<void> write(const calibration::Corrector& corrector, const std::filesystem::path& path) {
   const std::string text = csvText(corrector);
   return writeFileAtomically(path, [&](std::ostream& out) { out << text; });
 }
@@ -84,7 +85,11 @@ Result<void> write(const Corrector& corrector, const std::filesystem::path& path
 }  // namespace
 
 Exporter csvExporter() {
-  return {"csv", "Node table (CSV)", ".csv", "spreadsheets, MATLAB, Python, R, and Fieldtrue itself", write};
+  return {.id = "csv",
+          .label = "Node table (CSV)",
+          .extension = ".csv",
+          .reads_it = "spreadsheets, MATLAB, Python, R, and Fieldtrue itself",
+          .write = write};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::exporters

@@ -1,14 +1,20 @@
-#include "calib/exporters/ftcal.h"
+#include "calib/exporters/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::exporters {
 namespace {
 
-Result<void> write(const Corrector& corrector, const std::filesystem::path& path) { return corrector.save(path); }
+Result<void> write(const calibration::Corrector& corrector, const std::filesystem::path& path) {
+  return corrector.save(path);
+}
 
 }  // namespace
 
 Exporter ftcalExporter() {
-  return {"ftcal", "Fieldtrue calibration", ".ftcal.json", "Fieldtrue and programs that link its runtime", write};
+  return {.id = "ftcal",
+          .label = "Fieldtrue calibration",
+          .extension = ".ftcal.json",
+          .reads_it = "Fieldtrue",
+          .write = write};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::exporters

@@ -6,7 +6,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 GaussianStream::GaussianStream(std::uint64_t seed, std::uint32_t purpose, std::uint32_t index) {
   std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32U), purpose, index};
@@ -54,4 +54,4 @@ Eigen::Matrix3d CouplingNoise::at(double time_s) {
   return noise_;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

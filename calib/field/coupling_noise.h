@@ -5,7 +5,7 @@
 #include <optional>
 #include <random>
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 /// Standard normal numbers that are the same on every platform: the generator is fixed by the C++ standard, the
 /// transform (Box and Muller 1958) is ours, for std::normal_distribution is left to each library.
@@ -46,4 +46,4 @@ class CouplingNoise {
   std::optional<double> last_time_s_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

@@ -6,7 +6,7 @@
 
 #include "calib/core/pose.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 /// How the transmitter is driven and read.
 struct Excitation {
@@ -74,4 +74,4 @@ class CouplingDistortion : public PhysicalEffect {
   }
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

@@ -5,10 +5,10 @@
 #include <cmath>
 
 #include "calib/core/error.h"
-#include "calib/field/coupling.h"
+#include "calib/field/dipole_field.h"
 #include "calib/field/pose_solver.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 namespace {
 
@@ -19,16 +19,6 @@ Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
   return m;
-}
-
-/// Derivative of G(p; C) along axis `a`.
-Eigen::Matrix3d fieldSlope(const Eigen::Vector3d& p_m, double dipole_constant_m3, int a) {
-  const double r_m = p_m.norm();
-  const Eigen::Vector3d u = p_m / r_m;
-  const Eigen::Vector3d e = Eigen::Vector3d::Unit(a);
-  const Eigen::Matrix3d eu = e * u.transpose();
-  return 3.0 * dipole_constant_m3 / std::pow(r_m, 4) *
-         (eu + eu.transpose() + u[a] * Eigen::Matrix3d::Identity() - 5.0 * u[a] * u * u.transpose());
 }
 
 /// The nine equations and the pull of the last position, all without unit.
@@ -56,7 +46,7 @@ class Equations {
     const Eigen::Matrix3d to_sensor = pose.orientation.toRotationMatrix().transpose();
     const Eigen::Matrix3d G = dipoleField(pose.position_m, constant_m3_);
     for (int a = 0; a < 3; ++a) {
-      const Eigen::Matrix3d by_place = to_sensor * fieldSlope(pose.position_m, constant_m3_, a);
+      const Eigen::Matrix3d by_place = to_sensor * dipoleFieldSlope(pose.position_m, constant_m3_, a);
       const Eigen::Matrix3d by_turn = -to_sensor * crossMatrix(Eigen::Vector3d::Unit(a)) * G;
       J.col(a).head<9>() = per_coupling_ * by_place.reshaped();
       J.col(3 + a).head<9>() = per_coupling_ * by_turn.reshaped();
@@ -154,4 +144,4 @@ std::optional<PoseSolver> poseSolverNamed(std::string_view name) {
   return std::nullopt;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

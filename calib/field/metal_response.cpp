@@ -5,7 +5,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 namespace {
 
@@ -112,4 +112,4 @@ double inductiveShare(double rate_per_s, const Excitation& excitation) {
   return w * w / (w * w + rate_per_s * rate_per_s);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

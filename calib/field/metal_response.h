@@ -6,7 +6,7 @@
 
 #include "calib/field/effect.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 /// Permeability of free space [H/m].
 inline constexpr double kMu0_h_per_m = 1.25663706212e-6;
@@ -67,4 +67,4 @@ double sheetChargeShare(const MetalSheet& sheet, double rate_per_m, const Excita
 /// @param rate_per_s R / L
 double inductiveShare(double rate_per_s, const Excitation& excitation);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

@@ -4,7 +4,7 @@
 #include <Eigen/SVD>
 #include <cmath>
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 namespace {
 
@@ -54,4 +54,4 @@ double reflectionOf(const std::vector<PlaneImage>& images, double k_per_m) {
   return sum;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

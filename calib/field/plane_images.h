@@ -5,7 +5,7 @@
 
 #include "calib/field/metal_response.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 /// An image of the transmitter behind a plane.
 struct PlaneImage {
@@ -28,4 +28,4 @@ std::vector<PlaneImage> planeImages(const Metal& metal, std::optional<double> th
 /// Reflection of a field of wave number k by these images.
 double reflectionOf(const std::vector<PlaneImage>& images, double k_per_m);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

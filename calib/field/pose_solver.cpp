@@ -6,7 +6,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 namespace {
 
@@ -62,4 +62,4 @@ tl::expected<PoseSolution, SolveError> solvePose(const Eigen::Matrix3d& coupling
   return solution;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

@@ -8,7 +8,7 @@
 
 #include "calib/core/pose.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 /// Why nine couplings give no pose.
 enum class SolveError {
@@ -79,4 +79,4 @@ tl::expected<PoseSolution, SolveError> solvePose(PoseSolver solver, const Eigen:
 /// reported 1.8/(1.8 + w) of their size.
 inline constexpr double kDamping = 0.2;
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

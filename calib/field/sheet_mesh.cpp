@@ -8,7 +8,7 @@
 
 #include "calib/core/error.h"
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 namespace {
 
@@ -143,4 +143,4 @@ SheetModes SheetMesh::chargeModes() const {
   return {symmetric * modes.eigenvectors(), modes.eigenvalues()};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

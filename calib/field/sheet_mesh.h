@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-namespace fieldtrue {
+namespace fieldtrue::field {
 
 /// A linear answer split into independent modes: U diag(share(rate)) U^T.
 struct SheetModes {
@@ -49,4 +49,4 @@ class SheetMesh {
   std::vector<Eigen::Vector2d> charge_centers_m_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::field

@@ -2,35 +2,42 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "calib/core/file_io.h"
-#include "calib/gap/cleaning.h"
-#include "calib/gap/gap_candidates.h"
-#include "calib/gap/gap_held_out.h"
-#include "calib/gap/gap_isolability.h"
-#include "calib/gap/gap_next.h"
-#include "calib/gap/gap_search.h"
-#include "calib/gap/gap_traces.h"
-#include "calib/gap/gap_where.h"
-#include "calib/gap/sample_findings.h"
+#include "calib/effects/registry.h"
+#include "calib/field/tracker_model.h"
+#include "calib/gap/candidates.h"
+#include "calib/gap/held_out.h"
+#include "calib/gap/isolability.h"
+#include "calib/gap/next_measurement.h"
+#include "calib/gap/verdict.h"
+#include "calib/gap/where.h"
+#include "calib/identify/sample_findings.h"
+#include "calib/identify/search.h"
+#include "calib/identify/traces.h"
+#include "calib/recording/cleaning.h"
+#include "calib/recording/finding.h"
 
-namespace fieldtrue {
+namespace fieldtrue::gap {
 namespace {
 
 constexpr std::size_t kStartsForIsolability = 24;
+constexpr double kDegree = 180.0 / std::numbers::pi;
 
-Result<std::vector<std::unique_ptr<PhysicalEffect>>> believedEffects(const Scene* scene, const Excitation& excitation) {
-  std::vector<std::unique_ptr<PhysicalEffect>> effects;
+Result<std::vector<std::unique_ptr<field::PhysicalEffect>>> believedEffects(const simulation::Scene* scene,
+                                                                            const field::Excitation& excitation) {
+  std::vector<std::unique_ptr<field::PhysicalEffect>> effects;
   if (scene == nullptr) return effects;
-  for (const EffectInstance& instance : scene->effects) {
-    auto effect = makeEffect(instance.id, instance.parameters, excitation);
+  for (const simulation::EffectInstance& instance : scene->effects) {
+    auto effect = effects::makeEffect(instance.id, instance.parameters, excitation);
     if (!effect) return tl::unexpected<Error>(effect.error());
     effects.push_back(std::move(*effect));
   }
   return effects;
 }
 
-void takeFromScene(const Scene* scene, const TableMetadata& metadata, GapRows& rows) {
+void takeFromScene(const simulation::Scene* scene, const TableMetadata& metadata, identify::GapRows& rows) {
   if (scene == nullptr) return;
   if (!metadata.excitation) {
     rows.excitation.is_pulsed_dc = scene->tracker.excitation == "pulsed_dc";
@@ -41,103 +48,6 @@ void takeFromScene(const Scene* scene, const TableMetadata& metadata, GapRows& r
   if (!rows.placing_sd_rad && scene->rig.tolerance_rad > 0.0) rows.placing_sd_rad = scene->rig.tolerance_rad;
   if (metadata.alignment_known && metadata.frame != "tracker")
     rows.stated_tracker_from_reference = inverse(scene->reference_from_tracker);
-}
-
-/// What the verdict goes by.
-struct Evidence {
-  bool has_effect = false;      ///< One of the catalogue was selected.
-  bool has_structure = false;   ///< Before any effect.
-  bool is_above_floor = false;  ///< Clearly larger than a stated floor, structured or not.
-  double fraction = 1.0;        ///< What is surely left over what there was before, amplitude.
-};
-
-/// What a selection leaves: all that smooth physics could make, and single traces of what no catalogue holds.
-struct LeftOver {
-  Structure structure;
-  std::vector<Trace> traces;
-};
-
-LeftOver leftBy(const GapSearch& search, const GapModel& model, const GapRows& rows) {
-  const Linearized at(search.physics(), model, search.whitening(), search.spaceBlocks());
-  return {findStructure(at, rows, false), findTraces(at, rows)};
-}
-
-constexpr double kSureTrace = 1e-5;
-
-Evidence weigh(const GapSearch& search, const Selection& selection, const HeldOutGap& held_out, const LeftOver& left,
-               const GapRows& stated) {
-  constexpr double kSure = 1e-4;
-  constexpr double kSureOfNothingNamed = 1e-6;  // F tests of many columns are a little too sure.
-  constexpr double kClearlyAbove = 1.6;         // A floor stated 20 % too low is no gap, nor is one stated by guess.
-  const bool has_trace = left.traces.front().p_value < kSureTrace;
-  Evidence evidence;
-  evidence.has_effect = !selection.ways.empty();
-  evidence.has_structure = search.structureOfNone().p_value < kSureOfNothingNamed || has_trace;
-  const double placed_mm = stated.placing_sd_m ? 1e3 * *stated.placing_sd_m : 0.0;
-  evidence.is_above_floor = placed_mm > 0.0 && 1e3 * search.placingSd_m() > kClearlyAbove * placed_mm;
-  if (!evidence.has_effect) return evidence;
-  const GapRows& rows = search.physics().rows();
-  const double count = static_cast<double>(rows.rows.size()) * rows.channels();
-  double sure_left = 0.0;
-  if (left.structure.p_value < kSure) sure_left = std::max(0.0, held_out.left - 1.645 * held_out.left_sd);
-  if (has_trace) sure_left = std::max(sure_left, left.traces.front().explained / count);
-  evidence.fraction = std::sqrt(std::min(1.0, sure_left / std::max(held_out.before, 1e-12)));
-  return evidence;
-}
-
-GapVerdict verdictOf(const Evidence& evidence) {
-  if (!evidence.has_effect)
-    return evidence.has_structure || evidence.is_above_floor ? GapVerdict::kUnexplained : GapVerdict::kNoGap;
-  if (evidence.fraction <= 0.15) return GapVerdict::kExplained;
-  return evidence.fraction <= 0.5 ? GapVerdict::kPartlyExplained : GapVerdict::kUnexplained;
-}
-
-std::string labelOf(const std::string& id) {
-  const auto effect = findEffect(id);
-  return effect ? (*effect)->label : id;
-}
-
-std::string shown(double value) {
-  const double scale = value >= 10.0 ? 1.0 : value >= 1.0 ? 10.0 : 100.0;
-  return formatNumber(std::round(value * scale) / scale);
-}
-
-std::string causesText(const GapReport& report) {
-  std::string text;
-  for (const SelectedEffect& effect : report.selected) {
-    std::string name = labelOf(effect.effect);
-    for (const std::string& other : effect.equivalents)
-      if (other != effect.effect) name += " or " + labelOf(other) + " (this grid cannot tell)";
-    text += (text.empty() ? "" : ", and ") + name;
-  }
-  return text;
-}
-
-constexpr double kPoorlyPredicted = 0.5;
-
-std::string verdictText(const GapReport& report) {
-  const std::string gap =
-      shown(report.position_rms_mm) + " mm where noise alone would be " + shown(report.floor_position_mm) + " mm";
-  const std::string percent = shown(100.0 * std::max(0.0, 1.0 - report.remaining_fraction)) + " %";
-  switch (report.verdict) {
-    case GapVerdict::kNoGap:
-      return "No gap: the recording agrees with the simulation within its noise (" + gap + ").";
-    case GapVerdict::kExplained:
-      return "The gap (" + gap + ") is explained by: " + causesText(report) +
-             "; on places the fit did not see it takes " + percent + " of it away" +
-             (report.remaining_fraction > kPoorlyPredicted
-                  ? ", because these lie where nothing else tells of it; nothing is left where it was measured."
-                  : ".");
-    case GapVerdict::kPartlyExplained:
-      return "The gap (" + gap + ") is partly explained by: " + causesText(report) + "; this takes " + percent +
-             " of it away, the rest has another cause.";
-    case GapVerdict::kUnexplained:
-      return "There is a gap (" + gap + "), but no known effect explains it" +
-             (report.selected.empty()
-                  ? std::string(".")
-                  : "; the nearest, " + causesText(report) + ", takes only " + percent + " of it away.");
-  }
-  return {};
 }
 
 void addSequence(const HeldOutGap& held_out, double mm_per_unit, GapReport& report) {
@@ -167,15 +77,39 @@ void addRemaining(const HeldOutGap& held_out, const Evidence& evidence, GapRepor
   }
 }
 
-void addTraces(const std::vector<Trace>& traces, GapReport& report) {
-  for (const Trace& trace : traces)
+void addTraces(const std::vector<identify::Trace>& traces, GapReport& report) {
+  for (const identify::Trace& trace : traces)
     if (trace.p_value < kSureTrace)
       report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
 }
 
+/// What scatters from place to place beyond what a person with a jig does is told, for no tolerance says so.
+void addBoundOfFloor(const identify::GapSearch& search, GapReport& report) {
+  const auto tell = [&](double seen, double bound, const std::string& unit, const std::string& by_hand,
+                        const std::string& remedy) {
+    if (!(seen > bound)) return;
+    report.findings.push_back({"",
+                               "The places scatter by " + shown(seen) + " " + unit +
+                                   " (SD per axis) about any smooth field. No tolerance is stated, and a person with a "
+                                   "jig stays within " +
+                                   shown(bound) + " " + unit + " (" + by_hand +
+                                   "): the floor is held there, and what is above it counts as gap. " + remedy,
+                               {}});
+  };
+  if (search.floorPlacingSd_m() < search.placingSd_m())
+    tell(1e3 * search.placingSd_m(), 1e3 * identify::kWorstPlacing_m, "mm",
+         "a foot set on its mark within a finger's breadth",
+         "Are true and tracked positions of the same places and of one sensor? Else state jig_tolerance_m.");
+  if (search.floorPlacingSd_rad() < search.placingSd_rad())
+    tell(kDegree * search.placingSd_rad(), kDegree * identify::kWorstPlacing_rad, "degrees",
+         "turned and held upright by eye within ten degrees",
+         "Are the true orientations those of the places, and all rows of one sensor? Else state jig_tolerance_rad, or "
+         "leave the columns of the orientation out.");
+}
+
 /// Effects that single readings show stand beside those that the poses show.
 void selectSignalFindings(GapReport& report) {
-  for (const GapFinding& finding : report.findings) {
+  for (const recording::GapFinding& finding : report.findings) {
     if (finding.effect.empty()) continue;
     const auto is_same = [&](const SelectedEffect& e) { return e.effect == finding.effect; };
     if (std::any_of(report.selected.begin(), report.selected.end(), is_same)) continue;
@@ -187,10 +121,13 @@ void selectSignalFindings(GapReport& report) {
   }
 }
 
-void describeInput(const GapRows& rows, const SampleTable* samples, GapReport& report) {
+void describeInput(const identify::GapRows& rows, const SampleTable* samples, GapReport& report) {
   report.input.places = static_cast<int>(rows.place_nodes.size());
   report.input.rows = static_cast<int>(rows.rows.size());
-  report.input.samples = samples != nullptr ? static_cast<int>(samples->rows.size()) : 0;
+  if (samples != nullptr) {
+    report.input.samples = static_cast<int>(
+        std::count_if(samples->rows.begin(), samples->rows.end(), [](const SampleRow& row) { return row.node >= 0; }));
+  }
   report.input.orientations = rows.n_orientations;
   report.input.position_only = !rows.has_orientation;
 }
@@ -204,26 +141,28 @@ RunControl partOf(const RunControl& control, double from, double to) {
 
 }  // namespace
 
-Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const Scene* scene,
+Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
                            const DiagnosisOptions& options, const RunControl& control) {
   GapReport report;
-  Cleaned cleaned = cleanRows(table);
-  auto rows = makeGapRows(cleaned.nodes, table.metadata);
+  recording::Cleaned cleaned = recording::cleanRows(table);
+  auto rows = identify::makeGapRows(cleaned.nodes, table.metadata);
   if (!rows) return tl::unexpected<Error>(rows.error());
   takeFromScene(scene, table.metadata, *rows);
   auto believed = believedEffects(scene, rows->excitation);
   if (!believed) return tl::unexpected<Error>(believed.error());
+  report.names = std::move(cleaned.names);
   describeInput(*rows, samples, report);
   report.findings = std::move(cleaned.findings);
-  for (GapFinding& finding : sampleFindings(samples, table, scene)) report.findings.push_back(std::move(finding));
+  for (recording::GapFinding& finding : identify::sampleFindings(samples, table, scene))
+    report.findings.push_back(std::move(finding));
   control.progress(0.03);
 
-  const GapSearch search(*rows, std::move(*believed));
+  const identify::GapSearch search(*rows, std::move(*believed));
   control.progress(0.1);
-  SelectionOptions selecting;
-  const bool has_enough = rows->place_nodes.size() >= kFewestPlacesForCauses;
+  identify::EffectSelectionOptions selecting;
+  const bool has_enough = rows->place_nodes.size() >= identify::kFewestPlacesForCauses;
   selecting.most_effects = has_enough ? options.most_effects : 0;
-  const Selection selection = selectEffects(search, selecting, partOf(control, 0.1, 0.7));
+  const identify::EffectSelection selection = identify::selectEffects(search, selecting, partOf(control, 0.1, 0.7));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.7);
   const LeftOver left = leftBy(search, selection.model.model, *rows);
@@ -236,12 +175,14 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   report.sensor_from_mount = inverse(selection.model.model.alignment.mount_from_sensor);
   report.p_value = search.structureOfNone().p_value;
   report.origin = search.structureOfNone().origin;
-  report.candidates = describeCandidates(search, selection, held_out, report.floor_position_mm);
-  report.selected = describeSelected(search, selection, held_out, report.candidates, report.floor_position_mm);
-  const Evidence evidence = weigh(search, selection, held_out, left, *rows);
+  const double unit_mm = search.whitenedUnit_mm();
+  report.candidates = describeCandidates(search, selection, held_out, unit_mm);
+  report.selected = describeSelected(search, selection, held_out, report.candidates, unit_mm);
+  const Evidence evidence = weigh(search, selection, held_out, left, *rows, report);
   report.verdict = verdictOf(evidence);
   addTraces(left.traces, report);
-  addSequence(held_out, report.floor_position_mm, report);
+  addBoundOfFloor(search, report);
+  addSequence(held_out, unit_mm, report);
   addRemaining(held_out, evidence, report);
   report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);
   report.isolability = isolabilityOf(search, kStartsForIsolability, control);
@@ -250,15 +191,15 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   report.text = verdictText(report);
   if (!has_enough) {
     report.text += " Causes are not looked for: " + std::to_string(report.input.places) + " places are too few, " +
-                   std::to_string(kFewestPlacesForCauses) + " are needed.";
+                   std::to_string(identify::kFewestPlacesForCauses) + " are needed.";
   }
   selectSignalFindings(report);
   control.progress(1.0);
   return report;
 }
 
-Scene updatedScene(const Scene& scene, const GapReport& report) {
-  Scene updated = scene;
+simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report) {
+  simulation::Scene updated = scene;
   updated.reference_from_tracker = inverse(report.tracker_from_reference);
   for (const SelectedEffect& effect : report.selected)
     if (effect.scene_parameters.is_object()) updated.effects.push_back({effect.effect, effect.scene_parameters});
@@ -278,7 +219,7 @@ Pose defaultTransmitter(std::span<const PlannedPlace> plan) {
 }
 
 /// The rows that a plan would give were nothing wrong, with the noise of the scene's tracker and rig.
-Result<GapRows> plannedRows(std::span<const PlannedPlace> plan, const Scene& scene) {
+Result<identify::GapRows> plannedRows(std::span<const PlannedPlace> plan, const simulation::Scene& scene) {
   constexpr double kSecondsEach = 10.0;
   constexpr double kSamplesEach = 60.0;
   const Pose tracker_from_reference = inverse(scene.reference_from_tracker);
@@ -291,7 +232,7 @@ Result<GapRows> plannedRows(std::span<const PlannedPlace> plan, const Scene& sce
     node.index = place.index;
     node.reference_from_sensor = place.reference_from_sensor;
     node.tracker_from_sensor = tracker_from_reference * place.reference_from_sensor;
-    const Eigen::Matrix<double, 6, 9> by_field = poseByField(node.tracker_from_sensor.position_m);
+    const Eigen::Matrix<double, 6, 9> by_field = field::poseByField(node.tracker_from_sensor.position_m);
     const double sd = scene.tracker.coupling_noise / scene.tracker.dipole_constant_m3;
     node.covariance_m2 = sd * sd * by_field.topRows<3>() * by_field.topRows<3>().transpose();
     node.sd_rot_rad = sd * by_field.bottomRows<3>().norm();
@@ -307,28 +248,30 @@ Result<GapRows> plannedRows(std::span<const PlannedPlace> plan, const Scene& sce
   metadata.alignment_tolerance_rad = scene.rig.alignment_tolerance_rad;
   metadata.jig_tolerance_m = scene.rig.tolerance_m > 0.0 ? scene.rig.tolerance_m : 2e-3;
   metadata.jig_tolerance_rad = scene.rig.tolerance_rad > 0.0 ? scene.rig.tolerance_rad : 3.5e-3;
-  auto rows = makeGapRows(nodes, metadata);
+  auto rows = identify::makeGapRows(nodes, metadata);
   if (rows) rows->stated_tracker_from_reference = tracker_from_reference;
   return rows;
 }
 
 }  // namespace
 
-Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const Scene* scene, const RunControl& control) {
-  Scene believed = scene != nullptr ? *scene : Scene{};
+Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const simulation::Scene* scene,
+                              const RunControl& control) {
+  simulation::Scene believed = scene != nullptr ? *scene : simulation::Scene{};
   if (scene == nullptr) believed.reference_from_tracker = defaultTransmitter(plan);
   auto rows = plannedRows(plan, believed);
   if (!rows) return tl::unexpected<Error>(rows.error());
-  if (rows->place_nodes.size() < kFewestPlacesForCauses) {
-    return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " + std::to_string(kFewestPlacesForCauses) +
+  if (rows->place_nodes.size() < identify::kFewestPlacesForCauses) {
+    return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " +
+                                             std::to_string(identify::kFewestPlacesForCauses) +
                                              " places; this one has " + std::to_string(rows->place_nodes.size()) + ".");
   }
   auto effects = believedEffects(&believed, rows->excitation);
   if (!effects) return tl::unexpected<Error>(effects.error());
-  const GapSearch search(*rows, std::move(*effects), NoiseFrom::kStated);
+  const identify::GapSearch search(*rows, std::move(*effects), identify::NoiseFrom::kStated);
   Isolability isolability = isolabilityOf(search, 60, control);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The check of the plan was stopped.");
   return isolability;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::gap

@@ -7,10 +7,10 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
-#include "calib/gap/gap_report.h"
+#include "calib/gap/report.h"
 #include "calib/simulation/scene.h"
 
-namespace fieldtrue {
+namespace fieldtrue::gap {
 
 struct DiagnosisOptions {
   int most_effects = 4;
@@ -23,16 +23,17 @@ struct DiagnosisOptions {
 /// @param scene what the simulator believes; null = an ideal tracker in free space
 /// @error kTooFewNodes below 8 usable places (causes are looked for from 12 on), those with a value that is not finite
 /// left out and named; kCancelled
-Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const Scene* scene,
+Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
                            const DiagnosisOptions& options = {}, const RunControl& control = {});
 
 /// The scene with the selected effects of a report added; the transmitter's pose and signal effects are taken over too.
-Scene updatedScene(const Scene& scene, const GapReport& report);
+simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report);
 
 /// Which effects a planned grid can tell apart, before a day is spent on it.
 /// @param scene the tracker, its place in the rig's frame and the tolerances; null = the default tracker one pitch
 /// behind the middle of the grid's first face
 /// @error kTooFewNodes; kCancelled
-Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const Scene* scene, const RunControl& control = {});
+Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const simulation::Scene* scene,
+                              const RunControl& control = {});
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::gap

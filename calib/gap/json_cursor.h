@@ -11,7 +11,7 @@
 
 #include "calib/effects/object_reader.h"
 
-namespace fieldtrue {
+namespace fieldtrue::gap {
 
 /// One value of a JSON document and the path that leads to it. The first thing that is wrong anywhere in the document
 /// is remembered, so a reader goes straight through and asks once at the end; until then a wrong value reads as a
@@ -96,7 +96,7 @@ class JsonCursor {
 
   /// Remembers that the value is not what is needed.
   void refuse(const std::string& needed) const {
-    if (value_ != nullptr) remember(path_ + " is " + seenValue(*value_) + "; it must be " + needed);
+    if (value_ != nullptr) remember(path_ + " is " + effects::seenValue(*value_) + "; it must be " + needed);
   }
 
  private:
@@ -112,4 +112,4 @@ class JsonCursor {
   std::string* problem_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::gap

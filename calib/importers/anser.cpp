@@ -1,12 +1,11 @@
-#include "calib/importers/anser.h"
-
 #include <algorithm>
 #include <array>
 
-#include "calib/core/csv_reader.h"
 #include "calib/core/file_io.h"
+#include "calib/importers/rows.h"
+#include "calib/tables/csv_reader.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 namespace {
 
@@ -79,6 +78,7 @@ Result<Import> importAnser(const std::filesystem::path& path, const std::optiona
 
 }  // namespace
 
+/// The table of Anser EMT's Duplo-board recordings: one condition of it as a node table, positions only.
 Importer anserImporter() {
   Setting condition;
   condition.key = "condition";
@@ -88,12 +88,11 @@ Importer anserImporter() {
   condition.choices = {"standard_data_grid", "interpolate_data_grid", "interpolate_data_grid_probe_calibrate",
                        "finer_mesh_points",  "finer_mesh_3axis",      "steel_shield"};
   condition.help = "Which of the table's recordings to take";
-  return {"anser",
-          "Anser EMT Duplo-board table (.csv)",
-          "Jaeger, O'Donoghue, Matlab-Anser, mapping/data_out",
-          {condition},
-          false,
-          importAnser};
+  return {.id = "anser",
+          .label = "Anser EMT Duplo-board table (.csv)",
+          .source = "Jaeger, O'Donoghue, Matlab-Anser, mapping/data_out",
+          .settings = {condition},
+          .read = importAnser};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

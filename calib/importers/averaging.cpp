@@ -4,7 +4,7 @@
 #include <map>
 #include <tuple>
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 namespace {
 
@@ -51,4 +51,4 @@ Result<AveragedNodes> averageRows(std::span<const SampleRow> rows, const Averagi
   return averaged;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

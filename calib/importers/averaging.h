@@ -10,7 +10,7 @@
 #include "calib/core/error.h"
 #include "calib/core/statistics.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 /// Sets the status of a sample whose position is the mark of a missing reading.
 void markMissing(Sample& sample);
@@ -26,4 +26,4 @@ struct AveragedNodes {
 Result<AveragedNodes> averageRows(std::span<const SampleRow> rows, const AveragingOptions& options,
                                   bool has_orientation, const std::string& place_word);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

@@ -1,16 +1,15 @@
-#include "calib/importers/columns.h"
-
 #include <array>
 #include <map>
 #include <set>
 #include <tuple>
 
-#include "calib/core/csv_reader.h"
 #include "calib/core/file_io.h"
 #include "calib/importers/averaging.h"
+#include "calib/importers/rows.h"
 #include "calib/importers/truth.h"
+#include "calib/tables/csv_reader.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 namespace {
 
@@ -265,6 +264,7 @@ Setting textSetting(std::string key, std::string label, std::string default_valu
 
 }  // namespace
 
+/// Any table with a header row: the settings name its columns, unit and separator.
 Importer columnsImporter() {
   std::vector<Setting> settings;
   for (const char* axis : {"x", "y", "z"}) {
@@ -299,8 +299,11 @@ Importer columnsImporter() {
   average.default_value = false;
   average.help = "Average the rows of each node and visit instead of taking each as a mean";
   settings.push_back(average);
-  return {"columns",    "Table with named columns (.csv)", "any program that writes a header row", settings, false,
-          importColumns};
+  return {.id = "columns",
+          .label = "Table with named columns (.csv)",
+          .source = "any program that writes a header row",
+          .settings = settings,
+          .read = importColumns};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

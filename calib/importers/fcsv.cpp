@@ -2,11 +2,12 @@
 
 #include <array>
 
-#include "calib/core/csv_reader.h"
 #include "calib/core/file_io.h"
+#include "calib/importers/rows.h"
 #include "calib/importers/truth.h"
+#include "calib/tables/csv_reader.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 namespace {
 
@@ -86,10 +87,13 @@ Result<FcsvPoints> readFcsv(const std::filesystem::path& path) {
   return fcsv;
 }
 
+/// 3D Slicer markups with their truth as a node table, positions only.
 Importer fcsvImporter() {
-  return {
-      "fcsv",    "3D Slicer markups (.fcsv) and their true positions", "3D Slicer 4.x, markups fiducial file", {}, true,
-      importFcsv};
+  return {.id = "fcsv",
+          .label = "3D Slicer markups (.fcsv) and their true positions",
+          .source = "3D Slicer 4.x, markups fiducial file",
+          .needs_truth = true,
+          .read = importFcsv};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

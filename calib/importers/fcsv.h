@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "calib/core/pose.h"
-#include "calib/importers/registry.h"
+#include "calib/importers/importer.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 struct FcsvPoint {
   std::string label;
@@ -24,7 +24,4 @@ struct FcsvPoints {
 /// @error kIo; kBadInput naming file, line and column, or for a coordinate system that has no metric
 Result<FcsvPoints> readFcsv(const std::filesystem::path& path);
 
-/// 3D Slicer markups with their truth as a node table, positions only.
-Importer fcsvImporter();
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

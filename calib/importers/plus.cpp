@@ -1,15 +1,15 @@
-#include "calib/importers/plus.h"
-
 #include <array>
 #include <cstdio>
 #include <map>
 
-#include "calib/core/csv_reader.h"
 #include "calib/core/file_io.h"
+#include "calib/core/quantum.h"
 #include "calib/core/statistics.h"
 #include "calib/importers/averaging.h"
+#include "calib/importers/rows.h"
+#include "calib/tables/csv_reader.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 namespace {
 
@@ -146,6 +146,7 @@ Result<Import> importPlus(const std::filesystem::path& path, const std::optional
 
 }  // namespace
 
+/// The sample table of fCal (PLUS) recordings: a stylus pivoting on the landmarks of a phantom.
 Importer plusImporter() {
   Setting body;
   body.key = "body";
@@ -160,9 +161,11 @@ Importer plusImporter() {
   reject.type = SettingType::kBool;
   reject.default_value = true;
   reject.help = "Leave samples far from the median of their landmark out of its mean";
-  return {
-      "plus",    "PLUS fCal stylus recording (.csv)", "PlusToolkit, PlusLibData, fCal phantom", {body, reject}, false,
-      importPlus};
+  return {.id = "plus",
+          .label = "PLUS fCal stylus recording (.csv)",
+          .source = "PlusToolkit, PlusLibData, fCal phantom",
+          .settings = {body, reject},
+          .read = importPlus};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

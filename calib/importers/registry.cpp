@@ -1,6 +1,6 @@
 // To add an importer:
-// 1. Write calib/importers/<id>.h with `Importer <id>Importer();` and <id>.cpp with its row: id, label, source,
-//    settings, whether it needs a truth file, and the reading function.
+// 1. Write calib/importers/<id>.cpp with its row: id, label, source, settings, whether it needs a truth file, and the
+//    reading function. Declare the row in rows.h.
 // 2. Put the row into the table below.
 // 3. Add a test beside the others in tests/calib/importers; importer_contract_test checks the new row by itself.
 
@@ -9,13 +9,11 @@
 #include <algorithm>
 #include <vector>
 
-#include "calib/importers/anser.h"
-#include "calib/importers/columns.h"
 #include "calib/importers/fcsv.h"
-#include "calib/importers/plus.h"
-#include "calib/importers/traj.h"
+#include "calib/importers/importer.h"
+#include "calib/importers/rows.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 std::span<const Importer> importers() {
   static const std::vector<Importer> table{fcsvImporter(), anserImporter(), plusImporter(), columnsImporter(),
@@ -32,4 +30,4 @@ Result<const Importer*> findImporter(std::string_view id) {
   return fail(ErrorCode::kBadInput, "There is no format '" + std::string(id) + "' to import; the formats are " + known);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

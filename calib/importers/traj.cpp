@@ -1,12 +1,11 @@
-#include "calib/importers/traj.h"
-
 #include <array>
 #include <string>
 
-#include "calib/core/csv_reader.h"
 #include "calib/core/file_io.h"
+#include "calib/importers/rows.h"
+#include "calib/tables/csv_reader.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 namespace {
 
@@ -40,12 +39,14 @@ Result<std::vector<SampleRow>> readMatrices(std::istream& in, const std::string&
   std::vector<SampleRow> rows;
   Eigen::Matrix4d matrix;
   Eigen::Index next_row = 0;
-  int line_number = 0;
+  LineReader lines(in, name);
   const auto bad = [&](const std::string& what) {
-    return fail(ErrorCode::kBadInput, name + ", line " + std::to_string(line_number) + ": " + what);
+    return fail(ErrorCode::kBadInput, name + ", line " + std::to_string(lines.number()) + ": " + what);
   };
-  for (std::string line; std::getline(in, line);) {
-    ++line_number;
+  for (std::string line;;) {
+    const Result<bool> more = lines.next(line);
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) break;
     if (trimBlanks(line).empty()) {
       if (next_row != 0) return bad("a matrix has " + std::to_string(next_row) + " rows, it needs 4");
       continue;
@@ -89,6 +90,7 @@ Result<Import> importTraj(const std::filesystem::path& path, const std::optional
 
 }  // namespace
 
+/// Trajectories as 4x4 matrices separated by blank lines: samples without truth.
 Importer trajImporter() {
   Setting rate;
   rate.key = "rate_hz";
@@ -99,8 +101,11 @@ Importer trajImporter() {
   rate.max = 100000.0;
   rate.default_value = 100.0;
   rate.help = "Rows in a second; the file itself has no times";
-  return {"traj",    "Trajectory of 4x4 matrices in metres (.traj)", "RMonica, hand-polhemus-dataset", {rate}, false,
-          importTraj};
+  return {.id = "traj",
+          .label = "Trajectory of 4x4 matrices in metres (.traj)",
+          .source = "RMonica, hand-polhemus-dataset",
+          .settings = {rate},
+          .read = importTraj};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

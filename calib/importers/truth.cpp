@@ -3,10 +3,10 @@
 #include <map>
 
 #include "calib/core/file_io.h"
-#include "calib/core/table_io.h"
 #include "calib/importers/fcsv.h"
+#include "calib/tables/table_io.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 namespace {
 
@@ -118,4 +118,4 @@ Result<TruthMatch> matchTruth(const Truth& truth, const std::vector<std::string>
   return match;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

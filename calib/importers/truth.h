@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "calib/core/calibration_table.h"
-#include "calib/core/csv_reader.h"
 #include "calib/core/error.h"
+#include "calib/tables/csv_reader.h"
 
-namespace fieldtrue {
+namespace fieldtrue::importers {
 
 /// One place of a truth file.
 struct TruthPoint {
@@ -38,4 +38,4 @@ struct TruthMatch {
 /// @error kBadInput when the labels do not match and the counts differ
 Result<TruthMatch> matchTruth(const Truth& truth, const std::vector<std::string>& labels);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::importers

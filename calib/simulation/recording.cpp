@@ -6,11 +6,12 @@
 #include <utility>
 
 #include "calib/core/file_io.h"
+#include "calib/core/place_name.h"
 #include "calib/core/statistics.h"
 #include "calib/simulation/simulator.h"
 #include "calib/simulation/tracker_physics.h"
 
-namespace fieldtrue {
+namespace fieldtrue::simulation {
 
 namespace {
 
@@ -56,8 +57,8 @@ Result<void> check(std::span<const PlannedPlace> plan, const SimulationOptions& 
 std::vector<Stop> drawStops(const TrackerPhysics& physics, std::span<const PlannedPlace> plan,
                             const SimulationOptions& options) {
   const Scene& scene = physics.scene();
-  GaussianStream placing(options.seed, static_cast<std::uint32_t>(RandomPurpose::kPlacing));
-  CouplingNoise noise = physics.noiseOf(kSensor, options.seed);
+  field::GaussianStream placing(options.seed, static_cast<std::uint32_t>(RandomPurpose::kPlacing));
+  field::CouplingNoise noise = physics.noiseOf(kSensor, options.seed);
   VisitStream visits(physics.signal(), options.seed, kSensor);
   std::vector<Stop> stops;
   double now_s = 0.0;
@@ -104,16 +105,16 @@ std::string metres(double value_m) {
 Error noPoseError(const TrackerPhysics& physics, const Stop& stop) {
   const StandingSensor sensor = standingAt(physics, stop);
   const TrackerModel& tracker = physics.scene().tracker;
-  std::string text = "No pose can be solved at node " + std::to_string(stop.place->node) + " (visit " +
+  std::string text = "No pose can be solved at " + placeName(*stop.place) + " (visit " +
                      std::to_string(stop.place->visit) + "), " + metres(sensor.actual.position_m.norm()) +
                      " from the transmitter: ";
   if (const auto metal = physics.metalAround(sensor.actual.position_m)) {
     return {ErrorCode::kUnsupported, text + "it lies inside the metal of " + *metal + " of the scene."};
   }
   const auto solution = physics.solve(sensor, stop.visit, stop.times_s.front(), stop.noise.front());
-  text += describe(solution ? SolveError::kTooWeak : solution.error());
+  text += field::describe(solution ? field::SolveError::kTooWeak : solution.error());
   text += "; this tracker works from " + metres(tracker.nearest_range_m) + " to " + metres(tracker.farthest_range_m) +
-          ". Move the node or leave it out of the plan.";
+          ". Move the place or leave it out of the plan.";
   return {ErrorCode::kUnsupported, text};
 }
 
@@ -187,4 +188,4 @@ Result<Simulation> simulate(const Scene& scene, std::span<const PlannedPlace> pl
   return simulation;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::simulation

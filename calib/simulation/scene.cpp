@@ -1,15 +1,16 @@
 #include "calib/simulation/scene.h"
 
-#include <algorithm>
 #include <charconv>
 #include <string_view>
 
 #include "calib/core/file_io.h"
+#include "calib/effects/effect_row.h"
 #include "calib/effects/object_reader.h"
 #include "calib/effects/registry.h"
 #include "calib/field/pose_solver.h"
+#include "calib/tables/json_text.h"
 
-namespace fieldtrue {
+namespace fieldtrue::simulation {
 
 namespace {
 
@@ -23,7 +24,7 @@ const nlohmann::json& emptyObject() {
 }
 
 /// The object of a key, or an empty one: its defaults then hold.
-const nlohmann::json& objectOf(ObjectReader& reader, const std::string& key) {
+const nlohmann::json& objectOf(effects::ObjectReader& reader, const std::string& key) {
   const nlohmann::json* found = reader.object(key);
   return found == nullptr ? emptyObject() : *found;
 }
@@ -43,19 +44,21 @@ Result<void> checkSchema(const nlohmann::json& json, const std::string& file) {
                                               ".");
   }
   if (schema == known) return {};
-  return fail(ErrorCode::kBadInput, file + ": schema is " + seenValue(*found) + "; a scene has \"" + known + "\".");
+  return fail(ErrorCode::kBadInput,
+              file + ": schema is " + effects::seenValue(*found) + "; a scene has \"" + known + "\".");
 }
 
 std::vector<std::string> solverNames() {
   std::vector<std::string> names;
-  for (const PoseSolver solver : {PoseSolver::kClosedForm, PoseSolver::kLeastSquares, PoseSolver::kDamped}) {
-    names.emplace_back(nameOf(solver));
+  for (const field::PoseSolver solver :
+       {field::PoseSolver::kClosedForm, field::PoseSolver::kLeastSquares, field::PoseSolver::kDamped}) {
+    names.emplace_back(field::nameOf(solver));
   }
   return names;
 }
 
 Result<TrackerModel> trackerFrom(const nlohmann::json& json, const std::string& file) {
-  ObjectReader reader(json, file, "tracker");
+  effects::ObjectReader reader(json, file, "tracker");
   TrackerModel tracker;
   reader.text("name", tracker.name);
   reader.choice("excitation", tracker.excitation, {"ac", "pulsed_dc"});
@@ -79,7 +82,7 @@ Result<TrackerModel> trackerFrom(const nlohmann::json& json, const std::string& 
 }
 
 Result<Pose> transmitterFrom(const nlohmann::json& json, const std::string& file) {
-  ObjectReader reader(json, file, "transmitter");
+  effects::ObjectReader reader(json, file, "transmitter");
   Pose pose;
   reader.vector3("position_m", pose.position_m, kFarthest_m, "m");
   reader.quaternion("orientation_wxyz", pose.orientation);
@@ -88,7 +91,7 @@ Result<Pose> transmitterFrom(const nlohmann::json& json, const std::string& file
 }
 
 Result<RigModel> rigFrom(const nlohmann::json& json, const std::string& file) {
-  ObjectReader reader(json, file, "rig");
+  effects::ObjectReader reader(json, file, "rig");
   RigModel rig;
   std::string alignment = "unknown";
   reader.text("name", rig.name);
@@ -108,51 +111,32 @@ Result<RigModel> rigFrom(const nlohmann::json& json, const std::string& file) {
 }
 
 Result<EffectInstance> effectFrom(const nlohmann::json& json, const std::string& file, std::size_t index,
-                                  const Excitation& excitation) {
+                                  const field::Excitation& excitation) {
   const std::string path = "effects[" + std::to_string(index) + "]";
-  ObjectReader reader(json, file, path);
+  effects::ObjectReader reader(json, file, path);
   EffectInstance instance;
   reader.text("id", instance.id);
   const nlohmann::json& given = objectOf(reader, "parameters");
   if (const Result<void> done = reader.finish(); !done) return tl::unexpected<Error>(done.error());
   const auto located = [&](const Error& error) { return fail(error.code, file + ": " + path + ": " + error.message); };
-  const Result<const Effect*> effect = findEffect(instance.id);
+  const Result<const effects::Effect*> effect = effects::findEffect(instance.id);
   if (!effect) return located(effect.error());
-  Result<nlohmann::json> parameters = resolveEffectParameters(**effect, given);
+  Result<nlohmann::json> parameters = effects::resolveEffectParameters(**effect, given);
   if (!parameters) return located(parameters.error());
   if (const auto made = (*effect)->make(*parameters, excitation); !made) return located(made.error());
   instance.parameters = std::move(*parameters);
   return instance;
 }
 
-/// Line of a byte of a text, counted from 1.
-std::size_t lineOf(const std::string& text, std::size_t byte) {
-  const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(byte, text.size()));
-  return 1 + static_cast<std::size_t>(std::count(text.begin(), end, '\n'));
-}
-
-Result<nlohmann::json> parsed(const std::string& text, const std::string& file) {
-  try {
-    return nlohmann::json::parse(text, nullptr, true, true);
-  } catch (const nlohmann::json::parse_error& e) {
-    const std::size_t byte = e.byte == 0 ? 0 : e.byte - 1;
-    return fail(ErrorCode::kBadInput,
-                file + ", line " + std::to_string(lineOf(text, byte)) +
-                    ": this is not valid JSON; look for a missing comma, quote or bracket there or just before.");
-  } catch (const nlohmann::json::exception&) {
-    return fail(ErrorCode::kBadInput, file + ": a number in it is too large to be read.");
-  }
-}
-
 }  // namespace
 
-Excitation excitationOf(const TrackerModel& tracker) {
+field::Excitation excitationOf(const TrackerModel& tracker) {
   return {tracker.excitation == "pulsed_dc", tracker.carrier_hz, tracker.sampling_delay_s};
 }
 
 Result<Scene> sceneFromJson(const nlohmann::json& json, const std::string& name) {
   if (const Result<void> schema = checkSchema(json, name); !schema) return tl::unexpected<Error>(schema.error());
-  ObjectReader reader(json, name, "");
+  effects::ObjectReader reader(json, name, "");
   Scene scene;
   reader.value("schema");
   reader.text("name", scene.name);
@@ -183,7 +167,7 @@ Result<Scene> readScene(const std::filesystem::path& path) {
   const Result<std::string> text = readFile(path);
   if (!text) return tl::unexpected<Error>(text.error());
   const std::string name = path.filename().string();
-  const Result<nlohmann::json> json = parsed(*text, name);
+  const Result<nlohmann::json> json = parseJson(*text, name, JsonComments::kSkipped);
   if (!json) return tl::unexpected<Error>(json.error());
   return sceneFromJson(*json, name);
 }
@@ -225,4 +209,4 @@ nlohmann::json toJson(const Scene& scene) {
           {"effects", effects}};
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::simulation

@@ -9,7 +9,7 @@
 #include "calib/core/pose.h"
 #include "calib/field/effect.h"
 
-namespace fieldtrue {
+namespace fieldtrue::simulation {
 
 /// The tracker as the simulator believes it to be. Every default is that of a long-range AC tracker of the Fastrak
 /// kind.
@@ -29,7 +29,7 @@ struct TrackerModel {
 };
 
 /// How it drives its transmitter, as effects ask for it.
-Excitation excitationOf(const TrackerModel& tracker);
+field::Excitation excitationOf(const TrackerModel& tracker);
 
 /// How truth is known: the jig and its tolerances.
 struct RigModel {
@@ -67,4 +67,4 @@ Result<Scene> sceneFromJson(const nlohmann::json& json, const std::string& name)
 /// Writes every key; reading it back gives the same scene, bit for bit.
 nlohmann::json toJson(const Scene& scene);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::simulation

@@ -5,7 +5,7 @@
 
 #include "calib/simulation/tracker_physics.h"
 
-namespace fieldtrue {
+namespace fieldtrue::simulation {
 
 namespace {
 
@@ -14,7 +14,7 @@ constexpr double kSamePlace_m = 0.05;
 
 /// What the simulator remembers of one sensor.
 struct SensorMemory {
-  CouplingNoise noise;
+  field::CouplingNoise noise;
   VisitStream visits;
   Visit visit = {};
   std::optional<Eigen::Vector3d> place_m = std::nullopt;  ///< Where the visit began, rig's frame.
@@ -75,4 +75,4 @@ void TrackerSimulator::resetFilter(int sensor) {
 
 const Scene& TrackerSimulator::scene() const { return state_->physics.scene(); }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::simulation

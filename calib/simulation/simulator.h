@@ -9,7 +9,7 @@
 #include "calib/core/run_control.h"
 #include "calib/simulation/scene.h"
 
-namespace fieldtrue {
+namespace fieldtrue::simulation {
 
 /// A tracker in a scene: distorts the couplings by the scene's physics, adds noise, and solves for the pose under the
 /// undistorted model, as a tracker does. One object is one tracker's life (its filter and noise have memory); seeded.
@@ -59,4 +59,4 @@ struct Simulation {
 Result<Simulation> simulate(const Scene& scene, std::span<const PlannedPlace> plan, const SimulationOptions& options,
                             const RunControl& control = {});
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::simulation

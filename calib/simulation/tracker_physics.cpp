@@ -5,8 +5,9 @@
 #include <numbers>
 
 #include "calib/effects/registry.h"
+#include "calib/field/tracker_model.h"
 
-namespace fieldtrue {
+namespace fieldtrue::simulation {
 
 namespace {
 
@@ -15,8 +16,8 @@ constexpr const char* kSaturatedStatus = "j";
 /// Mains run up to so much ahead: many periods of any line, so that its phase is as good as random.
 constexpr double kMainsLead_s = 10.0;
 
-const char* statusOf(SolveError error) {
-  const bool is_strong = error == SolveError::kSaturated || error == SolveError::kNotFinite;
+const char* statusOf(field::SolveError error) {
+  const bool is_strong = error == field::SolveError::kSaturated || error == field::SolveError::kNotFinite;
   return is_strong ? kSaturatedStatus : kTooWeakStatus;
 }
 
@@ -30,35 +31,19 @@ Eigen::Quaterniond onLattice(const Eigen::Quaterniond& rotation, double quantum_
   return rotationFromVector(onLattice(rotationVector_rad(rotation), quantum_rad));
 }
 
-/// The pose with every effect's shift and turn, which add.
-Pose displaced(const Pose& stated, const std::vector<EffectResponse>& responses) {
-  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
-  for (const EffectResponse& response : responses) {
-    shift_m += response.shift_m;
-    turn_rad += response.turn_rad;
-  }
-  Pose actual = stated;
-  actual.position_m += shift_m;
-  if (turn_rad.squaredNorm() > 0.0) {
-    actual.orientation = (rotationFromVector(turn_rad) * stated.orientation).normalized();
-  }
-  return actual;
-}
-
 bool isSame(const Pose& a, const Pose& b) {
   return a.position_m == b.position_m && a.orientation.coeffs() == b.orientation.coeffs();
 }
 
 }  // namespace
 
-Pose disturbed(const Pose& pose, double sd_m, double sd_rad, GaussianStream& stream) {
+Pose disturbed(const Pose& pose, double sd_m, double sd_rad, field::GaussianStream& stream) {
   const Eigen::Vector3d shift_m = sd_m * stream.nextVector();
   const Eigen::Vector3d turn_rad = sd_rad * stream.nextVector();
   return {pose.position_m + shift_m, (pose.orientation * rotationFromVector(turn_rad)).normalized()};
 }
 
-VisitStream::VisitStream(const SignalModel& signal, std::uint64_t seed, int sensor)
+VisitStream::VisitStream(const field::SignalModel& signal, std::uint64_t seed, int sensor)
     : stream_(seed, static_cast<std::uint32_t>(RandomPurpose::kVisits), static_cast<std::uint32_t>(sensor)),
       flip_probability_(signal.flip_probability) {}
 
@@ -73,7 +58,7 @@ Result<TrackerPhysics> TrackerPhysics::make(const Scene& scene, std::uint64_t se
   TrackerPhysics physics;
   physics.scene_ = scene;
   physics.limits_ = {scene.tracker.nearest_range_m, scene.tracker.farthest_range_m};
-  const std::optional<PoseSolver> solver = poseSolverNamed(scene.tracker.solver);
+  const std::optional<field::PoseSolver> solver = field::poseSolverNamed(scene.tracker.solver);
   if (!solver) {
     return fail(ErrorCode::kBadInput, "Scene " + scene.name + ": the tracker's solver is \"" + scene.tracker.solver +
                                           "\"; it must be \"closed_form\", \"least_squares\" or \"damped\".");
@@ -82,7 +67,7 @@ Result<TrackerPhysics> TrackerPhysics::make(const Scene& scene, std::uint64_t se
   physics.signal_.correlation = scene.tracker.correlation;
   physics.signal_.quantum_m = scene.tracker.quantum_m;
   for (std::size_t i = 0; i < scene.effects.size(); ++i) {
-    auto effect = makeEffect(scene.effects[i].id, scene.effects[i].parameters, excitationOf(scene.tracker));
+    auto effect = effects::makeEffect(scene.effects[i].id, scene.effects[i].parameters, excitationOf(scene.tracker));
     if (!effect) {
       return fail(effect.error().code,
                   "Scene " + scene.name + ", effect " + std::to_string(i + 1) + ": " + effect.error().message);
@@ -92,7 +77,7 @@ Result<TrackerPhysics> TrackerPhysics::make(const Scene& scene, std::uint64_t se
   }
   Pose reference_from_tracker = scene.reference_from_tracker;
   if (scene.rig.alignment_known) {
-    GaussianStream stream(seed, static_cast<std::uint32_t>(RandomPurpose::kAlignment));
+    field::GaussianStream stream(seed, static_cast<std::uint32_t>(RandomPurpose::kAlignment));
     reference_from_tracker =
         disturbed(reference_from_tracker, scene.rig.alignment_tolerance_m, scene.rig.alignment_tolerance_rad, stream);
   }
@@ -105,9 +90,13 @@ StandingSensor TrackerPhysics::standing(const Pose& reference_from_sensor,
                                         double last_s) const {
   StandingSensor sensor;
   sensor.stated = {tracker_from_reference_ * reference_from_sensor, tracker_from_reference_, index, first_s};
-  std::vector<EffectResponse> responses;
-  for (const auto& effect : effects_) responses.push_back(effect->at(sensor.stated));
-  sensor.actual = displaced(sensor.stated.tracker_from_sensor, responses);
+  std::vector<field::EffectResponse> responses;
+  field::EffectResponse sum;
+  for (const auto& effect : effects_) {
+    responses.push_back(effect->at(sensor.stated));
+    field::add(responses.back(), 1.0, sum);
+  }
+  sensor.actual = field::displaced(sensor.stated.tracker_from_sensor, sum);
   const bool is_displaced = !isSame(sensor.actual, sensor.stated.tracker_from_sensor);
   sensor.field_per_m3.resize(effects_.size());
   for (std::size_t i = 0; i < effects_.size(); ++i) {
@@ -117,8 +106,8 @@ StandingSensor TrackerPhysics::standing(const Pose& reference_from_sensor,
   return sensor;
 }
 
-EffectResponse TrackerPhysics::changeAt(std::size_t effect, const StandingSensor& sensor, double time_s) const {
-  SensorSetting setting = sensor.stated;
+field::EffectResponse TrackerPhysics::changeAt(std::size_t effect, const StandingSensor& sensor, double time_s) const {
+  field::SensorSetting setting = sensor.stated;
   setting.tracker_from_sensor = sensor.actual;
   setting.time_s = time_s;
   return effects_[effect]->at(setting);
@@ -126,28 +115,29 @@ EffectResponse TrackerPhysics::changeAt(std::size_t effect, const StandingSensor
 
 Eigen::Matrix3d TrackerPhysics::couplingsAt(const StandingSensor& sensor, const Visit& visit, double time_s) const {
   const double C = scene_.tracker.dipole_constant_m3;
-  Eigen::Matrix3d field = dipoleField(sensor.actual.position_m, C);
+  Eigen::Matrix3d field = field::dipoleField(sensor.actual.position_m, C);
   Eigen::Matrix3d picked_up = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < effects_.size(); ++i) {
     const auto& known = sensor.field_per_m3[i];
     field += C * (known ? *known : changeAt(i, sensor, time_s).field_per_m3);
     picked_up += C * effects_[i]->interference_per_m3(time_s + visit.mains_lead_s);
   }
-  return couplings(field, sensor.actual.orientation) + picked_up;
+  return field::couplings(field, sensor.actual.orientation) + picked_up;
 }
 
-tl::expected<PoseSolution, SolveError> TrackerPhysics::solve(const StandingSensor& sensor, const Visit& visit,
-                                                             double time_s, const Eigen::Matrix3d& noise) const {
+tl::expected<field::PoseSolution, field::SolveError> TrackerPhysics::solve(const StandingSensor& sensor,
+                                                                           const Visit& visit, double time_s,
+                                                                           const Eigen::Matrix3d& noise) const {
   const Eigen::Vector3d& p_m = sensor.actual.position_m;
-  if (p_m.isZero(0.0)) return tl::make_unexpected(SolveError::kSaturated);
+  if (p_m.isZero(0.0)) return tl::make_unexpected(field::SolveError::kSaturated);
   for (const auto& effect : effects_) {
-    if (!effect->admits(p_m)) return tl::make_unexpected(SolveError::kTooWeak);
+    if (!effect->admits(p_m)) return tl::make_unexpected(field::SolveError::kTooWeak);
   }
   const double growth =
       signal_.noise_range_power == 0.0 ? 1.0 : std::pow(std::max(p_m.norm(), 1e-3), signal_.noise_range_power);
   const Eigen::Vector3d last_m = visit.is_flipped ? Eigen::Vector3d(-p_m) : p_m;
-  return solvePose(solver_, couplingsAt(sensor, visit, time_s) + growth * noise, scene_.tracker.dipole_constant_m3,
-                   last_m, limits_);
+  return field::solvePose(solver_, couplingsAt(sensor, visit, time_s) + growth * noise,
+                          scene_.tracker.dipole_constant_m3, last_m, limits_);
 }
 
 Sample TrackerPhysics::read(const StandingSensor& sensor, const Visit& visit, double time_s, int sensor_number,
@@ -169,10 +159,11 @@ Sample TrackerPhysics::read(const StandingSensor& sensor, const Visit& visit, do
   return sample;
 }
 
-CouplingNoise TrackerPhysics::noiseOf(int sensor, std::uint64_t seed) const {
+field::CouplingNoise TrackerPhysics::noiseOf(int sensor, std::uint64_t seed) const {
   const TrackerModel& tracker = scene_.tracker;
-  return CouplingNoise({tracker.coupling_noise * signal_.noise_factor, signal_.correlation, tracker.rate_hz}, seed,
-                       static_cast<std::uint32_t>(RandomPurpose::kCouplings), static_cast<std::uint32_t>(sensor));
+  return field::CouplingNoise({tracker.coupling_noise * signal_.noise_factor, signal_.correlation, tracker.rate_hz},
+                              seed, static_cast<std::uint32_t>(RandomPurpose::kCouplings),
+                              static_cast<std::uint32_t>(sensor));
 }
 
 std::optional<std::string> TrackerPhysics::metalAround(const Eigen::Vector3d& p_sensor_m) const {
@@ -184,4 +175,4 @@ std::optional<std::string> TrackerPhysics::metalAround(const Eigen::Vector3d& p_
   return std::nullopt;
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::simulation

@@ -9,13 +9,13 @@
 
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
-#include "calib/field/coupling.h"
 #include "calib/field/coupling_noise.h"
+#include "calib/field/dipole_field.h"
 #include "calib/field/effect.h"
 #include "calib/field/pose_solver.h"
 #include "calib/simulation/scene.h"
 
-namespace fieldtrue {
+namespace fieldtrue::simulation {
 
 /// What stays during one visit of a place and is another on the next.
 struct Visit {
@@ -25,8 +25,8 @@ struct Visit {
 
 /// A sensor that stands still for a while, and what effects change there meanwhile.
 struct StandingSensor {
-  SensorSetting stated;  ///< Where the jig put it, and when the while begins.
-  Pose actual;           ///< tracker_from_sensor after the effects' shifts and turns.
+  field::SensorSetting stated;  ///< Where the jig put it, and when the while begins.
+  Pose actual;                  ///< tracker_from_sensor after the effects' shifts and turns.
   /// Of each effect the change of the field for C = 1 [1/m^3]; none where it changes meanwhile.
   std::vector<std::optional<Eigen::Matrix3d>> field_per_m3;
 };
@@ -48,33 +48,33 @@ class TrackerPhysics {
   /// truly in, unless the visit is flipped: a tracker that follows the sensor without a break knows it. A damped solver
   /// is held back towards the true place.
   /// @param noise as `noiseOf` gives it
-  tl::expected<PoseSolution, SolveError> solve(const StandingSensor& sensor, const Visit& visit, double time_s,
-                                               const Eigen::Matrix3d& noise) const;
+  tl::expected<field::PoseSolution, field::SolveError> solve(const StandingSensor& sensor, const Visit& visit,
+                                                             double time_s, const Eigen::Matrix3d& noise) const;
 
   /// A reading with its status (Fastrak letters: k too weak, j saturated) and, unless told otherwise, on the lattice.
   Sample read(const StandingSensor& sensor, const Visit& visit, double time_s, int sensor_number,
               const Eigen::Matrix3d& noise, bool on_lattice = true) const;
 
   /// Noise of one sensor's couplings at 1 m, independent of the other sensors'.
-  CouplingNoise noiseOf(int sensor, std::uint64_t seed) const;
+  field::CouplingNoise noiseOf(int sensor, std::uint64_t seed) const;
 
   /// The effect inside whose metal a sensor would be: "effect 2 (metal_plane)".
   std::optional<std::string> metalAround(const Eigen::Vector3d& p_sensor_m) const;
 
   const Scene& scene() const { return scene_; }
-  const SignalModel& signal() const { return signal_; }
+  const field::SignalModel& signal() const { return signal_; }
 
  private:
   TrackerPhysics() = default;
-  EffectResponse changeAt(std::size_t effect, const StandingSensor& sensor, double time_s) const;
+  field::EffectResponse changeAt(std::size_t effect, const StandingSensor& sensor, double time_s) const;
   Eigen::Matrix3d couplingsAt(const StandingSensor& sensor, const Visit& visit, double time_s) const;
 
   Scene scene_;
   Pose tracker_from_reference_;
-  PoseSolver solver_ = PoseSolver::kClosedForm;
-  SolverLimits limits_;
-  SignalModel signal_;
-  std::vector<std::unique_ptr<PhysicalEffect>> effects_;
+  field::PoseSolver solver_ = field::PoseSolver::kClosedForm;
+  field::SolverLimits limits_;
+  field::SignalModel signal_;
+  std::vector<std::unique_ptr<field::PhysicalEffect>> effects_;
 };
 
 /// What the random streams of one seed are for.
@@ -83,15 +83,15 @@ enum class RandomPurpose : std::uint32_t { kCouplings = 1, kPlacing = 2, kAlignm
 /// Draws what differs from visit to visit.
 class VisitStream {
  public:
-  VisitStream(const SignalModel& signal, std::uint64_t seed, int sensor);
+  VisitStream(const field::SignalModel& signal, std::uint64_t seed, int sensor);
   Visit next();
 
  private:
-  GaussianStream stream_;
+  field::GaussianStream stream_;
   double flip_probability_;
 };
 
 /// A pose off by a normal error: position per axis of the outer frame, rotation per axis of the inner one.
-Pose disturbed(const Pose& pose, double sd_m, double sd_rad, GaussianStream& stream);
+Pose disturbed(const Pose& pose, double sd_m, double sd_rad, field::GaussianStream& stream);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::simulation

@@ -7,9 +7,10 @@
 #include <QTest>
 #include <set>
 
-#include "calib/core/table_io.h"
+#include "calib/tables/table_io.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 /// Recording with the simulated tracker and with an emulated one over TCP and a pty.
 using namespace fieldtrue;
@@ -225,5 +226,5 @@ class CliAcquireTest : public QObject {
   QTemporaryDir folder_;
 };
 
-QTEST_GUILESS_MAIN(CliAcquireTest)
+FIELDTRUE_TEST(CliAcquireTest)
 #include "cli_acquire_test.moc"

@@ -2,11 +2,13 @@
 #include <QTemporaryDir>
 #include <QTest>
 
-#include "calib/core/table_io.h"
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/corrector.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -69,8 +71,8 @@ class CliBakingTest : public QObject {
   QString at(const char* name) const { return folder_.filePath(name); }
 
   void verifyNear(const char* name, double bound_m) {
-    const auto original = Corrector::load(at("a.ftcal.json").toStdString());
-    const auto baked = Corrector::load(at(name).toStdString());
+    const auto original = calibration::Corrector::load(at("a.ftcal.json").toStdString());
+    const auto baked = calibration::Corrector::load(at(name).toStdString());
     FT_VERIFY_OK(original);
     FT_VERIFY_OK(baked);
     QVERIFY(baked->isBaked() && !original->isBaked());
@@ -85,5 +87,5 @@ class CliBakingTest : public QObject {
   CalibrationTable table_;
 };
 
-QTEST_GUILESS_MAIN(CliBakingTest)
+FIELDTRUE_TEST(CliBakingTest)
 #include "cli_baking_test.moc"

@@ -6,10 +6,13 @@
 #include <map>
 #include <set>
 
-#include "calib/core/table_io.h"
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/corrector.h"
+#include "calib/correctors/method_label.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 #include "tests/support/xml_tree.h"
 
 /// From a simulated room to a report, through files, as a script would do it.
@@ -231,6 +234,21 @@ class CliChainTest : public QObject {
     QCOMPARE(run.out.trimmed().split('\n').last().toStdString(), same.at("verdict").at("text").get<std::string>());
   }
 
+  void methodsAreNamedAsInTheWindow() {
+    const CliRun run = runCli({"compare", "--nodes", at("a.nodes.csv"), "--validate", "kfold:4", "--methods",
+                               "none,affine,hmq,polynomial:degree=2", "--learning-curve"});
+    FT_VERIFY_STATUS(run, 0);
+    for (const std::string& label :
+         {correctors::positionLabel("affine"), correctors::positionLabel("hmq"), correctors::positionLabel("none"),
+          correctors::positionLabel("polynomial", {{"degree", 2.0}})})
+      QVERIFY2(run.out.contains(label.c_str()), label.c_str());
+    for (const char* id : {"hmq", "polynomial:"}) QVERIFY2(!run.out.contains(id), id);
+    const CliRun fit = runCli({"fit", "--nodes", at("a.nodes.csv"), "--position", "hmq", "--out", at("n.ftcal.json")});
+    FT_VERIFY_STATUS(fit, 0);
+    QVERIFY2(fit.out.startsWith(("Fitted " + correctors::positionLabel("hmq") + " (position)").c_str()),
+             qPrintable(fit.out));
+  }
+
   void learningCurvesAreAddedWhenAskedFor() {
     const CliRun run = runCli({"compare", "--nodes", at("a.nodes.csv"), "--validate", "kfold:4", "--methods",
                                "rigid,affine", "--learning-curve", "--html", at("curves.html"), "--json"});
@@ -326,7 +344,7 @@ class CliChainTest : public QObject {
                      0);
     FT_VERIFY_STATUS(runCli({"apply", "--calibration", at("hmq.ftcal.json"), "--in", at(in), "--out", at("whole.csv")}),
                      0);
-    const auto corrector = Corrector::load(at("hmq.ftcal.json").toStdString());
+    const auto corrector = calibration::Corrector::load(at("hmq.ftcal.json").toStdString());
     FT_VERIFY_OK(corrector);
     const auto before = csvRows(readWhole(at(in)));
     const auto after = csvRows(readWhole(at("whole.csv")));
@@ -411,5 +429,5 @@ class CliChainTest : public QObject {
   json comparison_;
 };
 
-QTEST_GUILESS_MAIN(CliChainTest)
+FIELDTRUE_TEST(CliChainTest)
 #include "cli_chain_test.moc"

@@ -5,10 +5,12 @@
 #include <QTemporaryDir>
 #include <QTest>
 
-#include "calib/core/table_io.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 /// What the program says when something is wrong: one line on stderr, nothing on stdout, the right status, nothing
 /// lost.
@@ -115,6 +117,15 @@ class CliErrorsTest : public QObject {
         {"none.csv"});
     row("no such folder to write to", "simulate --plan grid:2x2x2@0.1 --nodes @/none/o.csv", 1, {"none/o.csv"});
     row("missing session", "tables --session @/none.fieldtrue --nodes @/o.csv", 1, {"none.fieldtrue"});
+    row("output is the input", "fit --nodes @/good.nodes.csv --position rigid --out @/good.nodes.csv", 2,
+        {"--nodes", "--out", "same file", "good.nodes.csv"});
+    row("output is the input by another name",
+        "apply --calibration @/good.ftcal.json --in @/good.nodes.csv --out @/./good.nodes.csv", 2,
+        {"--in", "--out", "same file"});
+    row("output is the calibration", "export --calibration @/good.ftcal.json --format csv --out @/good.ftcal.json", 2,
+        {"--calibration", "--out", "same file"});
+    row("two outputs of one name", "simulate --plan grid:2x2x2@0.3 --nodes @/both.csv --samples @/both.csv", 2,
+        {"--nodes", "--samples", "same file"});
     row("not a session", "report --session @/good.nodes.csv --html @/o.html", 1, {"good.nodes.csv"});
     row("port that does not exist",
         "acquire --device fastrak:@/ttyNONE --plan grid:2x2x2@0.1 --auto --session @/port.fieldtrue", 1, {"ttyNONE"});
@@ -232,5 +243,5 @@ class CliErrorsTest : public QObject {
   QTemporaryDir folder_;
 };
 
-QTEST_GUILESS_MAIN(CliErrorsTest)
+FIELDTRUE_TEST(CliErrorsTest)
 #include "cli_errors_test.moc"

@@ -4,6 +4,7 @@
 #include "calib/simulation/scene.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 #include "tests/support/xml_tree.h"
 
 using namespace fieldtrue;
@@ -68,7 +69,7 @@ class CliGapTest : public QObject {
     QVERIFY(first.out.startsWith("explained: "));
     QVERIFY(first.out.contains("compact_metal"));
 
-    const auto updated = readScene(at("updated.scene.json").toStdString());
+    const auto updated = simulation::readScene(at("updated.scene.json").toStdString());
     FT_VERIFY_OK(updated);
     QCOMPARE(updated->effects.size(), std::size_t(1));
     FT_VERIFY_STATUS(simulated("updated.scene.json", "again", 2), 0);
@@ -161,5 +162,5 @@ class CliGapTest : public QObject {
   QTemporaryDir folder_;
 };
 
-QTEST_GUILESS_MAIN(CliGapTest)
+FIELDTRUE_TEST(CliGapTest)
 #include "cli_gap_test.moc"

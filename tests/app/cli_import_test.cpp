@@ -4,6 +4,7 @@
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 /// Recordings of other people's trackers, from their files to figures that others published.
 using namespace fieldtrue::testing;
@@ -48,10 +49,13 @@ class CliImportTest : public QObject {
     const json result = compared.json();
     QCOMPARE(result.at("places").get<int>(), 41);
     FT_VERIFY_MATCH(near(result.at("before").at("position_mm").at("rms").get<double>(), held_out_mm, 0.01));
+    int n_rigid = 0;
     for (const json& score : result.at("position")) {
       if (score.at("method") != "rigid") continue;
+      ++n_rigid;
       FT_VERIFY_MATCH(near(score.at("position_mm").at("rms").get<double>(), held_out_mm, 0.01));
     }
+    QCOMPARE(n_rigid, 1);
     // Positions only: nothing can be said about orientation.
     QVERIFY(result.at("before").at("orientation_deg").is_null());
     QVERIFY(!result.at("verdict").at("apply_orientation").get<bool>());
@@ -102,5 +106,5 @@ class CliImportTest : public QObject {
   QTemporaryDir folder_;
 };
 
-QTEST_GUILESS_MAIN(CliImportTest)
+FIELDTRUE_TEST(CliImportTest)
 #include "cli_import_test.moc"

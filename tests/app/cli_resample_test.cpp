@@ -1,9 +1,10 @@
 #include <QTemporaryDir>
 #include <QTest>
 
-#include "calib/core/table_io.h"
+#include "calib/tables/table_io.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 /// Scattered places brought to a grid in tracked space.
 using namespace fieldtrue;
@@ -123,5 +124,5 @@ class CliResampleTest : public QObject {
   const QString measured_ = folder_.filePath("measured.nodes.csv");
 };
 
-QTEST_GUILESS_MAIN(CliResampleTest)
+FIELDTRUE_TEST(CliResampleTest)
 #include "cli_resample_test.moc"

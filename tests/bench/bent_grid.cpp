@@ -15,10 +15,10 @@ Eigen::Vector3d bend_m(const Eigen::Vector3d& p_m) {
 
 }  // namespace
 
-FitData bentGrid(int n) {
+correctors::FitData bentGrid(int n) {
   std::mt19937_64 generator(1);
   std::normal_distribution<double> noise_m(0.0, 0.002);
-  FitData data;
+  correctors::FitData data;
   for (int i = 0; i < n * n * n; ++i) {
     const Eigen::Vector3d p_true_m = 2.0 / n * Eigen::Vector3d(i % n, i / n % n, i / (n * n));
     data.p_true_m.push_back(p_true_m);
@@ -29,10 +29,10 @@ FitData bentGrid(int n) {
   return data;
 }
 
-FitData straightGrid(const std::array<int, 3>& counts) {
+correctors::FitData straightGrid(const std::array<int, 3>& counts) {
   std::mt19937_64 generator(1);
   std::normal_distribution<double> noise_m(0.0, 0.002);
-  FitData data;
+  correctors::FitData data;
   const double pitch_m = 2.0 / *std::max_element(counts.begin(), counts.end());
   for (int i = 0; i < counts[0]; ++i)
     for (int j = 0; j < counts[1]; ++j)

@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "calib/evaluation/comparison.h"
 
@@ -65,16 +66,17 @@ RunControl twoThreads() {
 }
 
 /// Seconds that a comparison of these methods takes.
-double compared_s(const CalibrationTable& table, const ComparisonOptions& options, std::string* skipped = nullptr) {
+double compared_s(const CalibrationTable& table, const evaluation::ComparisonOptions& options,
+                  std::string* skipped = nullptr) {
   const auto start = std::chrono::steady_clock::now();
-  const auto comparison = compareMethods(table, options, twoThreads());
+  const auto comparison = evaluation::compareMethods(table, options, twoThreads());
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!comparison) {
     std::fprintf(stderr, "%s\n", comparison.error().message.c_str());
     return HUGE_VAL;
   }
   for (const auto* scores : {&comparison->position, &comparison->orientation})
-    for (const MethodScore& score : *scores)
+    for (const evaluation::MethodScore& score : *scores)
       if (skipped != nullptr && score.skipped) *skipped = *score.skipped;
   return seconds;
 }
@@ -90,10 +92,10 @@ void printMethod(const char* kind, const std::string& id, double seconds, const 
 int main() {
   const CalibrationTable table = roomTable();
   const std::string network = "neural_network";
-  ComparisonOptions all;
+  evaluation::ComparisonOptions all;
   std::printf("leave-one-out on %zu nodes, two threads\n", table.nodes.size());
-  for (const PositionMethod& method : positionMethods()) {
-    ComparisonOptions one;
+  for (const correctors::PositionMethod& method : correctors::positionMethods()) {
+    evaluation::ComparisonOptions one;
     one.with_surroundings = false;
     one.position_methods = {{method.id, {}}};
     one.orientation_methods = {{"none", {}}};
@@ -102,8 +104,8 @@ int main() {
     printMethod("position", method.id, seconds, skipped);
     if (method.id != network) all.position_methods.push_back({method.id, {}});
   }
-  for (const OrientationMethod& method : orientationMethods()) {
-    ComparisonOptions one;
+  for (const correctors::OrientationMethod& method : correctors::orientationMethods()) {
+    evaluation::ComparisonOptions one;
     one.with_surroundings = false;
     one.position_methods = {{"none", {}}};
     one.orientation_methods = {{method.id, {}}};

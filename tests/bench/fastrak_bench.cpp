@@ -19,24 +19,25 @@ const std::vector<int> kItems = {2, 11, 16, 1};
 std::string binaryStream() {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> coordinate(-0.7, 0.7);
-  const auto layout = *fastrakLayout(kItems, FastrakFormat::kBinary);
+  const auto layout = *acquisition::fastrakLayout(kItems, acquisition::FastrakFormat::kBinary);
   std::string stream;
   for (std::size_t i = 0; i < kRecords; ++i) {
     const Eigen::Vector3d turn_rad(coordinate(random), coordinate(random), coordinate(random));
     const Pose pose{{coordinate(random), coordinate(random), coordinate(random)}, rotationFromVector(turn_rad)};
-    stream += encodeRecord(recordOfPose(1, ' ', pose), layout, FastrakUnit::kCentimetre);
+    stream += acquisition::encodeRecord(acquisition::recordOfPose(1, ' ', pose), layout,
+                                        acquisition::FastrakUnit::kCentimetre);
   }
   return stream;
 }
 
 void fastrakParser(benchmark::State& state) {
   const std::string stream = binaryStream();
-  FastrakStreamSettings settings;
+  acquisition::FastrakStreamSettings settings;
   settings.items[0] = kItems;
-  std::vector<FastrakRecord> records;
+  std::vector<acquisition::FastrakRecord> records;
   records.reserve(kRecords);
   for (auto _ : state) {
-    auto parser = *FastrakParser::make(settings);
+    auto parser = *acquisition::FastrakParser::make(settings);
     records.clear();
     for (std::size_t at = 0; at < stream.size(); at += kChunk) {
       parser.add(std::string_view(stream).substr(at, kChunk), records);
@@ -51,16 +52,16 @@ BENCHMARK(fastrakParser);
 
 void fastrakParserToSamples(benchmark::State& state) {
   const std::string stream = binaryStream();
-  FastrakStreamSettings settings;
+  acquisition::FastrakStreamSettings settings;
   settings.items[0] = kItems;
-  std::vector<FastrakRecord> records;
+  std::vector<acquisition::FastrakRecord> records;
   for (auto _ : state) {
-    auto parser = *FastrakParser::make(settings);
+    auto parser = *acquisition::FastrakParser::make(settings);
     double sum_m = 0.0;
     for (std::size_t at = 0; at < stream.size(); at += kChunk) {
       records.clear();
       parser.add(std::string_view(stream).substr(at, kChunk), records);
-      for (const auto& record : records) sum_m += toSample(record, 0.0).tracker_from_sensor.position_m.x();
+      for (const auto& record : records) sum_m += acquisition::toSample(record, 0.0).tracker_from_sensor.position_m.x();
     }
     benchmark::DoNotOptimize(sum_m);
   }

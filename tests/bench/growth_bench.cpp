@@ -13,6 +13,7 @@
 #include <optional>
 #include <thread>
 
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "tests/bench/bent_grid.h"
 #include "tests/bench/growth_report.h"
@@ -55,7 +56,7 @@ class Deadline {
   std::jthread timer_;
 };
 
-double evaluation_ns(const PositionModel& model) {
+double evaluation_ns(const correctors::PositionModel& model) {
   std::vector<Eigen::Vector3d> points_m = pointsWithin(1000);
   std::vector<Eigen::Vector3d> covered_m;
   for (const Eigen::Vector3d& p_m : points_m)
@@ -88,12 +89,12 @@ double expectedFit_s(const GrowthCurve& curve, int n) {
 
 /// Measures one size of one method.
 /// @return why it was not measured; none when it was
-std::optional<std::string> measure(const PositionMethod& method, const FitData& data, double most_s,
-                                   GrowthCurve& curve) {
+std::optional<std::string> measure(const correctors::PositionMethod& method, const correctors::FitData& data,
+                                   double most_s, GrowthCurve& curve) {
   const Settings settings = resolveSettings(method.id, method.settings, {}).value();
   const int n = static_cast<int>(data.size());
   double shortest_s = HUGE_VAL;
-  Result<std::unique_ptr<PositionModel>> model;
+  Result<std::unique_ptr<correctors::PositionModel>> model;
   const auto begin = Clock::now();
   for (int repetition = 0; repetition < 5 && (repetition == 0 || secondsSince(begin) < 0.2); ++repetition) {
     Deadline deadline(most_s);
@@ -117,11 +118,11 @@ std::optional<std::string> measure(const PositionMethod& method, const FitData& 
 
 int main(int argc, char** argv) {
   const std::string path = argc > 1 ? argv[1] : "growth.html";
-  const std::span<const PositionMethod> methods = positionMethods();
+  const std::span<const correctors::PositionMethod> methods = correctors::positionMethods();
   std::vector<GrowthCurve> curves(methods.size());
   const auto start = Clock::now();
   for (const auto& counts : kGrids) {
-    const FitData data = straightGrid(counts);
+    const correctors::FitData data = straightGrid(counts);
     const int n = static_cast<int>(data.size());
     for (std::size_t i = 0; i < methods.size(); ++i) {
       curves[i].method = methods[i].id;

@@ -12,8 +12,10 @@
 #include <string>
 
 #include "calib/core/geometry.h"
-#include "calib/correctors/baked_lattice_maker.h"
-#include "calib/correctors/hmq_kernel.h"
+#include "calib/correctors/baked/baked_lattice_maker.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/multiquadric/hmq_kernel.h"
+#include "calib/correctors/numerics/aligned_vector.h"
 #include "calib/correctors/registry.h"
 #include "tests/bench/bent_grid.h"
 #include "tests/bench/hmq_peers.h"
@@ -23,13 +25,13 @@ namespace {
 
 using namespace fieldtrue;
 using namespace fieldtrue::bench;
-using Model = std::unique_ptr<PositionModel>;
+using Model = std::unique_ptr<correctors::PositionModel>;
 
 constexpr std::size_t kBatch = 100000;
 constexpr double kLatticeBound_m = 50e-6;
 
-const FitData& grid(std::int64_t n) {
-  static std::map<std::int64_t, FitData> grids;
+const correctors::FitData& grid(std::int64_t n) {
+  static std::map<std::int64_t, correctors::FitData> grids;
   const auto found = grids.find(n);
   return found != grids.end() ? found->second : grids.emplace(n, bentGrid(static_cast<int>(n))).first->second;
 }
@@ -39,26 +41,26 @@ const std::vector<Eigen::Vector3d>& batchPoints() {
   return points_m;
 }
 
-Model fitWith(const FitData& data, const std::map<std::string, std::string>& given) {
-  const PositionMethod& method = *findPositionMethod("hmq").value();
+Model fitWith(const correctors::FitData& data, const std::map<std::string, std::string>& given) {
+  const correctors::PositionMethod& method = *correctors::findPositionMethod("hmq").value();
   return method.fit(data, resolveSettings(method.id, method.settings, given).value(), {}).value();
 }
 
-Model fitDouble(const FitData& data) { return fitWith(data, {}); }
-Model fitSingle(const FitData& data) { return fitWith(data, {{"precision", "single"}}); }
+Model fitDouble(const correctors::FitData& data) { return fitWith(data, {}); }
+Model fitSingle(const correctors::FitData& data) { return fitWith(data, {{"precision", "single"}}); }
 
 /// The multiquadric baked within 50 um.
-Model fitLattice(const FitData& data) {
+Model fitLattice(const correctors::FitData& data) {
   const Region region = Region::around(data.p_tracked_m, 3, 0.02);
-  auto lattice = bakeLattice(*fitDouble(data), region, data.p_tracked_m, kLatticeBound_m, {}).value();
+  auto lattice = correctors::bakeLattice(*fitDouble(data), region, data.p_tracked_m, kLatticeBound_m, {}).value();
   std::printf("%s\n", lattice->note().c_str());
   return lattice;
 }
 
 /// A multiquadric evaluated by one kernel's sums, to compare the ways that one processor has.
-class KernelModel : public PositionModel {
+class KernelModel : public correctors::PositionModel {
  public:
-  KernelModel(const FitData& data, decltype(MultiquadricKernel::sums) sums) : sums_(sums) {
+  KernelModel(const correctors::FitData& data, decltype(correctors::MultiquadricKernel::sums) sums) : sums_(sums) {
     const nlohmann::json fitted = fitDouble(data)->parameters();
     for (std::size_t j = 0; j < data.size(); ++j) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -84,42 +86,42 @@ class KernelModel : public PositionModel {
     sums_(arrays_, numbers_[3].data(), numbers_[4].data(), numbers_[5].data(), p_m->data(), count, f->data());
   }
 
-  decltype(MultiquadricKernel::sums) sums_;
-  std::array<AlignedVector<double>, 6> numbers_;
-  MultiquadricArrays arrays_;
+  decltype(correctors::MultiquadricKernel::sums) sums_;
+  std::array<correctors::AlignedVector<double>, 6> numbers_;
+  correctors::MultiquadricArrays arrays_;
 };
 
-Model fitRoots(const FitData& data) {
-  return std::make_unique<KernelModel>(data, multiquadricKernels().front().sums_by_roots);
+Model fitRoots(const correctors::FitData& data) {
+  return std::make_unique<KernelModel>(data, correctors::multiquadricKernels().front().sums_by_roots);
 }
 /// What a processor without wide registers runs.
-Model fitBaseline(const FitData& data) {
-  return std::make_unique<KernelModel>(data, multiquadricKernels().back().sums);
+Model fitBaseline(const correctors::FitData& data) {
+  return std::make_unique<KernelModel>(data, correctors::multiquadricKernels().back().sums);
 }
 
 /// Fitted once a size: what is measured is evaluation.
 template <class Fitted>
-const Fitted& fittedOnce(std::int64_t n, Fitted (*fit)(const FitData&)) {
-  static std::map<std::pair<std::int64_t, Fitted (*)(const FitData&)>, Fitted> models;
+const Fitted& fittedOnce(std::int64_t n, Fitted (*fit)(const correctors::FitData&)) {
+  static std::map<std::pair<std::int64_t, Fitted (*)(const correctors::FitData&)>, Fitted> models;
   const auto key = std::pair(n, fit);
   const auto found = models.find(key);
   return found != models.end() ? found->second : models.emplace(key, fit(grid(n))).first->second;
 }
 
 template <class Fitted>
-void fitIt(benchmark::State& state, Fitted (*fit)(const FitData&)) {
-  const FitData& data = grid(state.range(0));
+void fitIt(benchmark::State& state, Fitted (*fit)(const correctors::FitData&)) {
+  const correctors::FitData& data = grid(state.range(0));
   for (auto _ : state) benchmark::DoNotOptimize(fit(data));
 }
 
-void onePoint(benchmark::State& state, Model (*fit)(const FitData&)) {
-  const PositionModel& model = *fittedOnce(state.range(0), fit);
+void onePoint(benchmark::State& state, Model (*fit)(const correctors::FitData&)) {
+  const correctors::PositionModel& model = *fittedOnce(state.range(0), fit);
   std::size_t i = 0;
   for (auto _ : state) benchmark::DoNotOptimize(model.displacement_m(batchPoints()[i++ % kBatch]));
 }
 
-void manyPoints(benchmark::State& state, Model (*fit)(const FitData&)) {
-  const PositionModel& model = *fittedOnce(state.range(0), fit);
+void manyPoints(benchmark::State& state, Model (*fit)(const correctors::FitData&)) {
+  const correctors::PositionModel& model = *fittedOnce(state.range(0), fit);
   std::vector<Eigen::Vector3d> corrected_m(kBatch);
   for (auto _ : state) {
     model.correct(batchPoints(), corrected_m);
@@ -129,7 +131,7 @@ void manyPoints(benchmark::State& state, Model (*fit)(const FitData&)) {
 
 void rootsAlone(benchmark::State& state) {
   const auto count = static_cast<std::size_t>(state.range(0) * state.range(0) * state.range(0));
-  AlignedVector<double> squares(count);
+  correctors::AlignedVector<double> squares(count);
   for (std::size_t j = 0; j < count; ++j) squares[j] = 1e-3 * static_cast<double>(j + 1);
   std::size_t i = 0;
   for (auto _ : state) benchmark::DoNotOptimize(sumOfRoots(squares.data(), count, batchPoints()[i++ % kBatch].x()));

@@ -11,7 +11,7 @@
 
 namespace fieldtrue::bench {
 
-alglib::rbfmodel fitAlglib(const FitData& data) {
+alglib::rbfmodel fitAlglib(const correctors::FitData& data) {
   const auto count = static_cast<alglib::ae_int_t>(data.size());
   alglib::real_2d_array xy;
   xy.setlength(count, 6);
@@ -31,7 +31,7 @@ alglib::rbfmodel fitAlglib(const FitData& data) {
   return model;
 }
 
-vtkSmartPointer<vtkThinPlateSplineTransform> fitVtk(const FitData& data) {
+vtkSmartPointer<vtkThinPlateSplineTransform> fitVtk(const correctors::FitData& data) {
   vtkNew<vtkPoints> source;
   vtkNew<vtkPoints> target;
   source->SetDataTypeToDouble();
@@ -48,7 +48,7 @@ vtkSmartPointer<vtkThinPlateSplineTransform> fitVtk(const FitData& data) {
   return transform;
 }
 
-PlainMultiquadric plainTerms(const FitData& data) {
+PlainMultiquadric plainTerms(const correctors::FitData& data) {
   PlainMultiquadric plain;
   for (std::size_t i = 0; i < data.size(); ++i) plain.terms.push_back({data.p_tracked_m[i], data.p_true_m[i]});
   return plain;
@@ -74,7 +74,7 @@ std::string outputOf(const std::string& command) {
 
 }  // namespace
 
-std::optional<ScipyTimes> runScipy(const FitData& data, const std::vector<Eigen::Vector3d>& points_m) {
+std::optional<ScipyTimes> runScipy(const correctors::FitData& data, const std::vector<Eigen::Vector3d>& points_m) {
   std::string folder_name = (std::filesystem::temp_directory_path() / "fieldtrue-bench-XXXXXX").string();
   if (::mkdtemp(folder_name.data()) == nullptr) return std::nullopt;
   const std::filesystem::path folder(folder_name);

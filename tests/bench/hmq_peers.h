@@ -9,17 +9,17 @@
 #include <string>
 #include <vector>
 
-#include "calib/correctors/fit_data.h"
+#include "calib/correctors/base/fit_data.h"
 
 namespace fieldtrue::bench {
 
 inline constexpr double kR_m = 0.1;  ///< The default R squared, 100 cm2, for us and for the peers.
 
 /// ALGLIB's multiquadric through the same places.
-alglib::rbfmodel fitAlglib(const FitData& data);
+alglib::rbfmodel fitAlglib(const correctors::FitData& data);
 
 /// VTK's thin-plate spline through the same places.
-vtkSmartPointer<vtkThinPlateSplineTransform> fitVtk(const FitData& data);
+vtkSmartPointer<vtkThinPlateSplineTransform> fitVtk(const correctors::FitData& data);
 
 /// The textbook loop: one structure a centre.
 struct PlainMultiquadric {
@@ -35,7 +35,7 @@ struct PlainMultiquadric {
     return sum;
   }
 };
-PlainMultiquadric plainTerms(const FitData& data);
+PlainMultiquadric plainTerms(const correctors::FitData& data);
 
 /// Seconds that SciPy's RBFInterpolator takes with one thread, measured by itself in a process of its own: "fit",
 /// "one point" and "100,000 points".
@@ -45,6 +45,6 @@ struct ScipyTimes {
 };
 
 /// @return none, with a remark on stderr, where no python3 with SciPy is installed
-std::optional<ScipyTimes> runScipy(const FitData& data, const std::vector<Eigen::Vector3d>& points_m);
+std::optional<ScipyTimes> runScipy(const correctors::FitData& data, const std::vector<Eigen::Vector3d>& points_m);
 
 }  // namespace fieldtrue::bench

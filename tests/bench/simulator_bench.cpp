@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "calib/field/coupling.h"
+#include "calib/field/dipole_field.h"
 #include "calib/field/pose_solver.h"
 #include "calib/simulation/simulator.h"
 
@@ -18,8 +18,8 @@ using namespace fieldtrue;
 const Pose kSensor{{1.2, 0.4, -0.3}, Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5)};
 
 /// A room with a floor and the given number of bodies.
-Scene room(int bodies) {
-  Scene scene;
+simulation::Scene room(int bodies) {
+  simulation::Scene scene;
   scene.tracker.correlation = 0.3;
   if (bodies > 0) scene.effects.push_back({"metal_plane", {{"strength", 0.5}}});
   for (int i = 0; i < bodies; ++i) {
@@ -29,7 +29,8 @@ Scene room(int bodies) {
 }
 
 void measure(benchmark::State& state) {
-  TrackerSimulator tracker = std::move(TrackerSimulator::make(room(static_cast<int>(state.range(0))), 1).value());
+  simulation::TrackerSimulator tracker =
+      std::move(simulation::TrackerSimulator::make(room(static_cast<int>(state.range(0))), 1).value());
   double time_s = 0.0;
   for (auto unused : state) {
     benchmark::DoNotOptimize(tracker.measure(kSensor, time_s));
@@ -40,23 +41,23 @@ void measure(benchmark::State& state) {
 BENCHMARK(measure)->ArgName("bodies")->Arg(0)->Arg(1)->Arg(8);
 
 void solveOnly(benchmark::State& state) {
-  const Eigen::Matrix3d S =
-      couplings(dipoleField(kSensor.position_m, 1.0), kSensor.orientation) + 0.01 * Eigen::Matrix3d::Ones();
-  for (auto unused : state) benchmark::DoNotOptimize(solvePose(S, 1.0, kSensor.position_m));
+  const Eigen::Matrix3d S = field::couplings(field::dipoleField(kSensor.position_m, 1.0), kSensor.orientation) +
+                            0.01 * Eigen::Matrix3d::Ones();
+  for (auto unused : state) benchmark::DoNotOptimize(field::solvePose(S, 1.0, kSensor.position_m));
   state.SetItemsProcessed(state.iterations());
 }
 BENCHMARK(solveOnly);
 
 void recordSession(benchmark::State& state) {
   constexpr int kNodes = 100;
-  const SimulationOptions options;
+  const simulation::SimulationOptions options;
   std::vector<PlannedPlace> plan(kNodes);
   for (int i = 0; i < kNodes; ++i) {
     plan[static_cast<std::size_t>(i)].node = i;
     plan[static_cast<std::size_t>(i)].reference_from_sensor.position_m = {0.5 + 0.012 * i, 0.2, -0.3};
   }
-  const Scene scene = room(1);
-  for (auto unused : state) benchmark::DoNotOptimize(simulate(scene, plan, options));
+  const simulation::Scene scene = room(1);
+  for (auto unused : state) benchmark::DoNotOptimize(simulation::simulate(scene, plan, options));
   state.SetItemsProcessed(state.iterations() * kNodes * options.samples_per_node);
 }
 BENCHMARK(recordSession)->Unit(benchmark::kMillisecond);

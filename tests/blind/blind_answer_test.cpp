@@ -6,6 +6,7 @@
 #include "tests/blind/answer.h"
 #include "tests/blind/score.h"
 #include "tests/blind/sealed_folder.h"
+#include "tests/support/test_main.h"
 
 using namespace blind;
 using nlohmann::json;
@@ -144,5 +145,5 @@ void BlindAnswerTest::onlyTheAskedSessionsAreAnswered() {
   QCOMPARE(folder.answer({"--from", "3"}), 1);
 }
 
-QTEST_GUILESS_MAIN(BlindAnswerTest)
+FIELDTRUE_TEST(BlindAnswerTest)
 #include "blind_answer_test.moc"

@@ -8,6 +8,7 @@
 #include "tests/blind/controls.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/session_table.h"
+#include "tests/support/test_main.h"
 
 using namespace blind;
 using nlohmann::json;
@@ -89,5 +90,5 @@ void BlindControlsTest::placesAreShuffledWhole() {
   QCOMPARE(places_after, places_before);
 }
 
-QTEST_GUILESS_MAIN(BlindControlsTest)
+FIELDTRUE_TEST(BlindControlsTest)
 #include "blind_controls_test.moc"

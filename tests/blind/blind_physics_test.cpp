@@ -3,6 +3,7 @@
 
 #include "tests/blind/plates.h"
 #include "tests/blind/pose_solver.h"
+#include "tests/support/test_main.h"
 
 using namespace blind;
 
@@ -324,5 +325,5 @@ void BlindPhysicsTest::noiseEllipsoidIsFlat() {
   }
 }
 
-QTEST_GUILESS_MAIN(BlindPhysicsTest)
+FIELDTRUE_TEST(BlindPhysicsTest)
 #include "blind_physics_test.moc"

@@ -6,6 +6,7 @@
 #include "tests/blind/generate_effects.h"
 #include "tests/blind/generate_session.h"
 #include "tests/blind/session_draw.h"
+#include "tests/support/test_main.h"
 
 using namespace blind;
 
@@ -156,5 +157,5 @@ void BlindRecordingTest::readingsAreFiltered() {
   QVERIFY(isNear(columnOf(session.nodes_csv, "n_effective").front(), 50.0, 1e-9));
 }
 
-QTEST_GUILESS_MAIN(BlindRecordingTest)
+FIELDTRUE_TEST(BlindRecordingTest)
 #include "blind_recording_test.moc"

@@ -12,6 +12,7 @@
 #include "tests/blind/score.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/statistics.h"
+#include "tests/support/test_main.h"
 
 using namespace blind;
 using nlohmann::json;
@@ -385,5 +386,5 @@ void BlindScoreTest::wrongUsageIsTold() {
   QCOMPARE(runControls(plain), 2);
 }
 
-QTEST_GUILESS_MAIN(BlindScoreTest)
+FIELDTRUE_TEST(BlindScoreTest)
 #include "blind_score_test.moc"

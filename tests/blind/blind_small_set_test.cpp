@@ -7,6 +7,7 @@
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/sha256.h"
 #include "tests/blind/subprocess.h"
+#include "tests/support/test_main.h"
 
 using namespace blind;
 using nlohmann::json;
@@ -180,5 +181,5 @@ void BlindSmallSetTest::helpTellsEveryCommand() {
   QCOMPARE(runProgram({blind, "sing"}).exit_status, 2);
 }
 
-QTEST_GUILESS_MAIN(BlindSmallSetTest)
+FIELDTRUE_TEST(BlindSmallSetTest)
 #include "blind_small_set_test.moc"

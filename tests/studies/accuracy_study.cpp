@@ -5,9 +5,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "calib/calibration/alignment.h"
 #include "calib/core/settings.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/automatic_choice.h"
+#include "calib/correctors/base/method.h"
 #include "calib/evaluation/noise_floor.h"
 #include "tests/studies/rooms.h"
 #include "tests/studies/table2.h"
@@ -48,7 +50,8 @@ const std::vector<Entry>& entries() {
                            {"gaussian_process", false},
                            {"bspline", false},
                            {"harmonic_field", false}};
-    std::erase_if(all, [](const Entry& entry) { return !findPositionMethod(parseMethodText(entry.text)->id); });
+    std::erase_if(all,
+                  [](const Entry& entry) { return !correctors::findPositionMethod(parseMethodText(entry.text)->id); });
     return all;
   }();
   return kEntries;
@@ -66,9 +69,9 @@ struct Outcome {
   std::string our_pick;
 };
 
-AutomaticCandidate candidateOf(const std::string& text) {
+correctors::AutomaticCandidate candidateOf(const std::string& text) {
   const MethodText parsed = orThrow(parseMethodText(text));
-  const PositionMethod* method = orThrow(findPositionMethod(parsed.id));
+  const correctors::PositionMethod* method = orThrow(correctors::findPositionMethod(parsed.id));
   return {method, orThrow(resolveSettings(parsed.id, method->settings, parsed.given)), text, 0};
 }
 
@@ -88,21 +91,21 @@ std::string lowestHeldOut(const std::map<std::string, double>& held_out_mm, bool
 }
 
 Outcome runRoom(const std::string& room, std::uint64_t seed, int stride) {
-  const Scene scene = readRoom(FIELDTRUE_RESOURCES, room);
+  const simulation::Scene scene = readRoom(FIELDTRUE_RESOURCES, room);
   const RoomRecording recording = recordRoom(scene, seed, 200, stride);
-  const Alignment alignment = orThrow(fitAlignment(recording.fit_nodes));
-  const FitData data = makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
-  const auto folds = innerFolds(data);
+  const calibration::Alignment alignment = orThrow(calibration::fitAlignment(recording.fit_nodes));
+  const correctors::FitData data = calibration::makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
+  const auto folds = correctors::innerFolds(data);
   Outcome outcome;
-  outcome.floor_mm = noiseFloor(recording.validation_nodes, recording.table.metadata).position_mm;
+  outcome.floor_mm = evaluation::noiseFloor(recording.validation_nodes, recording.table.metadata).position_mm;
   outcome.known_physics_mm = knownPhysicsRms_mm(scene, recording, seed);
   for (const Entry& entry : entries()) {
-    const AutomaticCandidate candidate = candidateOf(entry.text);
+    const correctors::AutomaticCandidate candidate = candidateOf(entry.text);
     const auto model = candidate.method->fit(data, candidate.settings, {});
     if (!model) continue;
     outcome.exact_mm[entry.text] = roomRms_mm(**model, alignment, recording.exact_nodes);
     outcome.jig_mm[entry.text] = roomRms_mm(**model, alignment, recording.validation_nodes);
-    const InnerScore score = orThrow(scoreCandidate(candidate, data, folds, nullptr, {}));
+    const correctors::InnerScore score = orThrow(correctors::scoreCandidate(candidate, data, folds, nullptr, {}));
     if (!score.skipped) outcome.held_out_mm[entry.text] = 1000.0 * score.rms_m();
   }
   outcome.before_mm = outcome.exact_mm.at("none");

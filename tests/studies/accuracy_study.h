@@ -15,8 +15,9 @@ struct StudyOptions {
 /// tables on stdout and progress on stderr.
 nlohmann::json accuracyStudy(const StudyOptions& options);
 
-/// How often calibrations made on one half of the places and judged on the other are wrongly applied to the real
-/// recordings of anser_duplo (skipped without FIELDTRUE_REAL_DATA), and rightly to the mixed room.
+/// How often calibrations made on one half of the places and judged on a quarter are applied to the real recordings of
+/// anser_duplo (left out without FIELDTRUE_REAL_DATA) and to the mixed room, and how often wrongly: without a gain on
+/// the quarter that neither had seen.
 nlohmann::json applyStudy(const StudyOptions& options);
 
 }  // namespace fieldtrue::testing

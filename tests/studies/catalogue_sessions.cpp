@@ -6,9 +6,10 @@
 #include <random>
 
 #include "calib/core/file_io.h"
-#include "calib/core/table_io.h"
-#include "calib/gap/gap_refine.h"
+#include "calib/identify/refine.h"
 #include "calib/simulation/simulator.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 #include "tests/studies/rooms.h"
 #include "tests/studies/workers.h"
 
@@ -34,15 +35,15 @@ class SessionMaker {
   explicit SessionMaker(std::uint64_t seed) : generator_(seed) {}
 
   Made make(const std::filesystem::path& path) {
-    Scene scene = randomScene();
+    simulation::Scene scene = randomScene();
     const std::vector<PlannedPlace> plan = randomPlan();
     Made made;
     if (uniform(0.0, 1.0) > 0.25) {
       for (int attempt = 0; attempt < 50 && made.effect == "none"; ++attempt) tryEffect(scene, plan, made);
     }
-    SimulationOptions options;
+    simulation::SimulationOptions options;
     options.seed = generator_();
-    const Simulation simulation = orThrow(simulate(scene, plan, options));
+    const simulation::Simulation simulation = orThrow(simulation::simulate(scene, plan, options));
     made.rows = static_cast<int>(simulation.table.nodes.size());
     orThrow(writeNodeTable(path, simulation.table).map([] { return 0; }));
     return made;
@@ -52,8 +53,8 @@ class SessionMaker {
   double uniform(double low, double high) { return std::uniform_real_distribution(low, high)(generator_); }
   int integer(int low, int high) { return std::uniform_int_distribution(low, high)(generator_); }
 
-  Scene randomScene() {
-    Scene scene;
+  simulation::Scene randomScene() {
+    simulation::Scene scene;
     scene.name = "catalogue";
     scene.tracker.coupling_noise = std::pow(10.0, uniform(-4.3, -3.3));
     scene.tracker.correlation = uniform(0.0, 0.8);
@@ -85,8 +86,9 @@ class SessionMaker {
   }
 
   /// Noise-free rows of a scene, and their RMS gap per channel over its true noise, the alignment refitted.
-  double rhoOf(const Scene& scene, std::span<const PlannedPlace> plan, double noise_m, double noise_rad) const {
-    TrackerSimulator simulator = orThrow(TrackerSimulator::make(scene, 1));
+  double rhoOf(const simulation::Scene& scene, std::span<const PlannedPlace> plan, double noise_m,
+               double noise_rad) const {
+    simulation::TrackerSimulator simulator = orThrow(simulation::TrackerSimulator::make(scene, 1));
     std::vector<Node> nodes;
     double time_s = 0.0;
     for (const PlannedPlace& place : plan) {
@@ -103,19 +105,20 @@ class SessionMaker {
     TableMetadata metadata;
     metadata.jig_tolerance_m = noise_m;
     metadata.jig_tolerance_rad = noise_rad;
-    const GapRows rows = orThrow(makeGapRows(nodes, metadata));
-    const GapPhysics physics(rows, {});
-    const Whitening whitening = makeWhitening(rows, noise_m, noise_rad);
-    const GapModel start{initialAlignment(rows), {}};
-    const RefinedModel none = refineJointly(physics, start, whitening, {});
+    const identify::GapRows rows = orThrow(identify::makeGapRows(nodes, metadata));
+    const identify::GapPhysics physics(rows, {});
+    const identify::Whitening whitening = identify::makeWhitening(rows, noise_m, noise_rad);
+    const identify::GapModel start{identify::initialAlignment(rows), {}};
+    const identify::RefinedModel none = identify::refineJointly(physics, start, whitening, {});
     double sum = 0.0;
-    for (const Vector6d& r : whitenedResiduals(physics, none.model, whitening)) sum += r.squaredNorm();
+    for (const identify::Vector6d& r : identify::whitenedResiduals(physics, none.model, whitening))
+      sum += r.squaredNorm();
     return std::sqrt(sum / (6.0 * static_cast<double>(nodes.size())));
   }
 
-  void tryEffect(Scene& scene, std::span<const PlannedPlace> plan, Made& made) {
-    std::vector<SensorSetting> settings;
-    FitDesign design;
+  void tryEffect(simulation::Scene& scene, std::span<const PlannedPlace> plan, Made& made) {
+    std::vector<field::SensorSetting> settings;
+    effects::FitDesign design;
     double time_s = 0.0;
     for (const PlannedPlace& place : plan) {
       const Pose tracker_from_reference = inverse(scene.reference_from_tracker);
@@ -132,20 +135,20 @@ class SessionMaker {
     }
     design.has_times = true;
     design.end_s = time_s;
-    std::vector<const Effect*> fitted;
-    for (const Effect& effect : effects())
+    std::vector<const effects::Effect*> fitted;
+    for (const effects::Effect& effect : effects::effects())
       if (effect.fits != nullptr && !effect.fits(design).empty()) fitted.push_back(&effect);
-    const Effect& effect = *fitted[static_cast<std::size_t>(integer(0, static_cast<int>(fitted.size()) - 1))];
+    const effects::Effect& effect = *fitted[static_cast<std::size_t>(integer(0, static_cast<int>(fitted.size()) - 1))];
     auto fits = effect.fits(design);
-    const EffectFit& fit = *fits[static_cast<std::size_t>(integer(0, static_cast<int>(fits.size()) - 1))];
+    const effects::EffectFit& fit = *fits[static_cast<std::size_t>(integer(0, static_cast<int>(fits.size()) - 1))];
     std::vector<Eigen::VectorXd> starts = fit.starts();
     Eigen::VectorXd searched = starts[static_cast<std::size_t>(integer(0, static_cast<int>(starts.size()) - 1))];
     for (Eigen::Index d = 0; d < searched.size(); ++d) searched[d] += uniform(-0.05, 0.05);
     if (searched.size() > 0 && !fit.allows(searched)) return;
-    const std::vector<FitParameter> bounds = fit.linear();
+    const std::vector<effects::FitParameter> bounds = fit.linear();
     Eigen::VectorXd linear(static_cast<Eigen::Index>(bounds.size()));
     for (Eigen::Index j = 0; j < linear.size(); ++j) {
-      const FitParameter& b = bounds[static_cast<std::size_t>(j)];
+      const effects::FitParameter& b = bounds[static_cast<std::size_t>(j)];
       linear[j] = uniform(b.low, b.high);
     }
     const std::optional<double> level =
@@ -155,17 +158,18 @@ class SessionMaker {
     if (made.effect != "none") made.level = level;
   }
 
-  void scaleTo(double wanted, Scene& scene, std::span<const PlannedPlace> plan, const Effect& effect,
-               const EffectFit& fit, const Eigen::VectorXd& searched, const Eigen::VectorXd& linear, Made& made) {
+  void scaleTo(double wanted, simulation::Scene& scene, std::span<const PlannedPlace> plan,
+               const effects::Effect& effect, const effects::EffectFit& fit, const Eigen::VectorXd& searched,
+               const Eigen::VectorXd& linear, Made& made) {
     double scale = 0.2;
     double rho = 0.0;
-    FittedEffect described;
-    Scene with = scene;
+    effects::FittedEffect described;
+    simulation::Scene with = scene;
     for (int step = 0; step < 12; ++step) {
       described = fit.describe(searched, scale * linear);
       with = scene;
       with.effects.push_back({effect.id, described.parameters});
-      if (!makeEffect(effect.id, described.parameters)) return;
+      if (!effects::makeEffect(effect.id, described.parameters)) return;
       rho = rhoOf(with, plan, scene.rig.tolerance_m, scene.rig.tolerance_rad);
       if (!std::isfinite(rho)) {
         scale *= 0.3;
@@ -200,7 +204,7 @@ nlohmann::json truthOf(const Made& made, const std::string& file) {
                        {"parameters", made.parameters}});
   }
   nlohmann::json classes = nlohmann::json::array();
-  for (const Effect& effect : fieldtrue::effects())
+  for (const effects::Effect& effect : fieldtrue::effects::effects())
     if (effect.id != "grid_scale") {
       classes.push_back(effect.id == "global_gain" ? nlohmann::json{"global_gain", "grid_scale"}
                                                    : nlohmann::json::array({effect.id}));

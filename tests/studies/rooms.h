@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/field/coupling_noise.h"
 #include "calib/simulation/simulator.h"
 
@@ -29,8 +30,8 @@ T orThrow(Result<T> result) {
 }
 
 /// @param resources folder of the shipped resources
-inline Scene readRoom(const std::filesystem::path& resources, const std::string& room) {
-  return orThrow(readScene(resources / "rooms" / (room + ".scene.json")));
+inline simulation::Scene readRoom(const std::filesystem::path& resources, const std::string& room) {
+  return orThrow(simulation::readScene(resources / "rooms" / (room + ".scene.json")));
 }
 
 /// A calibration recorded in a room, and exact readings at the same validation places.
@@ -43,7 +44,8 @@ struct RoomRecording {
 };
 
 /// Records every `stride`th node of the 9x9x7 grid at 1 ft, and validation places spread evenly over its volume.
-inline RoomRecording recordRoom(const Scene& scene, std::uint64_t seed, int n_validation = 200, int stride = 1) {
+inline RoomRecording recordRoom(const simulation::Scene& scene, std::uint64_t seed, int n_validation = 200,
+                                int stride = 1) {
   std::vector<PlannedPlace> plan;
   for (int i = 0; i < kRoomCounts[0]; i += stride)
     for (int j = 0; j < kRoomCounts[1]; j += stride)
@@ -55,7 +57,7 @@ inline RoomRecording recordRoom(const Scene& scene, std::uint64_t seed, int n_va
         plan.push_back(place);
       }
   constexpr std::uint32_t kValidationPlaces = 77;
-  GaussianStream stream(seed, kValidationPlaces);
+  field::GaussianStream stream(seed, kValidationPlaces);
   const auto uniform = [&stream] { return 0.5 * std::erfc(-stream.next() / std::sqrt(2.0)); };
   for (int v = 0; v < n_validation; ++v) {
     PlannedPlace place;
@@ -66,11 +68,11 @@ inline RoomRecording recordRoom(const Scene& scene, std::uint64_t seed, int n_va
     place.role = NodeRole::kValidation;
     plan.push_back(place);
   }
-  SimulationOptions options;
+  simulation::SimulationOptions options;
   options.seed = seed;
   RoomRecording recording;
-  recording.table = orThrow(simulate(scene, plan, options)).table;
-  const TrackerSimulator tracker = orThrow(TrackerSimulator::make(scene, seed));
+  recording.table = orThrow(simulation::simulate(scene, plan, options)).table;
+  const simulation::TrackerSimulator tracker = orThrow(simulation::TrackerSimulator::make(scene, seed));
   for (const Node& node : recording.table.nodes) {
     if (node.role == NodeRole::kFit) {
       recording.fit_nodes.push_back(node);
@@ -85,7 +87,8 @@ inline RoomRecording recordRoom(const Scene& scene, std::uint64_t seed, int n_va
 }
 
 /// RMS distance of corrected and true positions, reference frame [mm].
-inline double roomRms_mm(const PositionModel& model, const Alignment& alignment, const std::vector<Node>& nodes) {
+inline double roomRms_mm(const correctors::PositionModel& model, const calibration::Alignment& alignment,
+                         const std::vector<Node>& nodes) {
   double sum_m2 = 0.0;
   for (const Node& node : nodes) {
     const Eigen::Vector3d& p_m = node.tracker_from_sensor.position_m;
@@ -96,7 +99,7 @@ inline double roomRms_mm(const PositionModel& model, const Alignment& alignment,
 }
 
 /// The place whose exact reading is the one given, by Newton's method on the simulator itself.
-inline Eigen::Vector3d placeOfReading_m(const TrackerSimulator& tracker, const Eigen::Vector3d& p_tracked_m,
+inline Eigen::Vector3d placeOfReading_m(const simulation::TrackerSimulator& tracker, const Eigen::Vector3d& p_tracked_m,
                                         const Eigen::Vector3d& start_m) {
   const auto read_m = [&tracker](const Eigen::Vector3d& p_m) {
     return tracker.measureExactly({p_m, Eigen::Quaterniond::Identity()}, 0.0).tracker_from_sensor.position_m;
@@ -116,8 +119,8 @@ inline Eigen::Vector3d placeOfReading_m(const TrackerSimulator& tracker, const E
 
 /// What no method can go below in exact truth: the room's physics known entirely, and only the alignment of rig and
 /// tracker found from the same nodes [mm].
-inline double knownPhysicsRms_mm(const Scene& scene, const RoomRecording& recording, std::uint64_t seed) {
-  const TrackerSimulator tracker = orThrow(TrackerSimulator::make(scene, seed));
+inline double knownPhysicsRms_mm(const simulation::Scene& scene, const RoomRecording& recording, std::uint64_t seed) {
+  const simulation::TrackerSimulator tracker = orThrow(simulation::TrackerSimulator::make(scene, seed));
   std::vector<Eigen::Vector3d> stood_m;
   std::vector<Eigen::Vector3d> planned_m;
   for (const Node& node : recording.fit_nodes) {

@@ -16,7 +16,7 @@ inline const Eigen::Vector3d kBody_m{0.45, 0.3, -0.35};
 
 /// 100 places over a steel ball under the grid.
 inline KnownRoom roomWithSteel() {
-  Scene scene = gapScene();
+  simulation::Scene scene = gapScene();
   const Eigen::Vector3d in_tracker_m = inverse(scene.reference_from_tracker) * kBody_m;
   scene.effects.push_back({"compact_metal",
                            {{"center_m", {in_tracker_m.x(), in_tracker_m.y(), in_tracker_m.z()}},
@@ -31,14 +31,14 @@ inline KnownRoom roomWithSteel() {
 }
 
 /// What a diagnosis of that kind says, every part of it filled in by hand.
-inline GapReport writtenReport() {
-  GapReport report;
-  report.verdict = GapVerdict::kPartlyExplained;
+inline gap::GapReport writtenReport() {
+  gap::GapReport report;
+  report.verdict = gap::GapVerdict::kPartlyExplained;
   report.text = "Most of the gap is metal near place 2; look there first.";
   report.next_measurement = "Take place 2 again with the sensor turned by 90 degrees.";
   report.floor_position_mm = 1.5;
   for (int n = 0; n < 4; ++n) {
-    GapNode node;
+    gap::GapNode node;
     node.node = n;
     node.place_m = {0.5 + 0.2 * n, 0.1, 0.0};
     node.before_m = {0.001 * (n + 1), 0.0, 0.0};
@@ -46,7 +46,7 @@ inline GapReport writtenReport() {
     node.is_flagged = n == 2;
     report.nodes.push_back(node);
   }
-  SelectedEffect metal;
+  gap::SelectedEffect metal;
   metal.effect = "compact_metal";
   metal.equivalents = {"compact_metal", "finite_plate"};
   metal.probability = 0.75;
@@ -54,13 +54,13 @@ inline GapReport writtenReport() {
   metal.location_covariance_m2 = Eigen::Vector3d(4e-4, 1e-4, 1e-4).asDiagonal();
   metal.shrinkage = {4.0, 1.0, 0.75, 0.6, 0.85};
   metal.scene_parameters = {{"center_m", {0.9, 0.1, -0.4}}, {"radius_m", 0.1}, {"material", "conductive"}};
-  GapCandidate drift;
+  gap::GapCandidate drift;
   drift.effect = "gain_drift";
   drift.probability = 0.2;
   drift.shrinkage = {4.0, 3.6, 0.1, -0.1, 0.2};
   drift.is_plausible = false;
   drift.doubt = "a drift of 9 percent an hour";
-  GapCandidate none;
+  gap::GapCandidate none;
   none.effect = "none";
   none.probability = 0.05;
   report.selected = {metal};

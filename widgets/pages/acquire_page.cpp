@@ -14,19 +14,25 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
-#include "widgets/pages/empty_page.h"
+#include "widgets/forms/empty_page.h"
 #include "widgets/pages/place_list_model.h"
-#include "widgets/pages/units.h"
-#include "widgets/views/room_view.h"
-#include "widgets/views/sample_ring.h"
+#include "widgets/style/icons.h"
+#include "widgets/style/unit_texts.h"
+#include "widgets/views/room/room_view.h"
+#include "widgets/views/room/sample_ring.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 // The operator reads the place from 3 m: its letters are this share of the window's height.
 constexpr double kPlaceTextShare = 1.0 / 11.0;
 constexpr double kPositionTextShare = 1.0 / 24.0;
 constexpr double kReasonTextShare = 1.0 / 28.0;
+constexpr double kToGoTextShare = 1.0 / 15.0;
+constexpr double kReasonHeightShare = 1.0 / 14.0;  ///< One line to read from afar, or two or three for a long reason.
+constexpr int kSmallestReason = 12;                ///< Pixels.
+// How much of the way to a new guess of the transmitter's place is gone with each status, some thirty a second.
+constexpr double kEase = 0.15;
 constexpr int kInspectorWidth = 320;
 // Nearer than this the tracker's own error decides what it says of the distance, and the marks on the floor know
 // better.
@@ -39,24 +45,29 @@ void setPixelHeight(QLabel* label, int pixels) {
   label->setFont(font);
 }
 
-SampleRing::State ringState(TakeState take) {
+SampleRing::State ringState(acquisition::TakeState take) {
   switch (take) {
-    case TakeState::kIdle:
+    case acquisition::TakeState::kIdle:
       return SampleRing::State::kIdle;
-    case TakeState::kCollecting:
+    case acquisition::TakeState::kCollecting:
       return SampleRing::State::kCollecting;
-    case TakeState::kDone:
+    case acquisition::TakeState::kDone:
       return SampleRing::State::kDone;
-    case TakeState::kFailed:
+    case acquisition::TakeState::kFailed:
       return SampleRing::State::kFailed;
   }
   return SampleRing::State::kIdle;
 }
 
-QString bannerState(const AcquisitionStatus& status) {
-  if (status.attention || status.take == TakeState::kFailed) return QStringLiteral("attention");
+QString bannerState(const acquisition::AcquisitionStatus& status) {
+  if (status.device == acquisition::DeviceState::kFailed) return QStringLiteral("danger");
+  if (status.attention || status.take == acquisition::TakeState::kFailed) return QStringLiteral("attention");
   if (!status.current) return QStringLiteral("done");
-  return status.take == TakeState::kCollecting ? QStringLiteral("collecting") : QStringLiteral("next");
+  return status.take == acquisition::TakeState::kCollecting ? QStringLiteral("collecting") : QStringLiteral("next");
+}
+
+Pose eased(const Pose& from, const Pose& to) {
+  return {from.position_m + kEase * (to.position_m - from.position_m), from.orientation.slerp(kEase, to.orientation)};
 }
 
 }  // namespace
@@ -89,12 +100,12 @@ AcquirePage::AcquirePage(Workbench& workbench, QWidget* parent) : QWidget(parent
   connect(room_, &RoomView::placeClicked, list_, &QTableView::selectRow);
   connect(&workbench_, &Workbench::sessionChanged, this, &AcquirePage::onSession);
   connect(&workbench_, &Workbench::statusChanged, this, &AcquirePage::onStatus);
-  connect(&workbench_, &Workbench::tableChanged, this, [this] { model_->setTable(workbench_.table()); });
+  connect(&workbench_, &Workbench::tableChanged, this, [this] { model_->setTable(workbench_.recordedTable()); });
 }
 
 QWidget* AcquirePage::makeEmpty() {
   return new EmptyPage(tr("No session is open."), tr("Plan where the jig is to stand, or run the demonstration."),
-                       {{tr("Make a plan"), [this] { workbench_.goToStep(Step::kPlan); }},
+                       {{tr("Make a plan"), [this] { workbench_.goToPage(QStringLiteral("plan")); }},
                         {tr("Run the demonstration"), [this] { workbench_.startDemonstration(); }}},
                        this);
 }
@@ -113,11 +124,27 @@ QWidget* AcquirePage::makeBanner() {
   position_->setObjectName(QStringLiteral("bannerPosition"));
   reason_ = new QLabel(banner_);
   reason_->setObjectName(QStringLiteral("bannerReason"));
+  reason_->setWordWrap(true);
   for (QLabel* label : {place_, position_, reason_}) {
-    label->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
+    label->setSizePolicy(QSizePolicy::Ignored, label == reason_ ? QSizePolicy::Fixed : QSizePolicy::Preferred);
     texts->addWidget(label);
   }
   layout->addLayout(texts, 1);
+  auto* distance = new QVBoxLayout;
+  distance->setSpacing(0);
+  to_go_ = new QLabel(banner_);
+  to_go_->setObjectName(QStringLiteral("bannerToGo"));
+  to_go_caption_ = new QLabel(tr("to go"), banner_);
+  to_go_caption_->setObjectName(QStringLiteral("bannerToGoCaption"));
+  distance->addStretch();
+  for (QLabel* label : {to_go_, to_go_caption_}) {
+    label->setAlignment(Qt::AlignRight);
+    label->hide();
+    distance->addWidget(label);
+  }
+  distance->addStretch();
+  layout->addLayout(distance);
+  layout->addSpacing(16);
   ring_ = new SampleRing(banner_);
   ring_->setObjectName(QStringLiteral("sampleRing"));
   layout->addWidget(ring_);
@@ -218,46 +245,51 @@ void AcquirePage::onSession() {
   room_->setPlaces(planned);
   states_.clear();
   current_.reset();
+  shown_reference_.reset();
   stack_->setCurrentIndex(workbench_.sessionIsOpen() ? 1 : 0);
   retake_->setEnabled(false);
   onStatus(workbench_.status());
   fitText();
 }
 
-void AcquirePage::onStatus(const AcquisitionStatus& status) {
-  if (status.session_path != workbench_.sessionPath() || status.places.empty()) return;
-  if (states_ != status.states || current_ != status.current) {
-    states_ = status.states;
+void AcquirePage::onStatus(const acquisition::AcquisitionStatus& status) {
+  if (status.session->path != workbench_.sessionPath() || status.session->places.empty()) return;
+  if (states_ != status.recorded->states || current_ != status.current) {
+    states_ = status.recorded->states;
     current_ = status.current;
     model_->setStates(states_, current_);
     room_->setStates(states_, current_);
-    room_->setJig(current_ ? std::optional<Pose>(status.places[*current_].reference_from_sensor) : std::nullopt);
+    room_->setJig(current_ ? std::optional<Pose>(status.session->places[*current_].reference_from_sensor)
+                           : std::nullopt);
     if (current_) list_->scrollTo(model_->index(static_cast<int>(*current_), 0), QAbstractItemView::PositionAtCenter);
   }
-  room_->setTransmitter(status.reference_from_tracker);
-  const bool live = status.live && status.live->status.empty() && status.device == DeviceState::kRunning;
-  room_->setLive(live ? std::optional<Pose>(status.reference_from_tracker * status.live->tracker_from_sensor)
-                      : std::nullopt);
+  model_->setMisfits(status.recorded->misfits);
+  shown_reference_ =
+      shown_reference_ ? eased(*shown_reference_, status.reference_from_tracker) : status.reference_from_tracker;
+  room_->setTransmitter(*shown_reference_);
+  const bool live = status.live && status.live->status.empty() && status.device == acquisition::DeviceState::kRunning;
+  room_->setLive(live ? std::optional<Pose>(*shown_reference_ * status.live->tracker_from_sensor) : std::nullopt);
   showPlace(status);
   showRing(status);
   showButtons(status);
 }
 
-void AcquirePage::showPlace(const AcquisitionStatus& status) {
+void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
   if (status.current) {
-    const PlannedPlace& place = status.places[*status.current];
+    const PlannedPlace& place = status.session->places[*status.current];
     const QString name = QString::fromStdString(placeName(place));
     place_->setText(status.current_is_retake ? tr("Retake %1").arg(name) : name);
-    QString where = positionText(place.reference_from_sensor.position_m);
-    if (status.reference_known && status.distance_m.value_or(0.0) > kWorthTelling_m &&
-        status.take != TakeState::kCollecting)
-      where += tr("     %1 to go").arg(distanceText(*status.distance_m));
-    position_->setText(where);
+    position_->setText(positionText(place.reference_from_sensor.position_m));
   } else {
     place_->setText(tr("All places done"));
-    position_->setText(tr("%1 taken, %2 skipped").arg(status.n_done).arg(status.n_skipped));
+    position_->setText(tr("%1 taken, %2 skipped").arg(status.recorded->n_done).arg(status.recorded->n_skipped));
   }
-  reason_->setText(status.reason);
+  showDistance(status);
+  if (reason_->text() != status.reason) {
+    reason_->setText(status.reason);
+    reason_->setToolTip(status.reason);
+    fitReason();
+  }
   const QString state = bannerState(status);
   if (banner_->property("state").toString() == state) return;
   banner_->setProperty("state", state);
@@ -269,25 +301,55 @@ void AcquirePage::showPlace(const AcquisitionStatus& status) {
   fitText();
 }
 
-void AcquirePage::showRing(const AcquisitionStatus& status) {
+void AcquirePage::showDistance(const acquisition::AcquisitionStatus& status) {
+  const bool far = status.distance_known && status.distance_m.value_or(0.0) > kWorthTelling_m;
+  const bool shown = status.current && far && status.take != acquisition::TakeState::kCollecting;
+  to_go_->setVisible(shown);
+  to_go_caption_->setVisible(shown);
+  if (!shown) return;
+  to_go_->setText(distanceText(*status.distance_m));
+  if (to_go_->property("away").toBool() == status.away) return;
+  to_go_->setProperty("away", status.away);
+  to_go_->style()->unpolish(to_go_);
+  to_go_->style()->polish(to_go_);
+  fitText();
+}
+
+void AcquirePage::fitReason() {
+  const int height = static_cast<int>(window()->height() * kReasonHeightShare);
+  reason_->setFixedHeight(height);
+  QFont font = reason_->font();
+  int pixels = static_cast<int>(window()->height() * kReasonTextShare);
+  const auto fits = [&] {
+    font.setPixelSize(pixels);
+    return QFontMetrics(font).boundingRect(0, 0, reason_->width(), 10000, Qt::TextWordWrap, reason_->text()).height() <=
+           height;
+  };
+  while (pixels > kSmallestReason && !fits()) --pixels;
+  setPixelHeight(reason_, pixels);
+}
+
+void AcquirePage::showRing(const acquisition::AcquisitionStatus& status) {
   ring_->setProgress(status.collected, status.wanted, ringState(status.take));
 }
 
-void AcquirePage::showButtons(const AcquisitionStatus& status) {
-  const auto total = static_cast<int>(status.places.size());
-  const auto handled = static_cast<int>(status.n_done + status.n_skipped);
+void AcquirePage::showButtons(const acquisition::AcquisitionStatus& status) {
+  const auto total = static_cast<int>(status.session->places.size());
+  const auto handled = static_cast<int>(status.recorded->n_done + status.recorded->n_skipped);
   progress_->setRange(0, total);
   progress_->setValue(handled);
-  counts_->setText(tr("%1 of %2 places done%3")
-                       .arg(status.n_done)
-                       .arg(total)
-                       .arg(status.n_skipped > 0 ? tr(", %1 skipped").arg(status.n_skipped) : QString()));
-  const bool running = status.device == DeviceState::kRunning;
-  take_->setEnabled(running && status.current && status.take != TakeState::kCollecting);
+  counts_->setText(
+      tr("%1 of %2 places done%3")
+          .arg(status.recorded->n_done)
+          .arg(total)
+          .arg(status.recorded->n_skipped > 0 ? tr(", %1 skipped").arg(status.recorded->n_skipped) : QString()));
+  const bool running = status.device == acquisition::DeviceState::kRunning;
+  take_->setEnabled(running && status.current && status.take != acquisition::TakeState::kCollecting);
   skip_->setEnabled(status.current.has_value());
-  undo_->setEnabled(status.can_undo);
-  redo_->setEnabled(status.can_redo);
+  undo_->setEnabled(status.recorded->can_undo);
+  redo_->setEnabled(status.recorded->can_redo);
   automatic_->setChecked(status.automatic);
+  automatic_->setText(status.automatic ? tr("Takes by itself when still: on") : tr("Take by itself when still"));
 }
 
 void AcquirePage::resizeEvent(QResizeEvent* event) {
@@ -299,9 +361,11 @@ void AcquirePage::fitText() {
   const double window_height = window()->height();
   setPixelHeight(place_, static_cast<int>(window_height * kPlaceTextShare));
   setPixelHeight(position_, static_cast<int>(window_height * kPositionTextShare));
-  setPixelHeight(reason_, static_cast<int>(window_height * kReasonTextShare));
+  setPixelHeight(to_go_, static_cast<int>(window_height * kToGoTextShare));
+  setPixelHeight(to_go_caption_, static_cast<int>(window_height * kReasonTextShare));
+  fitReason();
   const int ring = static_cast<int>(window_height * 0.17);
   ring_->setFixedSize(ring, ring);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

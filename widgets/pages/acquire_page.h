@@ -3,7 +3,8 @@
 #include <QWidget>
 #include <vector>
 
-#include "widgets/pages/workbench.h"
+#include "acquisition/plan/place_state.h"
+#include "widgets/workbench/workbench.h"
 
 class QLabel;
 class QProgressBar;
@@ -11,7 +12,7 @@ class QPushButton;
 class QStackedWidget;
 class QTableView;
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 class PlaceListModel;
 class RoomView;
@@ -35,10 +36,13 @@ class AcquirePage : public QWidget {
                          std::function<void()> action);
   void addShortcut(const QKeySequence& keys, std::function<void()> action);
   void onSession();
-  void onStatus(const AcquisitionStatus& status);
-  void showPlace(const AcquisitionStatus& status);
-  void showRing(const AcquisitionStatus& status);
-  void showButtons(const AcquisitionStatus& status);
+  void onStatus(const acquisition::AcquisitionStatus& status);
+  void showPlace(const acquisition::AcquisitionStatus& status);
+  void showDistance(const acquisition::AcquisitionStatus& status);
+  /// Makes a long reason smaller until all of it is read.
+  void fitReason();
+  void showRing(const acquisition::AcquisitionStatus& status);
+  void showButtons(const acquisition::AcquisitionStatus& status);
   void fitText();
 
   Workbench& workbench_;
@@ -47,6 +51,8 @@ class AcquirePage : public QWidget {
   QLabel* place_;
   QLabel* position_;
   QLabel* reason_;
+  QLabel* to_go_;
+  QLabel* to_go_caption_;
   SampleRing* ring_;
   RoomView* room_;
   QProgressBar* progress_;
@@ -59,8 +65,9 @@ class AcquirePage : public QWidget {
   QPushButton* redo_;
   QPushButton* retake_;
   QPushButton* automatic_;
-  std::vector<PlaceState> states_;
+  std::vector<acquisition::PlaceState> states_;
   std::optional<std::size_t> current_;
+  std::optional<Pose> shown_reference_;  ///< Where the transmitter is drawn: it glides to a new guess.
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

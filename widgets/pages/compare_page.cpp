@@ -11,18 +11,21 @@
 #include <QTabWidget>
 #include <QVBoxLayout>
 
-#include "widgets/pages/curve_panel.h"
-#include "widgets/pages/empty_page.h"
-#include "widgets/pages/field_panel.h"
-#include "widgets/pages/fitted_methods.h"
-#include "widgets/pages/method_panel.h"
-#include "widgets/pages/place_panel.h"
-#include "widgets/pages/units.h"
-#include "widgets/pages/verdict_panel.h"
-#include "widgets/pages/volume_store.h"
-#include "widgets/views/volume_field.h"
+#include "calib/calibration/alignment.h"
+#include "widgets/compare/curve_panel.h"
+#include "widgets/compare/field_panel.h"
+#include "widgets/compare/method_panel.h"
+#include "widgets/compare/place_panel.h"
+#include "widgets/compare/verdict_panel.h"
+#include "widgets/compare/volume_store.h"
+#include "widgets/forms/empty_page.h"
+#include "widgets/forms/sensor_choice.h"
+#include "widgets/report/report_data.h"
+#include "widgets/style/unit_texts.h"
+#include "widgets/views/field/volume_field.h"
+#include "widgets/workbench/fitted_methods.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kInspectorWidth = 432;
@@ -65,7 +68,7 @@ ComparePage::ComparePage(Workbench& workbench, QWidget* parent)
   stack_->addWidget(new EmptyPage(
       tr("Nothing to compare yet."),
       tr("At least %1 places must be taken; then every method is tried on places it did not see.").arg(kFewestPlaces),
-      {{tr("Acquire"), [this] { workbench_.goToStep(Step::kAcquire); }},
+      {{tr("Acquire"), [this] { workbench_.goToPage(QStringLiteral("acquire")); }},
        {tr("Run the demonstration"), [this] { workbench_.startDemonstration(); }}},
       this));
   stack_->addWidget(content);
@@ -79,7 +82,7 @@ ComparePage::ComparePage(Workbench& workbench, QWidget* parent)
 void ComparePage::connectParts() {
   connect(&workbench_, &Workbench::tableChanged, this, &ComparePage::onTable);
   connect(&workbench_, &Workbench::comparisonChanged, this, &ComparePage::onComparison);
-  connect(&workbench_, &Workbench::correctorChanged, this, &ComparePage::onCorrector);
+  connect(&workbench_, &Workbench::correctorChanged, this, &ComparePage::showChoice);
   connect(&workbench_, &Workbench::fittingChanged, this, &ComparePage::showChoice);
   connect(&workbench_, &Workbench::comparisonProgress, this, &ComparePage::onProgress);
   connect(&workbench_, &Workbench::closing, this, [this] {
@@ -109,6 +112,7 @@ QWidget* ComparePage::makeHeader() {
   headline_ = new QLabel(header_);
   headline_->setObjectName(QStringLiteral("headline"));
   headline_->setProperty("role", "headline");
+  headline_->setWordWrap(true);
   verdict_ = new QLabel(header_);
   verdict_->setObjectName(QStringLiteral("verdict"));
   verdict_->setWordWrap(true);
@@ -138,6 +142,7 @@ QWidget* ComparePage::makeControls(QWidget* header) {
   connect(run_, &QPushButton::clicked, this, [this] {
     if (workbench_.isComparing()) {
       slow_to_come_ = false;
+      stopped_ = true;
       workbench_.stopComparing();
     } else {
       runComparison(false);
@@ -149,6 +154,7 @@ QWidget* ComparePage::makeControls(QWidget* header) {
   progress_text_ = new QLabel(controls);
   progress_text_->setProperty("role", "muted");
   auto* row = new QHBoxLayout;
+  row->addWidget(new SensorChoice(workbench_, QStringLiteral("compareSensor"), controls));
   row->addWidget(validation_);
   row->addWidget(run_);
   layout->addLayout(row);
@@ -210,30 +216,37 @@ void ComparePage::onTable() {
   for (const Node& node : workbench_.table().nodes) usable += node.role != NodeRole::kSkipped;
   stack_->setCurrentIndex(usable >= kFewestPlaces ? 1 : 0);
   out_of_date_ = true;
-  place_->setData(workbench_.table(), workbench_.samples(), workbench_.comparison());
+  showPlaceData();
   if (stack_->currentIndex() == 1 && isVisible()) runComparison(true);
+}
+
+void ComparePage::showPlaceData() {
+  place_->setData(
+      workbench_.table(), [this](int node) { return workbench_.samplesAt(node); }, workbench_.comparison());
 }
 
 void ComparePage::runComparison(bool quick_first) {
   out_of_date_ = false;
-  ComparisonOptions options;
-  const auto validation = parseValidation(validation_->currentData().toString().toStdString());
+  evaluation::ComparisonOptions options;
+  const auto validation = evaluation::parseValidation(validation_->currentData().toString().toStdString());
   if (validation) options.validation = *validation;
   options.position_methods = quick_first ? position_->tickedQuick() : position_->ticked();
   options.orientation_methods = quick_first ? rotation_->tickedQuick() : rotation_->ticked();
   n_compared_ = static_cast<int>(options.position_methods.size() + options.orientation_methods.size());
-  slow_to_come_ = n_compared_ < position_->tickedCount() + rotation_->tickedCount();
+  const int n_ticked = position_->tickedCount() + rotation_->tickedCount();
+  slow_to_come_ = n_compared_ < n_ticked;
+  stopped_ = false;
   // An empty list would mean all methods; none ticked means the error before alone.
   for (auto* methods : {&options.position_methods, &options.orientation_methods})
     methods->insert(methods->begin(), MethodText{"none", {}});
-  workbench_.compare(options);
+  workbench_.compare(options, {n_compared_, n_ticked});
 }
 
 void ComparePage::onProgress(double fraction) {
   progress_->setValue(static_cast<int>(fraction * 1000.0));
   const QString done = QString::number(static_cast<int>(100.0 * fraction));
   progress_text_->setText(workbench_.comparison() && n_compared_ > 0
-                              ? tr("%1 % of %2 methods; the figures are the last ones").arg(done).arg(n_compared_)
+                              ? tr("%1 % of %2 methods; figures of the last run").arg(done).arg(n_compared_)
                               : tr("%1 % of %2 methods").arg(done).arg(n_compared_));
 }
 
@@ -245,10 +258,8 @@ void ComparePage::onComparison() {
   setPrimary(run_, !workbench_.comparison());
   if (running) {
     onProgress(0.0);
-    if (!workbench_.comparison()) {
-      headline_->setText(tr("Comparing..."));
-      verdict_->setText(tr("Trying every ticked method on places it has not seen."));
-    }
+    showHeadline();
+    showChoice();
     return;
   }
   showComparison();
@@ -256,7 +267,7 @@ void ComparePage::onComparison() {
 }
 
 void ComparePage::showComparison() {
-  const std::optional<Comparison>& comparison = workbench_.comparison();
+  const std::optional<evaluation::Comparison>& comparison = workbench_.comparison();
   // A view that shows the best goes on showing the best, whichever that is now.
   const bool follows_best = fields_->right() == shown_best_;
   fitted_methods_->reset(workbench_.table(), comparison);
@@ -265,14 +276,10 @@ void ComparePage::showComparison() {
   rotation_->setComparison(comparison);
   verdict_panel_->setComparison(comparison);
   curve_->setComparison(workbench_.table(), comparison);
-  place_->setData(workbench_.table(), workbench_.samples(), comparison);
+  showPlaceData();
   fields_->setComparison(workbench_.table(), comparison);
-  if (!comparison) {
-    headline_->setText(tr("Not compared yet"));
-    verdict_->clear();
-    return;
-  }
-  showHeadline(*comparison);
+  showHeadline();
+  if (!comparison) return showChoice();
   position_->choose(QString::fromStdString(comparison->best_position));
   rotation_->choose(QString::fromStdString(comparison->best_orientation));
   fields_->setOrientation(comparison->best_orientation_row);
@@ -282,25 +289,81 @@ void ComparePage::showComparison() {
   showMarks();
 }
 
-void ComparePage::showHeadline(const Comparison& comparison) {
-  const bool apply = comparison.verdict.apply_position;
-  const auto best = comparison.best_position_row;
-  const double after_mm = best ? comparison.position[*best].stats.rms : comparison.before_position_mm.rms;
-  headline_->setText(
-      apply
-          ? tr("Apply it: %1 \u2192 %2 mm").arg(threeFigures(comparison.before_position_mm.rms), threeFigures(after_mm))
-          : tr("Do not correct: %1 mm as it is").arg(threeFigures(comparison.before_position_mm.rms)));
-  header_->setProperty("state", apply ? "apply" : "leave");
+void ComparePage::showHeadline() {
+  const std::optional<evaluation::Comparison>& comparison = workbench_.comparison();
+  const bool running = workbench_.isComparing();
+  QString state, headline, words;
+  if (!comparison) {
+    headline = running    ? tr("Comparing...")
+               : stopped_ ? tr("Stopped; nothing is compared yet")
+                          : tr("Not compared yet");
+    words = running ? tr("Trying every ticked method on places it has not seen.") : workbench_.refusal();
+  } else {
+    const auto best = comparison->best_position_row;
+    const QString before = threeFigures(comparison->before_position_mm.rms);
+    const QString gain = best ? tr("%1 \u2192 %2 mm").arg(before, threeFigures(comparison->position[*best].stats.rms))
+                              : tr("%1 mm").arg(before);
+    words = QString::fromStdString(comparison->verdict.text);
+    const Workbench::MethodCount count = workbench_.comparedMethods();
+    if (workbench_.comparisonIsFinal() && !stopped_) {
+      const QString caution = QString::fromStdString(cautionText(*comparison));
+      if (const std::string untried = notComparedText(*comparison); !untried.empty())
+        words += tr(" Not compared: %1.").arg(QString::fromStdString(untried));
+      const bool apply = comparison->verdict.apply_position;
+      state = !apply ? QStringLiteral("leave") : caution.isEmpty() ? QStringLiteral("apply") : QStringLiteral("care");
+      const bool inside_out = comparison->verdict.is_inside_out;
+      headline = inside_out          ? tr("Do not correct: axes or places of the readings are wrong")
+                 : !apply            ? tr("Do not correct: %1 mm as it is").arg(before)
+                 : caution.isEmpty() ? tr("Apply it: %1").arg(gain)
+                                     : tr("Apply with care, %1: %2").arg(caution, gain);
+    } else if (!workbench_.comparisonIsCurrent()) {
+      headline =
+          running ? tr("Comparing again; before that %1").arg(gain) : tr("The places have changed since: %1").arg(gain);
+      words = running ? tr("The figures are those of the last comparison, of other rows.")
+                      : tr("The figures are those of the last comparison, of other rows; compare again.");
+    } else if (count.done < count.wanted) {
+      headline =
+          (running || slow_to_come_ ? tr("So far, %1 of %2 methods: %3") : tr("Stopped after %1 of %2 methods: %3"))
+              .arg(count.done)
+              .arg(count.wanted)
+              .arg(gain);
+      words = tr("Not the last word, for the other methods are not tried yet. So far: %1").arg(words);
+    } else {
+      headline = (running ? tr("Comparing again; before that %1") : tr("Stopped; before that %1")).arg(gain);
+      words = tr("The figures are those of the last comparison. It said: %1").arg(words);
+    }
+  }
+  headline_->setText(headline);
+  verdict_->setText(words);
+  header_->setProperty("state", state);
   for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(widget);
-  verdict_->setText(QString::fromStdString(comparison.verdict.text));
+}
+
+QString ComparePage::whyNotFit() const {
+  if (workbench_.isComparing())
+    return tr("Wait for the comparison, or stop it: until then no method is chosen for good.");
+  if (!workbench_.comparisonIsCurrent())
+    return tr("Compare first: a fit takes methods that were tried on these places.");
+  for (const MethodPanel* panel : {position_, rotation_})
+    if (const QString why = panel->whyUnusable(); !why.isEmpty()) return why;
+  if (position_->method() == QLatin1String("none") && rotation_->method() == QLatin1String("none"))
+    return tr("No correction is chosen, for position and for orientation: there is nothing to fit.");
+  return {};
 }
 
 void ComparePage::showChoice() {
+  const QString why = whyNotFit();
+  const QString choice = tr("%1 for position, %2 for orientation.").arg(position_->label(), rotation_->label());
   fit_->setText(workbench_.isFitting() ? tr("Fitting...") : tr("Fit these methods"));
-  fit_->setEnabled(!workbench_.isFitting());
-  fit_->setToolTip(tr("%1 for position, %2 for orientation").arg(position_->label(), rotation_->label()));
-  if (!workbench_.corrector())
-    fitted_->setText(tr("%1 for position, %2 for orientation.").arg(position_->label(), rotation_->label()));
+  fit_->setEnabled(!workbench_.isFitting() && why.isEmpty());
+  fit_->setToolTip(why.isEmpty() ? choice : why);
+  const std::optional<calibration::Corrector>& corrector = workbench_.corrector();
+  if (!why.isEmpty()) return fitted_->setText(why);
+  if (!corrector) return fitted_->setText(choice);
+  fitted_->setText(tr("Fitted on %1 rows; what is left on those same rows (no verdict): RMS %2. Kept in the session, "
+                      "ready to export.")
+                       .arg(corrector->report().n_nodes)
+                       .arg(millimetreText(corrector->report().rms_m)));
 }
 
 void ComparePage::onShown() {
@@ -314,22 +377,12 @@ void ComparePage::showMarks() {
 }
 
 void ComparePage::fitChosen() {
-  CorrectorChoice choice;
+  calibration::CorrectorChoice choice;
   choice.position_id = position_->method().toStdString();
   choice.position_settings = position_->settings();
   choice.orientation_id = rotation_->method().toStdString();
   choice.orientation_settings = rotation_->settings();
-  workbench_.fit(choice, defaultAlignMode(workbench_.table().metadata));
-}
-
-void ComparePage::onCorrector() {
-  const std::optional<Corrector>& corrector = workbench_.corrector();
-  if (!corrector) return showChoice();
-  const FitReport& report = corrector->report();
-  fitted_->setText(tr("Fitted on %1 rows; what is left on those same rows (no verdict): RMS %2. Kept in the session, "
-                      "ready to export.")
-                       .arg(report.n_nodes)
-                       .arg(errorText(report.rms_m)));
+  workbench_.fit(choice, calibration::defaultAlignMode(workbench_.table().metadata));
 }
 
 void ComparePage::selectNode(int node) {
@@ -338,4 +391,4 @@ void ComparePage::selectNode(int node) {
   tabs_->setCurrentWidget(place_);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

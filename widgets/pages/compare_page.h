@@ -2,7 +2,7 @@
 
 #include <QWidget>
 
-#include "widgets/pages/workbench.h"
+#include "widgets/workbench/workbench.h"
 
 class QComboBox;
 class QLabel;
@@ -11,7 +11,7 @@ class QPushButton;
 class QStackedWidget;
 class QTabWidget;
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 class CurvePanel;
 class FieldPanel;
@@ -37,14 +37,17 @@ class ComparePage : public QWidget {
   QWidget* makeInspector();
   void connectParts();
   void onTable();
+  void showPlaceData();
   /// @param quick_first without the slow methods, and with them as soon as that is shown
   void runComparison(bool quick_first);
   void onComparison();
   void onProgress(double fraction);
-  void onCorrector();
-  void showHeadline(const Comparison& comparison);
+  /// The verdict, or what keeps the figures from being one.
+  void showHeadline();
   void showComparison();
   void showChoice();
+  /// Why the chosen methods cannot be fitted now; empty when they can.
+  QString whyNotFit() const;
   void onShown();
   void showMarks();
   void fitChosen();
@@ -72,8 +75,9 @@ class ComparePage : public QWidget {
   QLabel* fitted_;
   bool out_of_date_ = true;
   bool slow_to_come_ = false;
+  bool stopped_ = false;  ///< By the person, since the last run began.
   int n_compared_ = 0;
   std::optional<std::size_t> shown_best_;  ///< Row of the best in the comparison shown.
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -13,10 +13,10 @@
 #include <algorithm>
 
 #include "acquisition/devices/registry.h"
-#include "widgets/pages/settings_form.h"
-#include "widgets/pages/units.h"
+#include "widgets/forms/settings_form.h"
+#include "widgets/style/unit_texts.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kColumnWidth = 640;
@@ -65,7 +65,7 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   kind_ = new QComboBox(column);
   kind_->setObjectName(QStringLiteral("deviceKind"));
   kind_->setAccessibleName(tr("Tracker"));
-  for (const DeviceKind& kind : deviceKinds())
+  for (const acquisition::DeviceKind& kind : acquisition::deviceKinds())
     kind_->addItem(QString::fromStdString(kind.label), QString::fromStdString(kind.id));
   kind_help_ = new QLabel(column);
   kind_help_->setProperty("role", "muted");
@@ -128,24 +128,25 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
     if (scene_->currentData().toString().isEmpty()) chooseScene();
   });
   connect(connect_, &QPushButton::clicked, this, [this] {
-    const DeviceState device = workbench_.status().device;
-    if (device == DeviceState::kRunning || device == DeviceState::kConnecting) {
+    const acquisition::DeviceState device = workbench_.status().device;
+    if (device == acquisition::DeviceState::kRunning || device == acquisition::DeviceState::kConnecting) {
       workbench_.disconnectDevice();
     } else {
       workbench_.connectDevice(deviceText(), scenePath());
     }
   });
-  connect(next_, &QPushButton::clicked, this,
-          [this] { workbench_.goToStep(workbench_.sessionIsOpen() ? Step::kAcquire : Step::kPlan); });
+  connect(next_, &QPushButton::clicked, this, [this] {
+    workbench_.goToPage(workbench_.sessionIsOpen() ? QStringLiteral("acquire") : QStringLiteral("plan"));
+  });
   connect(&workbench_, &Workbench::statusChanged, this, &ConnectPage::onStatus);
   onKind();
   onStatus(workbench_.status());
 }
 
 void ConnectPage::onKind() {
-  const DeviceKind& kind = deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
+  const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
   const bool simulated = kind_->currentIndex() == 0;
-  kind_help_->setText(simulated ? tr("A Fastrak in a simulated room; a virtual operator carries the jig.")
+  kind_help_->setText(simulated ? tr("A simulated tracker in a simulated room; a virtual operator carries the jig.")
                                 : QString::fromStdString(kind.address_help));
   for (QWidget* widget :
        {static_cast<QWidget*>(address_label_), static_cast<QWidget*>(address_), static_cast<QWidget*>(refresh_)})
@@ -159,7 +160,7 @@ void ConnectPage::onKind() {
 void ConnectPage::refreshLines() {
   const QString typed = address_->currentText();
   address_->clear();
-  for (const SerialLine& line : serialLines()) {
+  for (const acquisition::SerialLine& line : acquisition::serialLines()) {
     address_->addItem(QString::fromStdString(line.path));
     address_->setItemData(address_->count() - 1, QString::fromStdString(line.description), Qt::ToolTipRole);
   }
@@ -169,7 +170,7 @@ void ConnectPage::refreshLines() {
 }
 
 QString ConnectPage::deviceText() const {
-  const DeviceKind& kind = deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
+  const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
   const QString settings = changedSettings(kind.settings, settings_->values());
   QStringList parts{QString::fromStdString(kind.id)};
   if (kind_->currentIndex() != 0) parts << address_->currentText().trimmed();
@@ -193,22 +194,22 @@ QString ConnectPage::scenePath() const {
   return chosen.contains(QLatin1Char('/')) ? chosen : Workbench::builtInScene(chosen);
 }
 
-void ConnectPage::onStatus(const AcquisitionStatus& status) {
-  const bool busy = status.device == DeviceState::kConnecting;
-  const bool running = status.device == DeviceState::kRunning;
+void ConnectPage::onStatus(const acquisition::AcquisitionStatus& status) {
+  const bool busy = status.device == acquisition::DeviceState::kConnecting;
+  const bool running = status.device == acquisition::DeviceState::kRunning;
   connect_->setText(running ? tr("Disconnect") : busy ? tr("Stop connecting") : tr("Connect"));
   for (QWidget* widget : {static_cast<QWidget*>(kind_), static_cast<QWidget*>(address_), static_cast<QWidget*>(scene_),
                           static_cast<QWidget*>(settings_)})
     widget->setEnabled(!running && !busy);
   next_->setEnabled(running);
-  state_->setText(status.device == DeviceState::kClosed ? tr("Not connected") : status.device_text);
+  state_->setText(status.device == acquisition::DeviceState::kClosed ? tr("Not connected") : status.device_text);
   if (running && status.live) {
     numbers_->setText(tr("%1 Hz    SD now %2    %3")
                           .arg(status.rate_hz, 0, 'f', 0)
-                          .arg(errorText(status.sd_m), positionText(status.live->tracker_from_sensor.position_m)));
+                          .arg(millimetreText(status.sd_m), positionText(status.live->tracker_from_sensor.position_m)));
   } else {
     numbers_->clear();
   }
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -2,14 +2,14 @@
 
 #include <QWidget>
 
-#include "widgets/pages/workbench.h"
+#include "widgets/workbench/workbench.h"
 
 class QComboBox;
 class QLabel;
 class QLineEdit;
 class QPushButton;
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 class SettingsForm;
 
@@ -22,7 +22,7 @@ class ConnectPage : public QWidget {
  private:
   void onKind();
   void refreshLines();
-  void onStatus(const AcquisitionStatus& status);
+  void onStatus(const acquisition::AcquisitionStatus& status);
   QString deviceText() const;
   void chooseScene();
   QString scenePath() const;
@@ -42,4 +42,4 @@ class ConnectPage : public QWidget {
   QLabel* numbers_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

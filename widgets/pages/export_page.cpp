@@ -14,16 +14,21 @@
 #include <QStackedWidget>
 #include <QVBoxLayout>
 
-#include "calib/core/table_io.h"
+#include "calib/core/thread_pool.h"
+#include "calib/exporters/exporter.h"
 #include "calib/exporters/registry.h"
-#include "widgets/pages/background.h"
-#include "widgets/pages/empty_page.h"
-#include "widgets/pages/method_list.h"
-#include "widgets/pages/units.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
+#include "widgets/compare/method_list.h"
+#include "widgets/forms/empty_page.h"
+#include "widgets/forms/number_box.h"
 #include "widgets/report/report.h"
-#include "widgets/report/thread_pool.h"
+#include "widgets/style/unit_texts.h"
+#include "widgets/views/draw_picture.h"
+#include "widgets/workbench/background.h"
+#include "widgets/workbench/compared_methods.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kColumnWidth = 720;
@@ -83,9 +88,9 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   outer->addStretch();
 
   stack_ = new QStackedWidget(this);
-  stack_->addWidget(new EmptyPage(tr("There is no calibration to export yet."),
-                                  tr("Compare the methods and fit the one you choose."),
-                                  {{tr("Compare"), [this] { workbench_.goToStep(Step::kCompare); }}}, this));
+  stack_->addWidget(new EmptyPage(tr("There is nothing to export yet."),
+                                  tr("Take places first; then compare the methods and fit the one you choose."),
+                                  {{tr("Compare"), [this] { workbench_.goToPage(QStringLiteral("compare")); }}}, this));
   stack_->addWidget(content);
   auto* page = new QVBoxLayout(this);
   page->setContentsMargins(0, 0, 0, 0);
@@ -102,6 +107,9 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   connect(&workbench_, &Workbench::correctorChanged, this, &ExportPage::onData);
   connect(&workbench_, &Workbench::sessionChanged, this, &ExportPage::onData);
   connect(&workbench_, &Workbench::tableChanged, this, &ExportPage::onData);
+  connect(&workbench_, &Workbench::comparisonChanged, this, [this] {
+    if (stack_->currentIndex() == 1) showCalibration();
+  });
   list_->setCurrentRow(0);
   onData();
 }
@@ -110,7 +118,7 @@ QWidget* ExportPage::makeBake() {
   bake_row_ = new QWidget(this);
   bake_ = new QCheckBox(tr("Bake to a lattice that is fast to evaluate, off the method by at most"), bake_row_);
   bake_->setObjectName(QStringLiteral("exportBake"));
-  deviation_ = new QDoubleSpinBox(bake_row_);
+  deviation_ = new NumberBox(bake_row_);
   deviation_->setObjectName(QStringLiteral("exportDeviation"));
   deviation_->setAccessibleName(tr("Largest deviation of the lattice from the method"));
   deviation_->setDecimals(3);
@@ -128,27 +136,28 @@ QWidget* ExportPage::makeBake() {
   return bake_row_;
 }
 
-ExportPage::Writing ExportPage::calibrationWriter(Result<void> (*exporter)(const Corrector&,
+ExportPage::Writing ExportPage::calibrationWriter(Result<void> (*exporter)(const calibration::Corrector&,
                                                                            const std::filesystem::path&)) const {
   const bool bake = bake_->isChecked() && !workbench_.corrector()->isBaked();
   const double deviation_m = deviation_->value() / 1000.0;
   return [corrector = *workbench_.corrector(), exporter, bake, deviation_m](const std::string& path) {
     RunControl control;
     control.parallel_for = threadedFor(0);
-    const Result<Corrector> written = bake ? corrector.baked(deviation_m, control) : Result<Corrector>(corrector);
+    const Result<calibration::Corrector> written =
+        bake ? corrector.baked(deviation_m, control) : Result<calibration::Corrector>(corrector);
     if (!written) return Result<std::string>(tl::unexpected(written.error()));
     return said(exporter(*written, path), bake ? written->report().notes.back() : std::string());
   };
 }
 
 void ExportPage::fillTargets() {
-  for (const Exporter& exporter : exporters())
+  for (const exporters::Exporter& exporter : exporters::exporters())
     targets_.push_back({QString::fromStdString(exporter.id), QString::fromStdString(exporter.label),
                         QString::fromStdString(exporter.extension), QString::fromStdString(exporter.reads_it), true,
                         [this, write = exporter.write] { return calibrationWriter(write); }});
   targets_.push_back({QStringLiteral("nodes"), tr("Node table"), QStringLiteral(".nodes.csv"),
                       tr("One row per place: what the rig says and what the tracker said."), false, [this] {
-                        return [table = workbench_.table()](const std::string& path) {
+                        return [table = workbench_.recordedTable()](const std::string& path) {
                           return said(writeNodeTable(std::filesystem::path(path), table));
                         };
                       }});
@@ -168,33 +177,73 @@ void ExportPage::fillTargets() {
 
 ReportInput ExportPage::reportInput() const {
   ReportInput input;
+  input.draw = drawPictures;
   input.table = workbench_.table();
   if (workbench_.comparison()) input.comparison = *workbench_.comparison();
   input.gap = workbench_.gapReport();
   input.source = workbench_.sessionPath().toStdString();
   input.plan = toJson(workbench_.plan()).dump();
-  input.places = workbench_.status().places;
-  input.states = workbench_.status().states;
+  input.places = workbench_.status().session->places;
+  input.states = workbench_.status().recorded->states;
+  if (!workbench_.comparisonIsFinal()) {
+    const Workbench::MethodCount count = workbench_.comparedMethods();
+    input.notes.push_back("The comparison tells " + std::to_string(count.done) + " of " + std::to_string(count.wanted) +
+                          " methods that were asked for: it was not finished.");
+  }
   input.made_at = QDateTime::currentDateTime().toString(Qt::ISODate).toStdString();
   return input;
 }
 
 void ExportPage::onData() {
-  const std::optional<Corrector>& corrector = workbench_.corrector();
-  stack_->setCurrentIndex(corrector ? 1 : 0);
-  if (!corrector) return;
-  const QString warning =
-      workbench_.correctorIsCurrent()
-          ? QString()
-          : tr(" It was fitted before the session's places changed: fit again on the compare page.");
-  const CorrectorChoice& choice = corrector->choice();
-  calibration_->setText(
-      tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows.%4")
-          .arg(methodLabel(MethodPart::kPosition, choice.position_id, choice.position_settings),
-               methodLabel(MethodPart::kOrientation, choice.orientation_id, choice.orientation_settings))
-          .arg(corrector->report().n_nodes)
-          .arg(warning));
+  const bool has_something = workbench_.corrector() || !workbench_.recordedTable().nodes.empty();
+  stack_->setCurrentIndex(has_something ? 1 : 0);
+  if (!has_something) return;
+  showCalibration();
   onTarget();
+}
+
+QString ExportPage::verdictOnCalibration() const {
+  if (!workbench_.comparisonIsFinal()) return {};
+  const evaluation::Comparison& comparison = *workbench_.comparison();
+  const bool applies = comparison.verdict.apply_position;
+  const bool corrects = workbench_.corrector()->choice().position_id != "none";
+  if (applies && !corrects)
+    return tr(" The comparison says to correct position with %1, and this leaves position as it is.")
+        .arg(positionLabel(comparison, comparison.best_position_row));
+  if (!applies && corrects) return tr(" The comparison says not to correct position.");
+  return {};
+}
+
+void ExportPage::showCalibration() {
+  const bool corrects = workbench_.correctorCorrects();
+  if (!workbench_.corrector()) {
+    calibration_->setText(
+        tr("There is no calibration yet: the tables can be written now; a calibration once a method is "
+           "fitted on the compare page."));
+  } else if (corrects) {
+    const calibration::CorrectorChoice& choice = workbench_.corrector()->choice();
+    const QString warning =
+        workbench_.correctorIsCurrent()
+            ? QString()
+            : tr(" It was fitted before the session's places changed: fit again on the compare page.");
+    calibration_->setText(
+        tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows.%4%5")
+            .arg(methodLabel(MethodPart::kPosition, choice.position_id, choice.position_settings),
+                 methodLabel(MethodPart::kOrientation, choice.orientation_id, choice.orientation_settings))
+            .arg(workbench_.corrector()->report().n_nodes)
+            .arg(warning, verdictOnCalibration()));
+  } else {
+    calibration_->setText(
+        tr("The calibration kept in this session corrects nothing, neither position nor orientation: "
+           "it cannot be written. Fit a method on the compare page."));
+  }
+  for (std::size_t row = 0; row < targets_.size(); ++row) {
+    QListWidgetItem* item = list_->item(static_cast<int>(row));
+    const bool offered = corrects || !targets_[row].is_calibration;
+    item->setFlags(offered ? item->flags() | Qt::ItemIsEnabled : item->flags() & ~Qt::ItemIsEnabled);
+    if (offered && (!chosen() || !(list_->currentItem()->flags() & Qt::ItemIsEnabled)))
+      list_->setCurrentRow(static_cast<int>(row));
+  }
 }
 
 const ExportPage::Target* ExportPage::chosen() const {
@@ -221,16 +270,27 @@ void ExportPage::browse() {
   if (!target) return;
   const QString path =
       QFileDialog::getSaveFileName(this, tr("Write to"), path_->text(), QStringLiteral("*") + target->extension);
-  if (!path.isEmpty()) path_->setText(path);
+  if (path.isEmpty()) return;
+  replaceable_ = path;  // The dialog asks.
+  path_->setText(path);
 }
 
 void ExportPage::write() {
   const Target* target = chosen();
   const QString path = path_->text();
   if (!target || path.isEmpty()) return;
-  if (target->id == QLatin1String("report") && !workbench_.comparison()) {
+  if (target->is_calibration && !workbench_.correctorCorrects()) return;
+  if (target->id == QLatin1String("report") && !workbench_.comparisonIsCurrent()) {
     workbench_.showMessage({tr("The report shows the comparison; compare the methods first."), Severity::kAttention,
-                            tr("Compare"), [this] { workbench_.goToStep(Step::kCompare); }});
+                            tr("Compare"), [this] { workbench_.goToPage(QStringLiteral("compare")); }});
+    return;
+  }
+  if (QFileInfo::exists(path) && path != replaceable_) {
+    workbench_.showMessage({tr("%1 exists already; nothing was written.").arg(QDir::toNativeSeparators(path)),
+                            Severity::kAttention, tr("Replace it"), [this, path] {
+                              replaceable_ = path;
+                              if (path_->text() == path) write();
+                            }});
     return;
   }
   write_->setEnabled(false);
@@ -242,6 +302,7 @@ void ExportPage::write() {
 void ExportPage::onWritten(const QString& path, const Result<std::string>& written) {
   write_->setEnabled(true);
   if (written) {
+    replaceable_ = path;
     const QString note = QString::fromStdString(*written);
     workbench_.showMessage({tr("Written: %1").arg(QDir::toNativeSeparators(path)) +
                                 (note.isEmpty() ? QString() : QStringLiteral(". ") + note),
@@ -253,4 +314,4 @@ void ExportPage::onWritten(const QString& path, const Result<std::string>& writt
   }
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -2,8 +2,8 @@
 
 #include <QWidget>
 
-#include "widgets/pages/workbench.h"
 #include "widgets/report/report.h"
+#include "widgets/workbench/workbench.h"
 
 class QCheckBox;
 class QDoubleSpinBox;
@@ -13,7 +13,7 @@ class QLineEdit;
 class QPushButton;
 class QStackedWidget;
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 /// Writes the calibration, the tables and the report to files for other tools.
 class ExportPage : public QWidget {
@@ -36,9 +36,13 @@ class ExportPage : public QWidget {
   };
   void fillTargets();
   QWidget* makeBake();
-  Writing calibrationWriter(Result<void> (*exporter)(const Corrector&, const std::filesystem::path&)) const;
+  Writing calibrationWriter(Result<void> (*exporter)(const calibration::Corrector&,
+                                                     const std::filesystem::path&)) const;
   void onTarget();
   void onData();
+  void showCalibration();
+  /// What the comparison says of the calibration; empty where there is none of the present places.
+  QString verdictOnCalibration() const;
   void browse();
   void write();
   void onWritten(const QString& path, const Result<std::string>& written);
@@ -56,7 +60,8 @@ class ExportPage : public QWidget {
   QCheckBox* bake_;
   QDoubleSpinBox* deviation_;
   QLineEdit* path_;
+  QString replaceable_;  ///< A file that may be written over: the person was asked, or it was written from here.
   QPushButton* write_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

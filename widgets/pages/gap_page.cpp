@@ -4,6 +4,7 @@
 #include <QFileDialog>
 #include <QHBoxLayout>
 #include <QLabel>
+#include <QPointer>
 #include <QProgressBar>
 #include <QPushButton>
 #include <QScrollArea>
@@ -12,20 +13,22 @@
 #include <QStyle>
 #include <QVBoxLayout>
 #include <algorithm>
-#include <mutex>
 
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
-#include "calib/gap/gap_json.h"
-#include "widgets/pages/background.h"
-#include "widgets/pages/empty_page.h"
+#include "calib/gap/json.h"
+#include "calib/recording/finding.h"
+#include "calib/tables/table_sensors.h"
+#include "widgets/figures/field_scale.h"
+#include "widgets/figures/gap_field.h"
+#include "widgets/forms/empty_page.h"
+#include "widgets/forms/sensor_choice.h"
 #include "widgets/report/gap_section.h"
-#include "widgets/report/thread_pool.h"
-#include "widgets/views/field_scale.h"
-#include "widgets/views/field_view.h"
-#include "widgets/views/gap_bar_view.h"
+#include "widgets/views/charts/gap_bar_view.h"
+#include "widgets/views/draw_picture.h"
+#include "widgets/views/field/field_view.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr std::size_t kFewestRows = 12;
@@ -36,24 +39,15 @@ void restyle(QWidget* widget) {
   widget->style()->polish(widget);
 }
 
-Result<GapReport> diagnoseWithCalib(const CalibrationTable& table, const SampleTable* samples, const Scene* scene,
-                                    const RunControl& control) {
-  return diagnose(table, samples, scene, {}, control);
+Result<gap::GapReport> diagnoseWithCalib(const CalibrationTable& table, const SampleTable* samples,
+                                         const simulation::Scene* scene, const RunControl& control) {
+  return gap::diagnose(table, samples, scene, {}, control);
 }
 
 }  // namespace
 
-struct GapPage::ProgressBox {
-  std::mutex mutex;
-  GapPage* page = nullptr;  ///< Null once it is gone.
-};
-
 GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
-    : QWidget(parent),
-      workbench_(workbench),
-      diagnose_(diagnose ? std::move(diagnose) : diagnoseWithCalib),
-      progress_box_(std::make_shared<ProgressBox>()) {
-  progress_box_->page = this;
+    : QWidget(parent), workbench_(workbench), diagnose_(diagnose ? std::move(diagnose) : diagnoseWithCalib) {
   auto* content = new QWidget(this);
   auto* rows = new QVBoxLayout(content);
   rows->setContentsMargins(0, 0, 0, 0);
@@ -70,24 +64,24 @@ GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
   stack_->addWidget(new EmptyPage(
       tr("Nothing to diagnose yet."),
       tr("At least %1 places must be taken; then the recording is held against the simulation.").arg(kFewestRows),
-      {{tr("Acquire"), [this] { workbench_.goToStep(Step::kAcquire); }},
+      {{tr("Acquire"), [this] { workbench_.goToPage(QStringLiteral("acquire")); }},
        {tr("Run the demonstration"), [this] { workbench_.startDemonstration(); }}},
       this));
   stack_->addWidget(content);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   layout->addWidget(stack_);
-  connect(&workbench_, &Workbench::tableChanged, this,
-          [this] { setRecording(workbench_.table(), workbench_.samples()); });
-  connect(&workbench_, &Workbench::closing, this, &GapPage::stop);
-  setRecording(workbench_.table(), workbench_.samples());
+  connect(&workbench_, &Workbench::tableChanged, this, [this] {
+    setRecording(workbench_.table(), [this] {
+      const std::optional<int> sensor = workbench_.chosenSensor();
+      return sensor ? rowsOfSensor(workbench_.samples(), *sensor) : workbench_.samples();
+    });
+  });
+  connect(&workbench_, &Workbench::closing, this, [this] { jobs_.stop(); });
+  setRecording(workbench_.table(), {});
 }
 
-GapPage::~GapPage() {
-  stop_.request_stop();
-  const std::lock_guard lock(progress_box_->mutex);
-  progress_box_->page = nullptr;
-}
+GapPage::~GapPage() = default;
 
 QWidget* GapPage::makeHeader() {
   header_ = new QWidget(this);
@@ -140,6 +134,7 @@ QWidget* GapPage::makeButtons(QWidget* header) {
   QPushButton* order[] = {run_, choose_, add_, undo_, save_report_, save_scene_};
   for (int i = 0; i < 6; ++i) grid->addWidget(order[i], i / 2, i % 2);
   grid->addWidget(progress_, 3, 0, 1, 2);
+  grid->addWidget(new SensorChoice(workbench_, QStringLiteral("gapSensor"), buttons), 4, 0, 1, 2);
   return buttons;
 }
 
@@ -175,10 +170,10 @@ QWidget* GapPage::makeInspector() {
   return inspector;
 }
 
-void GapPage::setRecording(const CalibrationTable& table, const SampleTable& samples) {
-  stop();
+void GapPage::setRecording(const CalibrationTable& table, std::function<SampleTable()> samples) {
+  jobs_.stop();
   table_ = table;
-  samples_ = samples;
+  samples_ = std::move(samples);
   report_.reset();
   for (Earlier& earlier : earlier_) earlier.report.reset();
   const auto usable = std::count_if(table_.nodes.begin(), table_.nodes.end(),
@@ -187,8 +182,8 @@ void GapPage::setRecording(const CalibrationTable& table, const SampleTable& sam
   showReport();
 }
 
-void GapPage::setScene(const std::optional<Scene>& scene) {
-  stop();
+void GapPage::setScene(const std::optional<simulation::Scene>& scene) {
+  jobs_.stop();
   scene_ = scene;
   earlier_.clear();
   report_.reset();
@@ -196,57 +191,32 @@ void GapPage::setScene(const std::optional<Scene>& scene) {
 }
 
 void GapPage::runOrStop() {
-  if (diagnosing_) {
-    stop();
+  if (isDiagnosing()) {
+    jobs_.stop();
     showReport();
   } else {
     run();
   }
 }
 
-RunControl GapPage::controlOf(int run) {
-  RunControl control;
-  control.parallel_for = threadedFor(0);
-  control.stop = stop_.get_token();
-  control.progress = [box = progress_box_, run](double fraction) {
-    const std::lock_guard lock(box->mutex);
-    GapPage* const page = box->page;
-    if (page == nullptr) return;
-    QMetaObject::invokeMethod(
-        page,
-        [page, run, fraction] {
-          if (run == page->run_count_) page->progress_->setValue(static_cast<int>(fraction * 1000.0));
-        },
-        Qt::QueuedConnection);
-  };
-  return control;
-}
-
 void GapPage::run() {
-  stop();
-  stop_ = std::stop_source();
-  diagnosing_ = true;
-  const int run = ++run_count_;
+  jobs_.stop();
+  if (!workbench_.mayUse(table_, [page = QPointer(this)] {
+        if (page) page->run();
+      }))
+    return showReport();
   progress_->setValue(0);
-  showReport();
-  runInBackground(
-      this,
-      [diagnose = diagnose_, table = table_, samples = samples_, scene = scene_, control = controlOf(run)] {
+  jobs_.run(
+      [diagnose = diagnose_, table = table_, samples = samples_ ? samples_() : SampleTable(),
+       scene = scene_](const RunControl& control) {
         return diagnose(table, samples.rows.empty() ? nullptr : &samples, scene ? &*scene : nullptr, control);
       },
-      [this, run](Result<GapReport> result) { onResult(run, std::move(result)); });
+      [this](Result<gap::GapReport> result) { onResult(std::move(result)); },
+      [this](double fraction) { progress_->setValue(static_cast<int>(fraction * 1000.0)); });
+  showReport();
 }
 
-void GapPage::stop() {
-  if (!diagnosing_) return;
-  stop_.request_stop();
-  ++run_count_;
-  diagnosing_ = false;
-}
-
-void GapPage::onResult(int run, Result<GapReport> result) {
-  if (run != run_count_) return;
-  diagnosing_ = false;
+void GapPage::onResult(Result<gap::GapReport> result) {
   if (result) {
     report_ = std::move(*result);
   } else {
@@ -259,7 +229,7 @@ void GapPage::onResult(int run, Result<GapReport> result) {
 
 void GapPage::addToSimulation() {
   if (!report_ || report_->selected.empty()) return;
-  Scene updated = updatedScene(scene_.value_or(Scene{}), *report_);
+  simulation::Scene updated = gap::updatedScene(scene_.value_or(simulation::Scene{}), *report_);
   earlier_.push_back({std::move(scene_), std::move(report_)});
   scene_ = std::move(updated);
   report_.reset();
@@ -268,7 +238,7 @@ void GapPage::addToSimulation() {
 
 void GapPage::undo() {
   if (earlier_.empty()) return;
-  stop();
+  jobs_.stop();
   scene_ = std::move(earlier_.back().scene);
   report_ = std::move(earlier_.back().report);
   earlier_.pop_back();
@@ -279,7 +249,7 @@ void GapPage::chooseScene() {
   const QString path =
       QFileDialog::getOpenFileName(this, tr("Scene the simulator believes"), {}, tr("Scenes (*.scene.json)"));
   if (path.isEmpty()) return;
-  auto scene = readScene(path.toStdString());
+  auto scene = simulation::readScene(path.toStdString());
   if (!scene) {
     workbench_.showMessage({QString::fromStdString(scene.error().message), Severity::kAttention, {}, {}});
     return;
@@ -306,12 +276,12 @@ void GapPage::tell(const Result<void>& written, const QString& path) {
 
 Result<void> GapPage::saveReport(const QString& path) const {
   if (!report_) return fail(ErrorCode::kBadInput, "There is no diagnosis to save yet; press Diagnose first");
-  if (const auto written = writeGapReport(path.toStdString(), *report_); !written) return written;
-  return writeGapHtml(*report_, (path + QStringLiteral(".html")).toStdString(), &table_);
+  if (const auto written = gap::writeGapReport(path.toStdString(), *report_); !written) return written;
+  return writeGapHtml(*report_, drawPictures, (path + QStringLiteral(".html")).toStdString(), &table_);
 }
 
 Result<void> GapPage::saveScene(const QString& path) const {
-  const Scene scene = scene_.value_or(Scene{});
+  const simulation::Scene scene = scene_.value_or(simulation::Scene{});
   return writeFileAtomically(path.toStdString(), [&](std::ostream& out) { out << toJson(scene).dump(2) << '\n'; });
 }
 
@@ -321,7 +291,6 @@ void GapPage::showReport() {
   showCharts();
   showButtons();
   workbench_.setGapReport(report_);
-  emit changed();
 }
 
 void GapPage::showWords() {
@@ -329,7 +298,7 @@ void GapPage::showWords() {
                          ? tr("The simulation holds %n effect(s).", nullptr, static_cast<int>(scene_->effects.size()))
                          : tr("The simulation is an ideal tracker in free space."));
   const bool matches =
-      report_ && (report_->verdict == GapVerdict::kNoGap || report_->verdict == GapVerdict::kExplained);
+      report_ && (report_->verdict == gap::GapVerdict::kNoGap || report_->verdict == gap::GapVerdict::kExplained);
   header_->setProperty("state", !report_ ? "" : matches ? "apply" : "leave");
   for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(widget);
   QString next;
@@ -339,9 +308,11 @@ void GapPage::showWords() {
     next = QString::fromStdString(report_->next_measurement);
     if (!next.isEmpty()) next = tr("Next measurement: %1").arg(next);
   } else {
-    headline_->setText(diagnosing_ ? tr("Diagnosing...") : tr("Not diagnosed yet"));
-    sentence_->setText(diagnosing_ ? tr("Trying every known cause on places it has not seen.")
-                                   : tr("Press Diagnose to see where simulation and recording differ, and why."));
+    headline_->setText(isDiagnosing() ? tr("Diagnosing...") : tr("Not diagnosed yet"));
+    sentence_->setText(isDiagnosing() ? tr("Trying every known cause on places it has not seen.")
+                       : !workbench_.refusal().isEmpty()
+                           ? workbench_.refusal()
+                           : tr("Press Diagnose to see where simulation and recording differ, and why."));
   }
   next_->setText(next);
   next_->setVisible(!next.isEmpty());
@@ -379,25 +350,26 @@ void GapPage::showCharts() {
   }
   const std::string prediction = predictionText(*report_);
   if (!prediction.empty()) addText("gapPrediction", tr("To be checked: %1").arg(QString::fromStdString(prediction)));
-  for (const GapFinding& finding : report_->findings) addText("gapFinding", QString::fromStdString(finding.text));
+  for (const recording::GapFinding& finding : report_->findings)
+    addText("gapFinding", QString::fromStdString(finding.text));
   charts_layout_->addStretch(1);
   charts_layout_->activate();
 }
 
 void GapPage::showButtons() {
-  run_->setText(diagnosing_ ? tr("&Stop") : report_ ? tr("&Diagnose again") : tr("&Diagnose"));
+  run_->setText(isDiagnosing() ? tr("&Stop") : report_ ? tr("&Diagnose again") : tr("&Diagnose"));
   run_->setProperty("primary", !report_);
-  const bool can_add = !diagnosing_ && report_ && !report_->selected.empty();
+  const bool can_add = !isDiagnosing() && report_ && !report_->selected.empty();
   add_->setProperty("primary", can_add);
   for (QWidget* button : {run_, add_}) restyle(button);
   add_->setEnabled(can_add);
   undo_->setEnabled(!earlier_.empty());
-  choose_->setEnabled(!diagnosing_);
-  save_report_->setEnabled(!diagnosing_ && report_.has_value());
-  save_scene_->setEnabled(!diagnosing_);
+  choose_->setEnabled(!isDiagnosing());
+  save_report_->setEnabled(!isDiagnosing() && report_.has_value());
+  save_scene_->setEnabled(!isDiagnosing());
   after_->setEnabled(report_.has_value());
-  progress_->setVisible(diagnosing_);
+  progress_->setVisible(isDiagnosing());
   header_->layout()->activate();
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

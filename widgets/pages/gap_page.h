@@ -4,13 +4,13 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <stop_token>
 #include <vector>
 
 #include "calib/core/run_control.h"
-#include "calib/gap/gap_report.h"
+#include "calib/gap/report.h"
 #include "calib/simulation/scene.h"
-#include "widgets/pages/workbench.h"
+#include "widgets/workbench/background.h"
+#include "widgets/workbench/workbench.h"
 
 class QCheckBox;
 class QLabel;
@@ -19,7 +19,7 @@ class QPushButton;
 class QStackedWidget;
 class QVBoxLayout;
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 class FieldView;
 
@@ -28,35 +28,31 @@ class GapPage : public QWidget {
   Q_OBJECT
  public:
   /// Runs on a pool thread. A null scene is an ideal tracker in free space.
-  using Diagnose = std::function<Result<GapReport>(const CalibrationTable& table, const SampleTable* samples,
-                                                   const Scene* scene, const RunControl& control)>;
+  using Diagnose = std::function<Result<gap::GapReport>(const CalibrationTable& table, const SampleTable* samples,
+                                                        const simulation::Scene* scene, const RunControl& control)>;
   /// @param diagnose none = the diagnosis of calib/gap
   explicit GapPage(Workbench& workbench, Diagnose diagnose = {}, QWidget* parent = nullptr);
   ~GapPage() override;
 
   /// Takes other rows; what was found on the earlier ones is dropped.
-  void setRecording(const CalibrationTable& table, const SampleTable& samples);
+  /// @param samples its raw samples, asked for when they are diagnosed; none when there are none
+  void setRecording(const CalibrationTable& table, std::function<SampleTable()> samples);
   /// The scene the simulator believes; none = an ideal tracker in free space.
-  void setScene(const std::optional<Scene>& scene);
-  const std::optional<Scene>& scene() const { return scene_; }
-  const std::optional<GapReport>& report() const { return report_; }
-  bool isDiagnosing() const { return diagnosing_; }
+  void setScene(const std::optional<simulation::Scene>& scene);
+  const std::optional<simulation::Scene>& scene() const { return scene_; }
+  const std::optional<gap::GapReport>& report() const { return report_; }
+  bool isDiagnosing() const { return jobs_.busy(); }
   /// Writes PATH and, beside it, the same as a page: PATH with `.html`. @error kIo
   Result<void> saveReport(const QString& path) const;
   /// @error kIo
   Result<void> saveScene(const QString& path) const;
 
- signals:
-  void changed();  ///< A diagnosis began, ended or was dropped.
-
  private:
   /// What undo goes back to.
   struct Earlier {
-    std::optional<Scene> scene;
-    std::optional<GapReport> report;
+    std::optional<simulation::Scene> scene;
+    std::optional<gap::GapReport> report;
   };
-  /// Where a run that may outlive the page leaves its progress.
-  struct ProgressBox;
 
   QWidget* makeHeader();
   QWidget* makeButtons(QWidget* header);
@@ -64,9 +60,7 @@ class GapPage : public QWidget {
   QWidget* makeInspector();
   QPushButton* addButton(QWidget* parent, const QString& words, const char* name, void (GapPage::*slot)());
   void run();
-  void stop();
-  RunControl controlOf(int run);
-  void onResult(int run, Result<GapReport> result);
+  void onResult(Result<gap::GapReport> result);
   void runOrStop();
   void addToSimulation();
   void undo();
@@ -84,14 +78,11 @@ class GapPage : public QWidget {
   Workbench& workbench_;
   Diagnose diagnose_;
   CalibrationTable table_;
-  SampleTable samples_;
-  std::optional<Scene> scene_;
+  std::function<SampleTable()> samples_;
+  std::optional<simulation::Scene> scene_;
   std::vector<Earlier> earlier_;
-  std::optional<GapReport> report_;
-  std::stop_source stop_;
-  std::shared_ptr<ProgressBox> progress_box_;
-  int run_count_ = 0;
-  bool diagnosing_ = false;
+  std::optional<gap::GapReport> report_;
+  BackgroundJobs jobs_{this};
 
   QStackedWidget* stack_;
   QWidget* header_ = nullptr;
@@ -112,4 +103,4 @@ class GapPage : public QWidget {
   QVBoxLayout* charts_layout_ = nullptr;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

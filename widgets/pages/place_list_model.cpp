@@ -6,10 +6,11 @@
 #include <cmath>
 #include <map>
 
-#include "widgets/pages/units.h"
-#include "widgets/views/theme.h"
+#include "acquisition/plan/place_state.h"
+#include "widgets/style/theme.h"
+#include "widgets/style/unit_texts.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr std::array kColumns{QT_TRANSLATE_NOOP("PlaceListModel", "Place"),
@@ -18,15 +19,15 @@ constexpr std::array kColumns{QT_TRANSLATE_NOOP("PlaceListModel", "Place"),
 
 }  // namespace
 
-QString placeStateText(PlaceState state) {
+QString placeStateText(acquisition::PlaceState state) {
   switch (state) {
-    case PlaceState::kPlanned:
+    case acquisition::PlaceState::kPlanned:
       return QObject::tr("planned");
-    case PlaceState::kDone:
+    case acquisition::PlaceState::kDone:
       return QObject::tr("done");
-    case PlaceState::kSkipped:
+    case acquisition::PlaceState::kSkipped:
       return QObject::tr("skipped");
-    case PlaceState::kSuspicious:
+    case acquisition::PlaceState::kSuspicious:
       return QObject::tr("look at it");
   }
   return {};
@@ -35,17 +36,31 @@ QString placeStateText(PlaceState state) {
 void PlaceListModel::setPlaces(const std::vector<PlannedPlace>& places) {
   beginResetModel();
   places_ = places;
-  states_.assign(places.size(), PlaceState::kPlanned);
+  states_.assign(places.size(), acquisition::PlaceState::kPlanned);
   nodes_.assign(places.size(), std::nullopt);
+  misfits_.clear();
   current_.reset();
   endResetModel();
 }
 
-void PlaceListModel::setStates(const std::vector<PlaceState>& states, std::optional<std::size_t> current) {
+void PlaceListModel::setStates(const std::vector<acquisition::PlaceState>& states, std::optional<std::size_t> current) {
   if (states.size() != places_.size()) return;
   states_ = states;
   current_ = current;
   if (!places_.empty()) emit dataChanged(index(0, 0), index(rowCount() - 1, columnCount() - 1));
+}
+
+void PlaceListModel::setMisfits(const std::vector<acquisition::PlaceMisfit>& misfits) {
+  if (misfits == misfits_) return;
+  misfits_ = misfits;
+  if (!places_.empty()) emit dataChanged(index(0, 1), index(rowCount() - 1, 1));
+}
+
+QString PlaceListModel::stateText(std::size_t row) const {
+  if (current_ == row) return tr("next");
+  for (const acquisition::PlaceMisfit& misfit : misfits_)
+    if (misfit.place == row) return tr("%1 off").arg(distanceText(misfit.off_m));
+  return placeStateText(states_[row]);
 }
 
 void PlaceListModel::setTable(const CalibrationTable& table) {
@@ -69,7 +84,7 @@ QString PlaceListModel::text(std::size_t row, int column) const {
     case 0:
       return QString::fromStdString(placeName(places_[row]));
     case 1:
-      return current_ == row ? tr("next") : placeStateText(states_[row]);
+      return stateText(row);
     case 2:
       return node ? QString::number(node->n_used) : QString();
     case 3:
@@ -89,9 +104,9 @@ QVariant PlaceListModel::data(const QModelIndex& index, int role) const {
     return bold;
   }
   if (role == Qt::ForegroundRole && index.column() == 1) {
-    if (states_[row] == PlaceState::kDone) return theme().done;
-    if (states_[row] == PlaceState::kSuspicious) return theme().attention;
-    if (states_[row] == PlaceState::kSkipped) return theme().text_muted;
+    if (states_[row] == acquisition::PlaceState::kDone) return theme().done;
+    if (states_[row] == acquisition::PlaceState::kSuspicious) return theme().attention;
+    if (states_[row] == acquisition::PlaceState::kSkipped) return theme().text_muted;
   }
   return {};
 }
@@ -102,4 +117,4 @@ QVariant PlaceListModel::headerData(int section, Qt::Orientation orientation, in
   return tr(kColumns[static_cast<std::size_t>(section)]);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

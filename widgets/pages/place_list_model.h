@@ -4,9 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "acquisition/session/session_store.h"
+#include "acquisition/plan/place_state.h"
+#include "acquisition/session/acquisition_controller.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 /// Every planned place with its state and the numbers of its take: name, state, samples, SD, rejected.
 class PlaceListModel : public QAbstractTableModel {
@@ -14,7 +15,9 @@ class PlaceListModel : public QAbstractTableModel {
  public:
   using QAbstractTableModel::QAbstractTableModel;
   void setPlaces(const std::vector<PlannedPlace>& places);
-  void setStates(const std::vector<PlaceState>& states, std::optional<std::size_t> current);
+  void setStates(const std::vector<acquisition::PlaceState>& states, std::optional<std::size_t> current);
+  /// Takes that do not fit the others: the state says how far they are off.
+  void setMisfits(const std::vector<acquisition::PlaceMisfit>& misfits);
   void setTable(const CalibrationTable& table);
 
   int rowCount(const QModelIndex& parent = {}) const override;
@@ -24,13 +27,15 @@ class PlaceListModel : public QAbstractTableModel {
 
  private:
   QString text(std::size_t row, int column) const;
+  QString stateText(std::size_t row) const;
   std::vector<PlannedPlace> places_;
-  std::vector<PlaceState> states_;
+  std::vector<acquisition::PlaceState> states_;
   std::vector<std::optional<Node>> nodes_;
   std::optional<std::size_t> current_;
+  std::vector<acquisition::PlaceMisfit> misfits_;
 };
 
 /// "planned", "done", "skipped", "look at it".
-QString placeStateText(PlaceState state);
+QString placeStateText(acquisition::PlaceState state);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

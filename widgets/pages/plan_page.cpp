@@ -13,19 +13,24 @@
 #include <QSplitter>
 #include <QVBoxLayout>
 #include <cmath>
+#include <limits>
 #include <set>
 
-#include "widgets/pages/units.h"
-#include "widgets/views/room_view.h"
+#include "widgets/forms/number_box.h"
+#include "widgets/style/unit_texts.h"
+#include "widgets/style/units.h"
+#include "widgets/views/room/room_view.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr std::array kAxes{"x", "y", "z"};
 constexpr int kFormWidth = 360;
 constexpr int kScrollBarWidth = 14;
 constexpr int kMaxCount = 40;
+constexpr int kMaxSeed = std::numeric_limits<int>::max();
 // A practised operator carries the jig to the next mark and lets it settle in about this time.
+constexpr double kWidest_m = 30.0;  ///< What tables are refused for too.
 constexpr double kSecondsPerPlacement = 15.0;
 constexpr double kSamplesPerSecond = 120.0;
 
@@ -58,11 +63,12 @@ PlanPage::PlanPage(Workbench& workbench, QWidget* parent)
   splitter->setStretchFactor(0, 1);
   splitter->setSizes({940, kFormWidth});
   layout->addWidget(splitter);
+  connect(&workbench_, &Workbench::sessionChanged, this, [this] { showPlan(workbench_.plan()); });
   onChanged();
 }
 
 QDoubleSpinBox* PlanPage::makeLength(const QString& name, double metres) {
-  auto* box = new QDoubleSpinBox(this);
+  auto* box = new NumberBox(this);
   box->setDecimals(enteredDecimals(shown_unit_));
   box->setRange(-100000.0, 100000.0);
   box->setAccessibleName(name);
@@ -81,9 +87,9 @@ QWidget* PlanPage::makeForm() {
   title->setProperty("role", "heading");
   layout->addWidget(title);
 
-  const Plan start;
+  const acquisition::Plan start;
   auto makeCount = [this](const QString& name, int value, int low, int high) {
-    auto* box = new QSpinBox(this);
+    auto* box = new CountBox(this);
     box->setRange(low, high);
     box->setValue(value);
     box->setAccessibleName(name);
@@ -95,7 +101,9 @@ QWidget* PlanPage::makeForm() {
     counts_[axis] = makeCount(tr("Places along %1").arg(letter), start.counts[axis], 1, kMaxCount);
     counts_[axis]->setObjectName(QStringLiteral("count_") + letter);
     pitch_[axis] = makeLength(tr("Pitch along %1").arg(letter), start.pitch_m[static_cast<Eigen::Index>(axis)]);
-    pitch_[axis]->setMinimum(0.001);
+    pitch_[axis]->setObjectName(QStringLiteral("pitch_") + letter);
+    // Zero can be typed, so that it can be answered at the field instead of being put back in silence.
+    pitch_[axis]->setMinimum(0.0);
     origin_[axis] = makeLength(tr("First place %1").arg(letter), origin_m(start)[static_cast<Eigen::Index>(axis)]);
   }
   pipe_foot_ = makeLength(tr("Height of the pipes' feet"), start.pipe_base_m);
@@ -114,17 +122,24 @@ QWidget* PlanPage::makeForm() {
   order_->setItemData(1, tr("Tells drift with time from error with place"), Qt::ToolTipRole);
   order_->setAccessibleName(tr("Order"));
   connect(order_, &QComboBox::currentIndexChanged, this, &PlanPage::onChanged);
-  seed_ = makeCount(tr("Seed of the random order"), 1, 0, 1000000);
+  seed_ = makeCount(tr("Seed of the random order"), 1, 0, kMaxSeed);
   orientations_ = makeCount(tr("Sensor orientations at each place"), 1, 1, 8);
   reseat_ = makeCount(tr("Times each place is seated anew"), 1, 1, 8);
   samples_ = makeCount(tr("Samples at each place"), 60, 1, 10000);
   samples_->setObjectName(QStringLiteral("samplesPerNode"));
+
+  problem_ = new QLabel(panel);
+  problem_->setObjectName(QStringLiteral("planProblem"));
+  problem_->setProperty("role", "attention");
+  problem_->setWordWrap(true);
+  problem_->hide();
 
   auto* form = new QFormLayout;
   form->setRowWrapPolicy(QFormLayout::WrapLongRows);
   form->addRow(tr("Unit"), unit_);
   form->addRow(tr("Places x, y, z"), inRow({counts_[0], counts_[1], counts_[2]}));
   form->addRow(tr("Pitch x, y, z"), inRow({pitch_[0], pitch_[1], pitch_[2]}));
+  form->addRow(problem_);
   form->addRow(tr("First place"), default_origin_);
   form->addRow(QString(), inRow({origin_[0], origin_[1], origin_[2]}));
   form->addRow(tr("Pipe foot z"), pipe_foot_);
@@ -156,8 +171,8 @@ QWidget* PlanPage::makeForm() {
   return panel;
 }
 
-Plan PlanPage::plan() const {
-  Plan plan;
+acquisition::Plan PlanPage::plan() const {
+  acquisition::Plan plan;
   const double unit_m = metresPer(shown_unit_);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     plan.counts[axis] = counts_[axis]->value();
@@ -165,7 +180,7 @@ Plan PlanPage::plan() const {
   }
   if (!default_origin_->isChecked())
     plan.origin_m = Eigen::Vector3d(origin_[0]->value(), origin_[1]->value(), origin_[2]->value()) * unit_m;
-  plan.order = order_->currentIndex() == 0 ? PlanOrder::kSerpentine : PlanOrder::kRandom;
+  plan.order = order_->currentIndex() == 0 ? acquisition::PlanOrder::kSerpentine : acquisition::PlanOrder::kRandom;
   plan.seed = static_cast<std::uint64_t>(seed_->value());
   plan.orientations = orientations_->value();
   plan.reseat = reseat_->value();
@@ -193,9 +208,32 @@ void PlanPage::onUnit() {
   onChanged();
 }
 
+QString PlanPage::pitchProblem(const acquisition::Plan& now) const {
+  if (!now.explicit_places.empty()) return {};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (pitch_[axis]->value() <= 0.0)
+      return tr("The pitch along %1 is 0: the places would stand on each other. Enter a distance above 0.")
+          .arg(QLatin1String(kAxes[axis]));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double extent_m = (now.counts[axis] - 1) * now.pitch_m[static_cast<Eigen::Index>(axis)];
+    if (extent_m > kWidest_m)
+      return tr("Along %1 the places would span %2 m; no tracker reaches farther than %3 m. Look at pitch and unit.")
+          .arg(QLatin1String(kAxes[axis]))
+          .arg(extent_m, 0, 'g', 4)
+          .arg(kWidest_m);
+  }
+  return {};
+}
+
 void PlanPage::onChanged() {
-  const Plan now = plan();
+  if (filling_) return;
+  const acquisition::Plan now = plan();
   enableFields(now);
+  const QString problem = pitchProblem(now);
+  problem_->setText(problem);
+  problem_->setVisible(!problem.isEmpty());
+  create_->setEnabled(problem.isEmpty());
+  if (!problem.isEmpty()) return summary_->clear();
   const Eigen::Vector3d first_m = origin_m(now);
   for (std::size_t axis = 0; axis < 3 && !now.origin_m; ++axis) {
     const QSignalBlocker quiet(origin_[axis]);
@@ -207,7 +245,7 @@ void PlanPage::onChanged() {
   summary_->setText(summary(now, planned));
 }
 
-void PlanPage::enableFields(const Plan& now) {
+void PlanPage::enableFields(const acquisition::Plan& now) {
   const bool grid = now.explicit_places.empty();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     counts_[axis]->setEnabled(grid);
@@ -215,11 +253,11 @@ void PlanPage::enableFields(const Plan& now) {
     origin_[axis]->setEnabled(grid && now.origin_m.has_value());
   }
   default_origin_->setEnabled(grid);
-  seed_->setEnabled(now.order == PlanOrder::kRandom);
+  seed_->setEnabled(now.order == acquisition::PlanOrder::kRandom);
   use_grid_->setVisible(!grid);
 }
 
-QString PlanPage::summary(const Plan& now, const std::vector<PlannedPlace>& planned) const {
+QString PlanPage::summary(const acquisition::Plan& now, const std::vector<PlannedPlace>& planned) const {
   std::set<double> levels_m;
   for (const PlannedPlace& place : planned)
     levels_m.insert(std::round(place.reference_from_sensor.position_m.z() * 1000.0) / 1000.0);
@@ -230,7 +268,7 @@ QString PlanPage::summary(const Plan& now, const std::vector<PlannedPlace>& plan
                      .arg(levels_m.size())
                      .arg(std::ceil(minutes), 0, 'f', 0);
   QStringList pipes;
-  for (const double length_m : pipeLengths_m(now)) pipes << coordinateText(length_m);
+  for (const double length_m : acquisition::pipeLengths_m(now)) pipes << coordinateText(length_m);
   if (!pipes.isEmpty()) text += tr(" Pipes: %1.").arg(pipes.join(QStringLiteral(", ")));
   return text;
 }
@@ -238,29 +276,41 @@ QString PlanPage::summary(const Plan& now, const std::vector<PlannedPlace>& plan
 void PlanPage::loadPlanFile() {
   const QString path = QFileDialog::getOpenFileName(this, tr("Load a plan"), QString(), tr("Plans (*.plan.json)"));
   if (path.isEmpty()) return;
-  const Result<Plan> loaded = readPlan(path.toStdString());
+  const Result<acquisition::Plan> loaded = acquisition::readPlan(path.toStdString());
   if (!loaded) {
     workbench_.showMessage({QString::fromStdString(loaded.error().message), Severity::kAttention, {}, {}});
     return;
   }
-  explicit_places_ = loaded->explicit_places;
-  pipe_foot_->setValue(loaded->pipe_base_m / metresPer(shown_unit_));
-  default_origin_->setChecked(!loaded->origin_m.has_value());
+  showPlan(*loaded);
+}
+
+void PlanPage::showPlan(const acquisition::Plan& plan) {
+  filling_ = true;
+  const double unit_m = metresPer(shown_unit_);
+  const auto count = [](QSpinBox* box, int value) {
+    box->setMaximum(std::max(box->maximum(), value));
+    box->setValue(value);
+  };
+  explicit_places_ = plan.explicit_places;
+  pipe_foot_->setValue(plan.pipe_base_m / unit_m);
+  default_origin_->setChecked(!plan.origin_m.has_value());
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    counts_[axis]->setValue(loaded->counts[axis]);
-    pitch_[axis]->setValue(loaded->pitch_m[static_cast<Eigen::Index>(axis)] / metresPer(shown_unit_));
-    if (loaded->origin_m)
-      origin_[axis]->setValue((*loaded->origin_m)[static_cast<Eigen::Index>(axis)] / metresPer(shown_unit_));
+    const auto row = static_cast<Eigen::Index>(axis);
+    count(counts_[axis], plan.counts[axis]);
+    pitch_[axis]->setValue(plan.pitch_m[row] / unit_m);
+    if (plan.origin_m) origin_[axis]->setValue((*plan.origin_m)[row] / unit_m);
   }
-  order_->setCurrentIndex(loaded->order == PlanOrder::kSerpentine ? 0 : 1);
-  seed_->setValue(static_cast<int>(loaded->seed));
-  orientations_->setValue(loaded->orientations);
-  reseat_->setValue(loaded->reseat);
+  order_->setCurrentIndex(plan.order == acquisition::PlanOrder::kSerpentine ? 0 : 1);
+  seed_->setValue(static_cast<int>(std::min<std::uint64_t>(plan.seed, kMaxSeed)));
+  count(orientations_, plan.orientations);
+  count(reseat_, plan.reseat);
+  filling_ = false;
   onChanged();
 }
 
 void PlanPage::create() {
+  if (!pitchProblem(plan()).isEmpty()) return;
   workbench_.createSession(Workbench::freshSessionPath(QStringLiteral("session")), plan(), samples_->value());
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

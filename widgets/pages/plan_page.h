@@ -3,8 +3,9 @@
 #include <QWidget>
 #include <array>
 
-#include "widgets/pages/workbench.h"
-#include "widgets/views/theme.h"
+#include "widgets/style/theme.h"
+#include "widgets/style/units.h"
+#include "widgets/workbench/workbench.h"
 
 class QCheckBox;
 class QComboBox;
@@ -13,7 +14,7 @@ class QLabel;
 class QPushButton;
 class QSpinBox;
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 class RoomView;
 
@@ -23,7 +24,7 @@ class PlanPage : public QWidget {
  public:
   explicit PlanPage(Workbench& workbench, QWidget* parent = nullptr);
   /// The plan as the form shows it.
-  Plan plan() const;
+  acquisition::Plan plan() const;
 
  private:
   QWidget* makeForm();
@@ -31,9 +32,12 @@ class PlanPage : public QWidget {
   void onUnit();
   void onChanged();
   void loadPlanFile();
+  /// Fills the form; a plan beyond the fields' usual ranges widens them rather than being changed.
+  void showPlan(const acquisition::Plan& plan);
+  QString pitchProblem(const acquisition::Plan& now) const;
   void create();
-  void enableFields(const Plan& now);
-  QString summary(const Plan& now, const std::vector<PlannedPlace>& planned) const;
+  void enableFields(const acquisition::Plan& now);
+  QString summary(const acquisition::Plan& now, const std::vector<PlannedPlace>& planned) const;
 
   Workbench& workbench_;
   RoomView* room_;
@@ -48,11 +52,13 @@ class PlanPage : public QWidget {
   QSpinBox* reseat_;
   QSpinBox* samples_;
   QLabel* summary_;
+  QLabel* problem_;
   QDoubleSpinBox* pipe_foot_;
   QPushButton* create_;
   QPushButton* use_grid_;
   LengthUnit shown_unit_;
   std::vector<PlannedPlace> explicit_places_;
+  bool filling_ = false;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -10,9 +10,10 @@
 #include <QSettings>
 #include <QVBoxLayout>
 
-#include "widgets/views/theme.h"
+#include "widgets/style/icons.h"
+#include "widgets/style/theme.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kColumnWidth = 560;
@@ -59,7 +60,7 @@ StartPage::StartPage(Workbench& workbench, QWidget* parent) : QWidget(parent), w
   auto* open = makeChoice(QStringLiteral("startOpen"), QStringLiteral("folder"), tr("Open a session"),
                           tr("Goes on exactly where it was closed."), false);
   connect(demo, &QPushButton::clicked, this, [this] { workbench_.startDemonstration(); });
-  connect(connect_tracker, &QPushButton::clicked, this, [this] { workbench_.goToStep(Step::kConnect); });
+  connect(connect_tracker, &QPushButton::clicked, this, [this] { workbench_.goToPage(QStringLiteral("connect")); });
   connect(open, &QPushButton::clicked, this, &StartPage::openWithDialog);
   for (QPushButton* button : {demo, connect_tracker, open}) layout->addWidget(button);
 
@@ -107,4 +108,4 @@ void StartPage::openWithDialog() {
   if (!path.isEmpty()) workbench_.openSession(path);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

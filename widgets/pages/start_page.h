@@ -2,11 +2,11 @@
 
 #include <QWidget>
 
-#include "widgets/pages/workbench.h"
+#include "widgets/workbench/workbench.h"
 
 class QVBoxLayout;
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 /// The first minute: run the demonstration, connect a tracker, open a session; recent sessions below.
 class StartPage : public QWidget {
@@ -21,4 +21,4 @@ class StartPage : public QWidget {
   QVBoxLayout* recent_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -1,57 +1,39 @@
 #include "widgets/report/gap_section.h"
 
 #include <algorithm>
-#include <map>
 #include <sstream>
 
 #include "calib/core/file_io.h"
+#include "calib/core/number_text.h"
+#include "calib/recording/finding.h"
+#include "widgets/figures/field_scale.h"
+#include "widgets/figures/gap_bars.h"
+#include "widgets/figures/gap_field.h"
 #include "widgets/report/html_writer.h"
 #include "widgets/report/numbers.h"
+#include "widgets/report/picture_section.h"
 #include "widgets/report/report_style.h"
-#include "widgets/views/field_scale.h"
-#include "widgets/views/gap_bars.h"
-#include "widgets/views/gap_bodies.h"
-#include "widgets/views/picture.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
-constexpr QSize kFieldSize(900, 700);
 constexpr int kChartWidth = 560;
 constexpr int kRowHeight = 38;
 constexpr int kNoteLine = 15;
 constexpr std::size_t kNoteLetters = 92;
 
-std::string dataUrl(const QImage& image) { return "data:image/png;base64," + pngBytes(image).toBase64().toStdString(); }
-
-void writeField(HtmlWriter& html, const ErrorField& field, const char* id, const FieldScale& scale) {
-  QString why;
-  const auto draw = [&](bool dark) {
-    return renderFieldPicture(field, scale.max_mm, scale.magnification, kFieldSize, dark, &why);
-  };
-  const QImage light = draw(false);
-  const QImage dark = light.isNull() ? QImage() : draw(true);
-  if (light.isNull() || dark.isNull()) {
-    html.element("p", "Picture could not be drawn: " + why.toStdString() + ".", {{"class", "notice"}});
-    return;
-  }
+CaptionedPicture picture(const char* id, const ErrorField& field, const FieldScale& scale) {
   const std::string caption = field.title.toStdString() + "; colours to " + significantText(scale.max_mm) +
                               " mm, arrows x" + significantText(scale.magnification, 2);
-  html.open("figure", {{"id", id}});
-  html.open("picture");
-  html.emptyElement("source", {{"media", "screen and (prefers-color-scheme: dark)"}, {"srcset", dataUrl(dark)}});
-  html.emptyElement("img", {{"src", dataUrl(light)}, {"alt", caption}});
-  html.close();
-  html.element("figcaption", caption);
-  html.close();
+  return {id, caption, {FieldPicture{field, scale.max_mm, scale.magnification}, kFieldWidth_px, kFieldHeight_px}};
 }
 
 void writeLine(HtmlWriter& html, double x1, double x2, double y1, double y2) {
   html.element("line", "",
-               {{"x1", decimalText(x1, 1)},
-                {"x2", decimalText(x2, 1)},
-                {"y1", decimalText(y1, 1)},
-                {"y2", decimalText(y2, 1)},
+               {{"x1", fixedText(x1, 1)},
+                {"x2", fixedText(x2, 1)},
+                {"y1", fixedText(y1, 1)},
+                {"y2", fixedText(y2, 1)},
                 {"stroke", "currentColor"},
                 {"stroke-width", "1.5"}});
 }
@@ -73,14 +55,14 @@ int rowHeight(const GapBar& bar) { return kRowHeight + kNoteLine * static_cast<i
 
 void writeBar(HtmlWriter& html, const GapBar& bar, double scale, double top) {
   const std::string color = bar.muted ? "var(--muted)" : "var(--text)";
-  html.element("text", bar.name, {{"x", "0"}, {"y", decimalText(top + 14, 1)}, {"fill", color}});
+  html.element("text", bar.name, {{"x", "0"}, {"y", fixedText(top + 14, 1)}, {"fill", color}});
   html.element(
       "text", bar.text,
-      {{"x", std::to_string(kChartWidth)}, {"y", decimalText(top + 14, 1)}, {"fill", color}, {"text-anchor", "end"}});
+      {{"x", std::to_string(kChartWidth)}, {"y", fixedText(top + 14, 1)}, {"fill", color}, {"text-anchor", "end"}});
   html.element("rect", "",
                {{"x", "0"},
-                {"y", decimalText(top + 20, 1)},
-                {"width", decimalText(scale * bar.value, 1)},
+                {"y", fixedText(top + 20, 1)},
+                {"width", fixedText(scale * bar.value, 1)},
                 {"height", "10"},
                 {"fill", bar.muted ? "var(--line)" : "var(--accent)"}});
   if (bar.low90 && bar.high90)
@@ -89,7 +71,7 @@ void writeBar(HtmlWriter& html, const GapBar& bar, double scale, double top) {
   double line_at = top + 43;
   for (const std::string& line : noteLines(bar)) {
     html.element("text", line,
-                 {{"x", "0"}, {"y", decimalText(line_at, 1)}, {"fill", "var(--muted)"}, {"font-size", "11"}});
+                 {{"x", "0"}, {"y", fixedText(line_at, 1)}, {"fill", "var(--muted)"}, {"font-size", "11"}});
     line_at += kNoteLine;
   }
 }
@@ -114,33 +96,29 @@ void writeChart(HtmlWriter& html, const GapBarChart& chart) {
   html.close();
 }
 
-void writeFindings(HtmlWriter& html, const GapReport& report) {
+void writeFindings(HtmlWriter& html, const gap::GapReport& report) {
   if (report.findings.empty()) return;
   html.element("h3", "What the readings themselves showed");
   html.open("ul");
-  for (const GapFinding& finding : report.findings) html.element("li", finding.text);
+  for (const recording::GapFinding& finding : report.findings) html.element("li", finding.text);
   html.close();
 }
 
-void writeFields(HtmlWriter& html, const GapReport& report, bool with_pictures, const CalibrationTable* table) {
-  if (!with_pictures) {
-    html.element("p", "Pictures could not be drawn: they were not asked for.", {{"class", "notice"}});
-    return;
-  }
+void writeFields(HtmlWriter& html, const gap::GapReport& report, const DrawPictures& draw,
+                 const CalibrationTable* table) {
   const ErrorField before = gapField(report, false, table);
   const FieldScale scale = fieldScale(before);
-  html.open("div", {{"class", "pictures"}});
-  writeField(html, before, "gap-before", scale);
-  writeField(html, gapField(report, true, table), "gap-after", scale);
-  html.close();
+  writePictures(
+      html, {picture("gap-before", before, scale), picture("gap-after", gapField(report, true, table), scale)}, draw);
 }
 
-void writeDiagnosis(HtmlWriter& html, const GapReport& report, bool with_pictures, const CalibrationTable* table) {
+void writeDiagnosis(HtmlWriter& html, const gap::GapReport& report, const DrawPictures& draw,
+                    const CalibrationTable* table) {
   html.element("p", report.text, {{"class", "lead"}});
   if (!report.next_measurement.empty()) html.element("p", "Next measurement: " + report.next_measurement);
   const std::string prediction = predictionText(report);
   if (!prediction.empty()) html.element("p", "To be checked: " + prediction);
-  writeFields(html, report, with_pictures, table);
+  writeFields(html, report, draw, table);
   html.open("div", {{"class", "pictures"}});
   for (const GapBarChart& chart : gapCharts(report)) writeChart(html, chart);
   html.close();
@@ -149,43 +127,24 @@ void writeDiagnosis(HtmlWriter& html, const GapReport& report, bool with_picture
 
 }  // namespace
 
-ErrorField gapField(const GapReport& report, bool after, const CalibrationTable* table) {
-  std::map<std::pair<int, int>, Eigen::Vector3d> places_m;
-  if (table)
-    for (const Node& row : table->nodes)
-      places_m.emplace(std::pair(row.node, row.visit), row.reference_from_sensor.position_m);
-  const Pose reference_from_tracker = inverse(report.tracker_from_reference);
-  ErrorField field;
-  field.title = after ? QStringLiteral("Gap with the causes added") : QStringLiteral("Gap as simulated now");
-  field.reference_from_tracker = reference_from_tracker;
-  field.bodies = believedBodies(report);
-  for (const GapNode& node : report.nodes) {
-    FieldArrow arrow;
-    const auto place = places_m.find({node.node, node.visit});
-    arrow.from_m = place != places_m.end() ? place->second : reference_from_tracker * node.place_m;
-    arrow.error_m = reference_from_tracker.orientation * (after ? node.after_m : node.before_m);
-    arrow.node = node.node;
-    arrow.flagged = node.is_flagged;
-    field.arrows.push_back(std::move(arrow));
-  }
-  return field;
-}
-
-void writeGapSection(HtmlWriter& html, const GapReport& report, bool with_pictures, const CalibrationTable* table) {
+void writeGapSection(HtmlWriter& html, const gap::GapReport& report, const DrawPictures& draw,
+                     const CalibrationTable* table) {
   html.element("h2", "Simulation and reality: " + gapHeadline(report));
-  writeDiagnosis(html, report, with_pictures, table);
+  writeDiagnosis(html, report, draw, table);
 }
 
-std::string gapHtml(const GapReport& report, bool with_pictures, const CalibrationTable* table) {
+std::string gapHtml(const gap::GapReport& report, const DrawPictures& draw, const CalibrationTable* table) {
   HtmlWriter html("Simulation and reality", kReportStyle);
+  html.element("h1", "Simulation and reality");
   html.element("p", gapHeadline(report), {{"class", "verdict"}});
-  writeDiagnosis(html, report, with_pictures, table);
+  writeDiagnosis(html, report, draw, table);
   return html.finish().toStdString();
 }
 
-Result<void> writeGapHtml(const GapReport& report, const std::filesystem::path& path, const CalibrationTable* table) {
-  const std::string page = gapHtml(report, true, table);
+Result<void> writeGapHtml(const gap::GapReport& report, const DrawPictures& draw, const std::filesystem::path& path,
+                          const CalibrationTable* table) {
+  const std::string page = gapHtml(report, draw, table);
   return writeFileAtomically(path, [&](std::ostream& out) { out << page; });
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

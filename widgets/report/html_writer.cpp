@@ -1,9 +1,8 @@
 #include "widgets/report/html_writer.h"
 
-#include <QBuffer>
 #include <QString>
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 /// XML 1.0 allows no control characters but tab and line ends, and no U+FFFE and U+FFFF.
@@ -59,12 +58,4 @@ QByteArray HtmlWriter::finish() {
   return page_;
 }
 
-QByteArray pngBytes(const QImage& image) {
-  QByteArray png;
-  QBuffer buffer(&png);
-  buffer.open(QIODevice::WriteOnly);
-  image.save(&buffer, "PNG");
-  return png;
-}
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -1,13 +1,12 @@
 #pragma once
 
 #include <QByteArray>
-#include <QImage>
 #include <QXmlStreamWriter>
 #include <initializer_list>
 #include <string>
 #include <utility>
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 /// Writes one HTML page that is also well-formed XML. Everything given as text is escaped, and characters that XML
 /// cannot hold are replaced.
@@ -35,7 +34,4 @@ class HtmlWriter {
   QXmlStreamWriter xml_;
 };
 
-/// The picture as the content of a PNG file.
-QByteArray pngBytes(const QImage& image);
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -6,29 +6,30 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/session/session_store.h"
+#include "acquisition/plan/place_state.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/learning_curve.h"
-#include "calib/gap/gap_report.h"
+#include "calib/gap/report.h"
+#include "widgets/figures/picture_request.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 /// Everything a report tells. The same input always gives the same page.
 struct ReportInput {
-  CalibrationTable table;                      ///< The rows that were compared.
-  Comparison comparison;                       ///< Of that table.
-  std::vector<LearningCurve> learning_curves;  ///< Of that table; empty = not asked for.
-  std::optional<GapReport> gap;                ///< The diagnosis of that table; none = not asked for.
-  std::string source;                          ///< The file the table came from.
-  std::string plan;                            ///< How the places were planned; empty = not known.
-  std::vector<PlannedPlace> places;            ///< What was planned, in visiting order; empty = the table's places.
-  std::vector<PlaceState> states;              ///< One per planned place.
-  std::string made_at;                         ///< When the report was made, as text.
-  std::uint64_t seed = 1;                      ///< Of folds and bootstrap.
-  std::vector<std::string> notes;              ///< Remarks of whoever read the input.
-  bool with_pictures = true;                   ///< False leaves the pictures out and says so.
+  CalibrationTable table;                                  ///< The rows that were compared.
+  evaluation::Comparison comparison;                       ///< Of that table.
+  std::vector<evaluation::LearningCurve> learning_curves;  ///< Of that table; empty = not asked for.
+  std::optional<gap::GapReport> gap;                       ///< The diagnosis of that table; none = not asked for.
+  std::string source;                                      ///< The file the table came from.
+  std::string plan;                                        ///< How the places were planned; empty = not known.
+  std::vector<PlannedPlace> places;             ///< What was planned, in visiting order; empty = the table's places.
+  std::vector<acquisition::PlaceState> states;  ///< One per planned place.
+  std::string made_at;                          ///< When the report was made, as text.
+  std::uint64_t seed = 1;                       ///< Of folds and bootstrap.
+  std::vector<std::string> notes;               ///< Remarks of whoever read the input.
+  DrawPictures draw;                            ///< None leaves the pictures out and says so.
 };
 
 /// Writes one self-contained HTML page: verdict, error field before and after, method tables, what was measured, places
@@ -39,4 +40,4 @@ Result<void> writeHtmlReport(const ReportInput& input, const std::filesystem::pa
 /// The page itself, UTF-8, well-formed XML.
 std::string htmlReport(const ReportInput& input);
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "calib/core/number_text.h"
+#include "calib/correctors/method_label.h"
 #include "widgets/report/numbers.h"
 #include "widgets/report/report_data.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr std::size_t kMostCurves = 8;
@@ -22,14 +24,14 @@ constexpr double kLineHeight = 17.0;
 constexpr std::array<const char*, kMostCurves> kColors = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                           "#e69f00", "#56b4e9", "#8a6d3b", "#7f7f7f"};
 
-std::string px(double value) { return decimalText(value, 1); }
+std::string px(double value) { return fixedText(value, 1); }
 
 /// Places to the right, error upwards by its logarithm.
 class Axes {
  public:
-  explicit Axes(const std::vector<const LearningCurve*>& curves) {
-    for (const LearningCurve* curve : curves)
-      for (const LearningPoint& point : curve->points) {
+  explicit Axes(const std::vector<const evaluation::LearningCurve*>& curves) {
+    for (const evaluation::LearningCurve* curve : curves)
+      for (const evaluation::LearningPoint& point : curve->points) {
         most_places_ = std::max(most_places_, static_cast<double>(point.n_places));
         low_mm_ = std::min(low_mm_, std::max(point.rms, 1e-3));
         high_mm_ = std::max(high_mm_, point.rms);
@@ -74,7 +76,7 @@ void line(HtmlWriter& html, double x1, double y1, double x2, double y2, const ch
                 {"stroke-opacity", opacity}});
 }
 
-void drawAxes(HtmlWriter& html, const Axes& axes, const LearningCurve& longest) {
+void drawAxes(HtmlWriter& html, const Axes& axes, const evaluation::LearningCurve& longest) {
   const double right = kWidth - kRight;
   const double bottom = kHeight - kBottom;
   line(html, kLeft, bottom, right, bottom, "0.7");
@@ -82,7 +84,7 @@ void drawAxes(HtmlWriter& html, const Axes& axes, const LearningCurve& longest) 
     line(html, kLeft, axes.y(tick_mm), right, axes.y(tick_mm), "0.15");
     text(html, kLeft - 6.0, axes.y(tick_mm) + 4.0, "end", significantText(tick_mm, 1));
   }
-  for (const LearningPoint& point : longest.points)
+  for (const evaluation::LearningPoint& point : longest.points)
     text(html, axes.x(point.n_places), bottom + 18.0, "middle", std::to_string(point.n_places));
   text(html, 0.5 * (kLeft + right), kHeight - 8.0, "middle", "places fitted to");
   html.element("text", "held-out RMS (mm)",
@@ -94,11 +96,11 @@ void drawAxes(HtmlWriter& html, const Axes& axes, const LearningCurve& longest) 
                 {"fill", "currentColor"}});
 }
 
-void drawCurve(HtmlWriter& html, const Axes& axes, const LearningCurve& curve, const char* color) {
+void drawCurve(HtmlWriter& html, const Axes& axes, const evaluation::LearningCurve& curve, const char* color) {
   std::string upper;
   std::string lower;
   std::string middle;
-  for (const LearningPoint& point : curve.points) {
+  for (const evaluation::LearningPoint& point : curve.points) {
     const std::string x = px(axes.x(point.n_places));
     upper += x + "," + px(axes.y(point.high)) + " ";
     lower = x + "," + px(axes.y(point.low)) + " " + lower;
@@ -109,24 +111,25 @@ void drawCurve(HtmlWriter& html, const Axes& axes, const LearningCurve& curve, c
 }
 
 /// Names at the ends of their curves, moved apart where they would touch.
-void drawNames(HtmlWriter& html, const Axes& axes, const std::vector<const LearningCurve*>& curves) {
+void drawNames(HtmlWriter& html, const Axes& axes, const std::vector<const evaluation::LearningCurve*>& curves) {
   double lowest = kTop;
   for (std::size_t i = curves.size(); i-- > 0;) {
-    const LearningPoint& end = curves[i]->points.back();
+    const evaluation::LearningPoint& end = curves[i]->points.back();
     const double y = std::max(axes.y(end.rms) + 4.0, lowest);
     lowest = y + kLineHeight;
-    text(html, kWidth - kRight + 10.0, y, "start", curves[i]->method + " " + errorFigure(end.rms), kColors[i]);
+    text(html, kWidth - kRight + 10.0, y, "start",
+         correctors::positionLabel(curves[i]->method, curves[i]->settings) + " " + errorFigure(end.rms), kColors[i]);
   }
 }
 
 }  // namespace
 
-void writeLearningCurves(HtmlWriter& html, const std::vector<LearningCurve>& curves) {
-  std::vector<const LearningCurve*> drawn;
-  for (const LearningCurve& curve : curves)
+void writeLearningCurves(HtmlWriter& html, const std::vector<evaluation::LearningCurve>& curves) {
+  std::vector<const evaluation::LearningCurve*> drawn;
+  for (const evaluation::LearningCurve& curve : curves)
     if (!curve.points.empty()) drawn.push_back(&curve);
   if (drawn.empty()) return;
-  const auto least_first = [](const LearningCurve* a, const LearningCurve* b) {
+  const auto least_first = [](const evaluation::LearningCurve* a, const evaluation::LearningCurve* b) {
     return a->points.back().rms < b->points.back().rms;
   };
   std::stable_sort(drawn.begin(), drawn.end(), least_first);
@@ -139,7 +142,7 @@ void writeLearningCurves(HtmlWriter& html, const std::vector<LearningCurve>& cur
                     {"width", "100%"},
                     {"role", "img"},
                     {"aria-label", "Held-out error against the number of places fitted to"}});
-  const auto most_points = [](const LearningCurve* a, const LearningCurve* b) {
+  const auto most_points = [](const evaluation::LearningCurve* a, const evaluation::LearningCurve* b) {
     return a->points.size() < b->points.size();
   };
   drawAxes(html, axes, **std::max_element(drawn.begin(), drawn.end(), most_points));
@@ -155,4 +158,4 @@ void writeLearningCurves(HtmlWriter& html, const std::vector<LearningCurve>& cur
   html.close();
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -7,11 +7,13 @@
 #include <set>
 
 #include "calib/core/file_io.h"
+#include "calib/core/number_text.h"
 #include "calib/core/statistics.h"
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "widgets/report/numbers.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr double kMmPerM = 1000.0;
@@ -60,11 +62,11 @@ PlaceSummary summarise(int node, const std::vector<const Node*>& rows) {
 
 }  // namespace
 
-const MethodScore* bestPosition(const Comparison& comparison) {
+const evaluation::MethodScore* bestPosition(const evaluation::Comparison& comparison) {
   return comparison.best_position_row ? &comparison.position.at(*comparison.best_position_row) : nullptr;
 }
 
-const MethodScore* bestOrientation(const Comparison& comparison) {
+const evaluation::MethodScore* bestOrientation(const evaluation::Comparison& comparison) {
   return comparison.best_orientation_row ? &comparison.orientation.at(*comparison.best_orientation_row) : nullptr;
 }
 
@@ -73,8 +75,8 @@ std::vector<PlaceSummary> placeSummaries(const ReportInput& input) {
   for (const Node& node : input.table.nodes) {
     if (node.role != NodeRole::kSkipped) rows_of[node.node].push_back(&node);
   }
-  const Comparison& comparison = input.comparison;
-  const MethodScore* best = bestPosition(comparison);
+  const evaluation::Comparison& comparison = input.comparison;
+  const evaluation::MethodScore* best = bestPosition(comparison);
   std::vector<PlaceSummary> places;
   places.reserve(comparison.places.size());
   for (std::size_t i = 0; i < comparison.places.size(); ++i) {
@@ -133,18 +135,29 @@ std::string settingsText(const Settings& settings) {
   return text;
 }
 
-std::string givenSettingsText(const Settings& settings, std::span<const Setting> declared) {
-  Settings given;
-  for (const auto& [key, value] : settings) {
-    const auto is_default = [&key = key, &value = value](const Setting& setting) {
-      return setting.key == key && setting.default_value == value;
-    };
-    if (std::none_of(declared.begin(), declared.end(), is_default)) given.emplace(key, value);
-  }
-  return settingsText(given);
+std::string cautionText(const evaluation::Comparison& comparison) {
+  const evaluation::MethodScore* best = bestPosition(comparison);
+  if (!comparison.verdict.apply_position || best == nullptr) return {};
+  std::string text;
+  if (comparison.fold_back && comparison.fold_back->n_folded > 0) text = "the field folds back";
+  if (best->stats.max >= comparison.before_position_mm.max)
+    text += (text.empty() ? "" : " and ") + std::string("the worst place is no better");
+  if (comparison.validated_share < 0.5)
+    text += (text.empty() ? "" : " and ") + std::string("the places that judge it span a part of the region");
+  return text;
 }
 
-std::string toBestText(const MethodScore& score, bool is_best) {
+std::string notComparedText(const evaluation::Comparison& comparison) {
+  std::string names;
+  for (const correctors::PositionMethod& method : correctors::positionMethods()) {
+    const auto is_method = [&](const evaluation::MethodScore& score) { return score.method == method.id; };
+    if (std::any_of(comparison.position.begin(), comparison.position.end(), is_method)) continue;
+    names += (names.empty() ? "" : ", ") + std::string(method.label);
+  }
+  return names;
+}
+
+std::string toBestText(const evaluation::MethodScore& score, bool is_best) {
   if (is_best) return "best";
   const auto figure = [](double value) { return value < 0.0 ? "-" + errorFigure(-value) : errorFigure(value); };
   const bool as_good = score.rms_to_best_low90 <= 0.0;
@@ -152,9 +165,9 @@ std::string toBestText(const MethodScore& score, bool is_best) {
          " to " + figure(score.rms_to_best_high90) + ")" + (as_good ? ", as good" : "");
 }
 
-std::string truenessText(const Comparison& comparison) {
+std::string truenessText(const evaluation::Comparison& comparison) {
   std::string text;
-  const Trueness& trueness = comparison.trueness;
+  const evaluation::Trueness& trueness = comparison.trueness;
   if (comparison.floor_position_mm > 0.0)
     text = errorFigure(trueness.before_position_mm) + " mm before and " + errorFigure(trueness.after_position_mm) +
            " mm after the best position method";
@@ -164,9 +177,9 @@ std::string truenessText(const Comparison& comparison) {
   return text.empty() ? text : "Systematic error apart from the noise floor: " + text + ".";
 }
 
-std::string resamplingText(const Comparison& comparison) {
+std::string resamplingText(const evaluation::Comparison& comparison) {
   std::string text;
-  for (const ResamplingError& error : comparison.resampling) {
+  for (const evaluation::ResamplingError& error : comparison.resampling) {
     text += (text.empty() ? "" : ", ") + error.method + " ";
     if (error.n_scored > 0)
       text += errorFigure(error.rms_mm) + " mm (" + errorFigure(error.excess_mm) + " above the noise floor, " +
@@ -177,7 +190,7 @@ std::string resamplingText(const Comparison& comparison) {
   return text.empty() ? text : "Error that resampling adds by itself, each place left out in turn: " + text + ".";
 }
 
-std::string floorText(const Comparison& comparison) {
+std::string floorText(const evaluation::Comparison& comparison) {
   std::string text;
   if (comparison.floor_position_mm > 0.0) text = significantText(comparison.floor_position_mm) + " mm";
   if (comparison.floor_orientation_deg > 0.0) {
@@ -187,14 +200,4 @@ std::string floorText(const Comparison& comparison) {
   return text + " (from " + comparison.floor_from + ")";
 }
 
-std::string positionLabel(const std::string& id) {
-  const auto row = findPositionMethod(id);
-  return row ? (*row)->label : id;
-}
-
-std::string orientationLabel(const std::string& id) {
-  const auto row = findOrientationMethod(id);
-  return row ? (*row)->label : id;
-}
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -11,7 +10,7 @@
 #include "widgets/report/report.h"
 
 /// What the parts of a report share: numbers gathered from the table and the comparison, no markup.
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 /// One scored place of a comparison.
 struct PlaceSummary {
@@ -44,8 +43,8 @@ struct MeasurementSummary {
 };
 
 /// The score of the best position method; none when nothing was better than the input.
-const MethodScore* bestPosition(const Comparison& comparison);
-const MethodScore* bestOrientation(const Comparison& comparison);
+const evaluation::MethodScore* bestPosition(const evaluation::Comparison& comparison);
+const evaluation::MethodScore* bestOrientation(const evaluation::Comparison& comparison);
 
 /// The scored places in the comparison's order.
 std::vector<PlaceSummary> placeSummaries(const ReportInput& input);
@@ -54,25 +53,24 @@ MeasurementSummary measurementSummary(const CalibrationTable& table);
 /// "degree=3, lambda=auto"; empty without settings.
 std::string settingsText(const Settings& settings);
 
-/// What is not at its default: "degree=4"; empty when all are.
-/// @param declared settings of the method
-std::string givenSettingsText(const Settings& settings, std::span<const Setting> declared);
+/// What a person should know before applying what the verdict recommends: "the field folds back", "the worst place is
+/// no better"; empty when there is nothing.
+std::string cautionText(const evaluation::Comparison& comparison);
+
+/// The position methods that were not tried, by name; empty when all were.
+std::string notComparedText(const evaluation::Comparison& comparison);
 
 /// Distance of a method's RMS to the best one's: "best", "+0.42 (0.31 to 0.55)", and ", as good" where the 90 %
 /// interval holds zero.
-std::string toBestText(const MethodScore& score, bool is_best);
+std::string toBestText(const evaluation::MethodScore& score, bool is_best);
 
 /// What the floor leaves of the error before and after the best method, as a sentence; empty where no floor is known.
-std::string truenessText(const Comparison& comparison);
+std::string truenessText(const evaluation::Comparison& comparison);
 
 /// What each way to bring the measured errors to a grid costs by itself, as a sentence; empty where none was tried.
-std::string resamplingText(const Comparison& comparison);
+std::string resamplingText(const evaluation::Comparison& comparison);
 
 /// "0.31 mm, 0.02 deg (from samples and jig tolerance)", or that it is not known.
-std::string floorText(const Comparison& comparison);
+std::string floorText(const evaluation::Comparison& comparison);
 
-/// The label of a method as menus show it; the id itself when no registry has it.
-std::string positionLabel(const std::string& id);
-std::string orientationLabel(const std::string& id);
-
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

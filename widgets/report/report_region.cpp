@@ -2,17 +2,17 @@
 
 #include <algorithm>
 
+#include "calib/core/number_text.h"
 #include "widgets/report/numbers.h"
 #include "widgets/report/report_data.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr std::size_t kMostListed = 20;
 
 std::string pointText(const Eigen::Vector3d& point_m) {
-  return "(" + decimalText(point_m.x(), 3) + ", " + decimalText(point_m.y(), 3) + ", " + decimalText(point_m.z(), 3) +
-         ") m";
+  return "(" + fixedText(point_m.x(), 3) + ", " + fixedText(point_m.y(), 3) + ", " + fixedText(point_m.z(), 3) + ") m";
 }
 
 /// A list of lines, the first twenty, with how many there are besides.
@@ -24,40 +24,39 @@ void writeList(HtmlWriter& html, const std::vector<std::string>& lines) {
   html.close();
 }
 
-void writeCoverage(HtmlWriter& html, const Coverage& coverage) {
+void writeCoverage(HtmlWriter& html, const evaluation::Coverage& coverage) {
   html.element("h3", "Coverage");
   html.element("p", coverage.text, {{"id", "coverage"}});
   std::vector<std::string> holes;
-  for (const Hole& hole : coverage.holes)
-    holes.push_back("hole around " + pointText(hole.center_m) + ", " + decimalText(hole.radius_m, 3) +
+  for (const evaluation::Hole& hole : coverage.holes)
+    holes.push_back("hole around " + pointText(hole.center_m) + ", " + fixedText(hole.radius_m, 3) +
                     " m from the nearest place");
   writeList(html, holes);
 }
 
-std::string cellText(const FoldBackCell& cell) {
-  std::string nodes;
-  for (const int node : cell.nodes) nodes += (nodes.empty() ? "" : ", ") + std::to_string(node);
-  return (nodes.empty() ? "point around " : "cell between places " + nodes + " around ") + pointText(cell.center_m) +
-         ", determinant " + significantText(cell.determinant) + ", condition " + significantText(cell.condition);
+std::string cellText(const evaluation::FoldBackCell& cell, const PlaceNames& names) {
+  return (cell.nodes.empty() ? "point around " : "cell between " + names.list(cell.nodes, 8) + " around ") +
+         pointText(cell.center_m) + ", determinant " + significantText(cell.determinant) + ", condition " +
+         significantText(cell.condition);
 }
 
-void writeFoldBack(HtmlWriter& html, const FoldBack& fold_back) {
+void writeFoldBack(HtmlWriter& html, const evaluation::FoldBack& fold_back, const PlaceNames& names) {
   html.element("h3", "Fold-back");
   html.element("p", fold_back.text, {{"id", "fold-back"}});
   std::vector<std::string> folded;
-  for (const FoldBackCell& cell : fold_back.cells)
-    if (!cell.one_to_one) folded.push_back(cellText(cell));
+  for (const evaluation::FoldBackCell& cell : fold_back.cells)
+    if (!cell.one_to_one) folded.push_back(cellText(cell, names));
   writeList(html, folded);
 }
 
 }  // namespace
 
-void writeRegion(HtmlWriter& html, const Comparison& comparison) {
+void writeRegion(HtmlWriter& html, const evaluation::Comparison& comparison) {
   const std::string resampling = resamplingText(comparison);
   if (!comparison.coverage && !comparison.fold_back && !comparison.orientation_dependence && resampling.empty()) return;
   html.element("h2", "Region and field");
   if (comparison.coverage) writeCoverage(html, *comparison.coverage);
-  if (comparison.fold_back) writeFoldBack(html, *comparison.fold_back);
+  if (comparison.fold_back) writeFoldBack(html, *comparison.fold_back, comparison.names);
   if (comparison.orientation_dependence) {
     html.element("h3", "Dependence on orientation");
     html.element("p", comparison.orientation_dependence->text, {{"id", "orientation-dependence"}});
@@ -68,4 +67,4 @@ void writeRegion(HtmlWriter& html, const Comparison& comparison) {
   }
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

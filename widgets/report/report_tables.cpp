@@ -4,9 +4,12 @@
 #include <functional>
 #include <span>
 
+#include "calib/core/number_text.h"
+#include "calib/correctors/method_label.h"
+#include "calib/evaluation/error_stats.h"
 #include "widgets/report/numbers.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
 constexpr std::size_t kWorstPlaces = 10;
@@ -20,12 +23,14 @@ void writeHead(HtmlWriter& html, std::initializer_list<const char*> columns) {
 }
 
 void number(HtmlWriter& html, const std::string& text) { html.element("td", text, {{"class", "number"}}); }
+/// Several numbers, which may stand in lines below each other where there is little room.
+void range(HtmlWriter& html, const std::string& text) { html.element("td", text, {{"class", "range"}}); }
 
-void writeStats(HtmlWriter& html, const ErrorStats& stats) {
+void writeStats(HtmlWriter& html, const evaluation::ErrorStats& stats) {
   number(html, errorFigure(stats.mean));
   number(html, errorFigure(stats.median));
   number(html, errorFigure(stats.rms));
-  number(html, errorFigure(stats.rms_low90) + " to " + errorFigure(stats.rms_high90));
+  range(html, errorFigure(stats.rms_low90) + " to " + errorFigure(stats.rms_high90));
   number(html, errorFigure(stats.p95));
   number(html, errorFigure(stats.max));
 }
@@ -33,35 +38,34 @@ void writeStats(HtmlWriter& html, const ErrorStats& stats) {
 /// The scores of one kind of method as a table.
 struct ScoreTable {
   const char* unit;
-  const std::vector<MethodScore>& scores;
-  const ErrorStats& before;
-  const MethodScore* best;  ///< None when nothing beats the input.
-  std::string (*label)(const std::string& id);
+  const std::vector<evaluation::MethodScore>& scores;
+  const evaluation::ErrorStats& before;
+  const evaluation::MethodScore* best;  ///< None when nothing beats the input.
+  std::string (*label)(const std::string& id, const Settings& settings);
   bool with_common_places;  ///< Whether the RMS over the places that all methods cover is a column.
 
   int columns() const { return with_common_places ? 13 : 12; }
 };
 
-void writeName(HtmlWriter& html, const std::string& label, const std::string& settings, const std::string& mark) {
+void writeName(HtmlWriter& html, const std::string& label, const std::string& mark) {
   html.open("th", {{"scope", "row"}});
   html.text(label);
-  if (!settings.empty()) html.element("small", settings);
   if (!mark.empty()) html.element("span", mark, {{"class", "mark"}});
   html.close();
 }
 
 void writeBefore(HtmlWriter& html, const ScoreTable& table) {
   html.open("tr", {{"class", "before"}});
-  writeName(html, "Before", {}, {});
+  writeName(html, "Before", {});
   writeStats(html, table.before);
   for (int i = 7; i < table.columns(); ++i) number(html, {});
   html.close();
 }
 
-void writeScore(HtmlWriter& html, const ScoreTable& table, const MethodScore& score) {
+void writeScore(HtmlWriter& html, const ScoreTable& table, const evaluation::MethodScore& score) {
   if (score.skipped) {
     html.open("tr", {{"class", "skipped"}});
-    writeName(html, table.label(score.method), settingsText(score.settings), {});
+    writeName(html, table.label(score.method, score.settings), {});
     html.element("td", "not used: " + *score.skipped, {{"colspan", std::to_string(table.columns() - 1)}});
     html.close();
     return;
@@ -69,12 +73,9 @@ void writeScore(HtmlWriter& html, const ScoreTable& table, const MethodScore& sc
   const bool best = &score == table.best;
   const bool worse = score.stats.rms > table.before.rms;
   html.open("tr", {{"class", best ? "best" : worse ? "worse" : "plain"}});
-  writeName(html, table.label(score.method), settingsText(score.settings),
-            best    ? "best"
-            : worse ? "worse than before"
-                    : "");
+  writeName(html, table.label(score.method, score.settings), best ? "best" : worse ? "worse than before" : "");
   writeStats(html, score.stats);
-  number(html, toBestText(score, best));
+  range(html, toBestText(score, best));
   number(html, std::to_string(score.n_uncovered));
   if (table.with_common_places) number(html, errorFigure(score.rms_common_mm));
   number(html, errorFigure(score.in_sample_rms));
@@ -89,16 +90,15 @@ void writeScoreTable(HtmlWriter& html, const ScoreTable& table) {
   html.element("caption",
                std::string("Held-out errors in ") + table.unit + ": on places the fits did not see, unless stated");
   if (table.with_common_places) {
-    writeHead(html, {"Method", "Mean", "Median", "RMS", "90 % interval of the RMS", "95th percentile", "Largest",
-                     "To the best (90 %)", "Places not covered", "RMS where all cover", "RMS on its own places",
-                     "One fit", "One evaluation"});
+    writeHead(html, {"Method", "Mean", "Median", "RMS", "90 % interval of the RMS", "95 %", "Max", "To the best (90 %)",
+                     "Places left out", "RMS where all cover", "RMS on its own places", "One fit", "One correction"});
   } else {
-    writeHead(html, {"Method", "Mean", "Median", "RMS", "90 % interval of the RMS", "95th percentile", "Largest",
-                     "To the best (90 %)", "Places not covered", "RMS on its own places", "One fit", "One evaluation"});
+    writeHead(html, {"Method", "Mean", "Median", "RMS", "90 % interval of the RMS", "95 %", "Max", "To the best (90 %)",
+                     "Places left out", "RMS on its own places", "One fit", "One correction"});
   }
   html.open("tbody");
   writeBefore(html, table);
-  for (const MethodScore& score : table.scores) writeScore(html, table, score);
+  for (const evaluation::MethodScore& score : table.scores) writeScore(html, table, score);
   html.close();
   html.close();
   html.close();
@@ -112,9 +112,9 @@ void writePlaces(HtmlWriter& html, std::span<const PlaceSummary> places) {
   html.open("tbody");
   for (const PlaceSummary& place : places) {
     html.open("tr");
-    writeName(html, place.name, {}, place.validation ? "validation" : "");
+    writeName(html, place.name, place.validation ? "validation" : "");
     number(html, std::to_string(place.node));
-    for (int axis = 0; axis < 3; ++axis) number(html, decimalText(place.p_true_m[axis], 3));
+    for (int axis = 0; axis < 3; ++axis) number(html, fixedText(place.p_true_m[axis], 3));
     number(html, errorFigure(place.before_mm));
     number(html, errorFigure(place.after_mm));
     number(html, place.sd_mm ? errorFigure(*place.sd_mm) : "not known");
@@ -129,15 +129,15 @@ void writePlaces(HtmlWriter& html, std::span<const PlaceSummary> places) {
 
 }  // namespace
 
-void writePositionTable(HtmlWriter& html, const Comparison& comparison) {
-  writeScoreTable(
-      html, {"mm", comparison.position, comparison.before_position_mm, bestPosition(comparison), positionLabel, true});
+void writePositionTable(HtmlWriter& html, const evaluation::Comparison& comparison) {
+  writeScoreTable(html, {"mm", comparison.position, comparison.before_position_mm, bestPosition(comparison),
+                         correctors::positionLabel, true});
 }
 
-void writeOrientationTable(HtmlWriter& html, const Comparison& comparison) {
+void writeOrientationTable(HtmlWriter& html, const evaluation::Comparison& comparison) {
   if (!comparison.before_orientation_deg) return;
   writeScoreTable(html, {"degrees", comparison.orientation, *comparison.before_orientation_deg,
-                         bestOrientation(comparison), orientationLabel, false});
+                         bestOrientation(comparison), correctors::orientationLabel, false});
 }
 
 void writePlaceTables(HtmlWriter& html, std::vector<PlaceSummary> places) {
@@ -159,4 +159,4 @@ void FactList::add(const std::string& name, const std::string& value) {
   html_.element("dd", value);
 }
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -5,12 +5,12 @@
 #include "widgets/report/html_writer.h"
 #include "widgets/report/report_data.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 
 /// Scores of the position methods, "before" first, the best in bold, those worse than before marked.
-void writePositionTable(HtmlWriter& html, const Comparison& comparison);
+void writePositionTable(HtmlWriter& html, const evaluation::Comparison& comparison);
 /// The same for orientation; nothing when the table has none.
-void writeOrientationTable(HtmlWriter& html, const Comparison& comparison);
+void writeOrientationTable(HtmlWriter& html, const evaluation::Comparison& comparison);
 /// One row a place: the ten worst at once, the rest folded away.
 void writePlaceTables(HtmlWriter& html, std::vector<PlaceSummary> places);
 
@@ -27,4 +27,4 @@ class FactList {
   HtmlWriter& html_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets

@@ -11,18 +11,19 @@ namespace fieldtrue::testing {
 /// Listens to a device and keeps what it said.
 class DeviceProbe : public QObject {
  public:
-  explicit DeviceProbe(TrackerDevice& device) {
-    connect(&device, &TrackerDevice::stateChanged, this, [this](DeviceState now, const QString& text) {
-      state = now;
-      last_text = text;
-      texts << text;
-      if (now == DeviceState::kFailed) ++failures;
-    });
-    connect(&device, &TrackerDevice::samplesReceived, this, [this](const std::vector<Sample>& more) {
+  explicit DeviceProbe(acquisition::TrackerDevice& device) {
+    connect(&device, &acquisition::TrackerDevice::stateChanged, this,
+            [this](acquisition::DeviceState now, const QString& text) {
+              state = now;
+              last_text = text;
+              texts << text;
+              if (now == acquisition::DeviceState::kFailed) ++failures;
+            });
+    connect(&device, &acquisition::TrackerDevice::samplesReceived, this, [this](const std::vector<Sample>& more) {
       samples.insert(samples.end(), more.begin(), more.end());
       ++batches;
     });
-    connect(&device, &TrackerDevice::bytesSeen, this,
+    connect(&device, &acquisition::TrackerDevice::bytesSeen, this,
             [this](bool sent, const QByteArray& bytes) { (sent ? bytes_sent : bytes_received) += bytes; });
   }
 
@@ -34,7 +35,7 @@ class DeviceProbe : public QObject {
     return result;
   }
 
-  DeviceState state = DeviceState::kClosed;
+  acquisition::DeviceState state = acquisition::DeviceState::kClosed;
   QString last_text;
   QStringList texts;
   int failures = 0;

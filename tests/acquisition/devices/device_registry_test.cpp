@@ -8,13 +8,15 @@
 #include "calib/core/statistics.h"
 #include "tests/acquisition/devices/device_probe.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 namespace {
 
-std::unique_ptr<TrackerDevice> deviceOf(const std::string& text, const Scene& scene = {}) {
+std::unique_ptr<TrackerDevice> deviceOf(const std::string& text, const simulation::Scene& scene = {}) {
   auto device = makeDevice(text, scene);
   FT_CHECK(device.has_value());
   return std::move(*device);
@@ -32,7 +34,6 @@ class DeviceRegistryTest : public QObject {
   void goodTexts();
   void badTexts_data();
   void badTexts();
-  void listsLines();
   void simulatedStandsWhereItIsSent();
   void simulatedKeepsItsOwnTime();
   void simulatedStartsAgain();
@@ -119,12 +120,8 @@ void DeviceRegistryTest::badTexts() {
   FT_VERIFY_MATCH(holdsAll(device.error().message, fragments));
 }
 
-void DeviceRegistryTest::listsLines() {
-  for (const auto& line : serialLines()) QVERIFY(!line.path.empty());
-}
-
 void DeviceRegistryTest::simulatedStandsWhereItIsSent() {
-  Scene scene;
+  simulation::Scene scene;
   scene.reference_from_tracker = {{0.1, 0.2, 0.3}, rotationFromEuler(Eigen::Vector3d(0.3, 0.0, 0.0))};
   auto device = deviceOf("simulated:speed=20,travel_s=0.5,seed=3", scene);
   DeviceProbe probe(*device);
@@ -175,7 +172,7 @@ void DeviceRegistryTest::simulatedStartsAgain() {
 }
 
 void DeviceRegistryTest::simulatedWorksInAnotherThread() {
-  qRegisterMetaType<DeviceState>("fieldtrue::DeviceState");
+  qRegisterMetaType<DeviceState>("fieldtrue::acquisition::DeviceState");
   auto device = deviceOf("simulated:speed=10");
   std::atomic<int> samples{0};
   connect(device.get(), &TrackerDevice::samplesReceived, device.get(),
@@ -191,5 +188,5 @@ void DeviceRegistryTest::simulatedWorksInAnotherThread() {
   QVERIFY(thread.wait(5000));
 }
 
-QTEST_GUILESS_MAIN(DeviceRegistryTest)
+FIELDTRUE_TEST(DeviceRegistryTest)
 #include "device_registry_test.moc"

@@ -5,11 +5,14 @@
 #include <algorithm>
 
 #include "acquisition/emulators/fastrak_emulator.h"
+#include "acquisition/emulators/pty_endpoint.h"
 #include "calib/core/statistics.h"
 #include "tests/acquisition/devices/device_probe.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -383,5 +386,5 @@ void FastrakDeviceTest::startsAgainAfterFailure() {
   QTRY_COMPARE_WITH_TIMEOUT(bench.probe->state, DeviceState::kRunning, 10000);
 }
 
-QTEST_GUILESS_MAIN(FastrakDeviceTest)
+FIELDTRUE_TEST(FastrakDeviceTest)
 #include "fastrak_device_test.moc"

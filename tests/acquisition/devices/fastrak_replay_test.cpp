@@ -8,8 +8,10 @@
 #include "tests/acquisition/devices/device_probe.h"
 #include "tests/support/matchers.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -63,7 +65,7 @@ void FastrakReplayTest::everyRecordOfARealHandArrives() {
   QCOMPARE(recorded.rows.size(), std::size_t{290});
 
   QTemporaryDir folder;
-  FastrakEmulation emulation;
+  Emulation emulation;
   emulation.replay = recorded;
   if (tcp) {
     emulation.tcp_port = 0;
@@ -100,7 +102,7 @@ void FastrakReplayTest::everyRecordOfARealHandArrives() {
 }
 
 void FastrakReplayTest::refusesWhatCannotBeReplayed() {
-  FastrakEmulation emulation;
+  Emulation emulation;
   FT_VERIFY_MATCH(holdsAll(makeFastrakEmulator(emulation).error().message, {"--pty", "--listen"}));
   emulation.tcp_port = 0;
   emulation.replay = SampleTable{};
@@ -109,5 +111,5 @@ void FastrakReplayTest::refusesWhatCannotBeReplayed() {
   FT_VERIFY_MATCH(holdsAll(makeFastrakEmulator(emulation).error().message, {"sensor 7"}));
 }
 
-QTEST_GUILESS_MAIN(FastrakReplayTest)
+FIELDTRUE_TEST(FastrakReplayTest)
 #include "fastrak_replay_test.moc"

@@ -4,8 +4,10 @@
 #include <random>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 class SampleClockTest : public QObject {
@@ -106,5 +108,5 @@ void SampleClockTest::doesNotMistakeMotionForAFlip() {
   QCOMPARE(later.status, std::string());
 }
 
-QTEST_GUILESS_MAIN(SampleClockTest)
+FIELDTRUE_TEST(SampleClockTest)
 #include "sample_clock_test.moc"

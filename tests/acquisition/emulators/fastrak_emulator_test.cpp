@@ -3,8 +3,10 @@
 
 #include "acquisition/emulators/fastrak_emulator_core.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -377,5 +379,5 @@ void FastrakEmulatorTest::badFaultLists() {
   FT_VERIFY_MATCH(holdsAll(faults.error().message, {fragment}));
 }
 
-QTEST_GUILESS_MAIN(FastrakEmulatorTest)
+FIELDTRUE_TEST(FastrakEmulatorTest)
 #include "fastrak_emulator_test.moc"

@@ -2,8 +2,10 @@
 
 #include "acquisition/emulators/simulated_jig.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -14,7 +16,7 @@ const Pose kPlace{{0.6, 0.3, -0.1}, rotationFromEuler(Eigen::Vector3d(0.4, 0.1, 
 VirtualOperator exact(double travel_s) {
   OperatorHabits habits;
   habits.travel_s = travel_s;
-  return VirtualOperator(RigModel{}, habits, kRest, 1);
+  return VirtualOperator(simulation::RigModel{}, habits, kRest, 1);
 }
 
 }  // namespace
@@ -78,7 +80,7 @@ void VirtualOperatorTest::neverJumps() {
 void VirtualOperatorTest::placesWithTheRigsTolerance() {
   OperatorHabits habits;
   habits.travel_s = 0.0;
-  RigModel rig;
+  simulation::RigModel rig;
   rig.tolerance_m = 0.002;
   rig.tolerance_rad = 0.01;
   VirtualOperator person(rig, habits, kRest, 5);
@@ -110,7 +112,7 @@ void VirtualOperatorTest::repeatedCallsOnTheWayChangeNothing() {
 }
 
 void VirtualOperatorTest::setsDownAnewOnTheSamePlace() {
-  RigModel rig;
+  simulation::RigModel rig;
   rig.tolerance_m = 0.001;
   VirtualOperator person(rig, OperatorHabits{}, kRest, 2);
   person.guideTo(kPlace, 0.0);
@@ -129,5 +131,5 @@ void VirtualOperatorTest::travelsAtOnceWhenAsked() {
   FT_VERIFY_MATCH(near(person.poseAt(5.0), kPlace, 1e-12, 1e-9));
 }
 
-QTEST_GUILESS_MAIN(VirtualOperatorTest)
+FIELDTRUE_TEST(VirtualOperatorTest)
 #include "virtual_operator_test.moc"

@@ -3,7 +3,10 @@
 #include <QTest>
 #include <set>
 
+#include "tests/support/test_main.h"
+
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 
 Q_DECLARE_METATYPE(FastrakCommand)
 
@@ -159,5 +162,5 @@ void FastrakCommandsTest::longLinesAreCut() {
   QCOMPARE(commands[0].text.size() + 1, std::size_t{256});
 }
 
-QTEST_GUILESS_MAIN(FastrakCommandsTest)
+FIELDTRUE_TEST(FastrakCommandsTest)
 #include "fastrak_commands_test.moc"

@@ -4,8 +4,10 @@
 #include "acquisition/protocols/fastrak.h"
 #include "tests/acquisition/protocols/fastrak_bytes.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -205,5 +207,5 @@ void FastrakParserTest::refusesNoStation() {
   FT_VERIFY_MATCH(holdsAll(FastrakParser::make({}).error().message, {"station"}));
 }
 
-QTEST_GUILESS_MAIN(FastrakParserTest)
+FIELDTRUE_TEST(FastrakParserTest)
 #include "fastrak_parser_test.moc"

@@ -6,8 +6,10 @@
 #include "acquisition/protocols/fastrak.h"
 #include "tests/acquisition/protocols/fastrak_bytes.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 Q_DECLARE_METATYPE(std::vector<int>)
@@ -353,5 +355,5 @@ void FastrakRecordsTest::readsBack() {
   QVERIFY(!findReadBack("22I   0.50\r\n", 'I', 1));
 }
 
-QTEST_GUILESS_MAIN(FastrakRecordsTest)
+FIELDTRUE_TEST(FastrakRecordsTest)
 #include "fastrak_records_test.moc"

@@ -2,8 +2,12 @@
 
 #include <QTest>
 #include <clocale>
+#include <cstdio>
+#include <cstdlib>
 
-namespace fieldtrue {
+#include "tests/support/test_main.h"
+
+namespace fieldtrue::acquisition {
 
 class PlainNumberTest : public QObject {
   Q_OBJECT
@@ -32,17 +36,20 @@ class PlainNumberTest : public QObject {
   }
 
   void ignoresTheLocale() {
-    for (const char* name : {"de_DE.UTF-8", "fr_FR.UTF-8", "nl_NL.UTF-8"}) {
-      if (!std::setlocale(LC_NUMERIC, name)) continue;
-      QCOMPARE(fixedText(1.5, 2), std::string("1.50"));
-      std::setlocale(LC_NUMERIC, "C");
-      return;
-    }
-    QSKIP("no locale with a decimal comma is installed here");
+    ::setenv("LOCPATH", FIELDTRUE_COMMA_LOCALES, 1);
+    if (!std::setlocale(LC_NUMERIC, "de_DE.UTF-8")) QSKIP("there is no German locale: install the package locales");
+    char with_comma[8];
+    std::snprintf(with_comma, sizeof with_comma, "%.2f", 1.5);
+    const std::string fixed = fixedText(1.5, 2);
+    const std::string exponent = exponentText(-0.00123, 5);
+    std::setlocale(LC_NUMERIC, "C");
+    QCOMPARE(std::string(with_comma), std::string("1,50"));
+    QCOMPARE(fixed, std::string("1.50"));
+    QCOMPARE(exponent, std::string("-1.23000E-03"));
   }
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::acquisition
 
-QTEST_GUILESS_MAIN(fieldtrue::PlainNumberTest)
+FIELDTRUE_TEST(fieldtrue::acquisition::PlainNumberTest)
 #include "plain_number_test.moc"

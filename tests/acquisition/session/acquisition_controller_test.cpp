@@ -9,14 +9,24 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "acquisition/plan/place_state.h"
+#include "calib/tables/metadata_keys.h"
 #include "tests/acquisition/session/controller_bench.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 
 using testing::Bench;
 using testing::kRate_hz;
 using testing::planOf;
+
+namespace {
+
+const Eigen::Vector3d kElsewhere_m{0.0, 0.36, 0.48};  ///< 0.6 m long.
+
+}  // namespace
 
 class AcquisitionControllerTest : public QObject {
   Q_OBJECT
@@ -100,12 +110,85 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(bench.stored.size(), std::size_t{7});
   }
 
+  void aSensorElsewhereIsRefusedOnceAndThenMarked() {
+    Bench bench(newPath());
+    for (int i = 0; i < 6; ++i) bench.takeHere();
+    const std::size_t place = *bench.controller.status().current;
+    Pose wrong = bench.placePose(place);
+    wrong.position_m += kElsewhere_m;
+    bench.tracker->carryTo(wrong);
+    bench.tracker->stand(0.5);
+    bench.controller.take();
+    bench.tracker->stand(0.6);
+    AcquisitionStatus status = bench.controller.status();
+    QCOMPARE(bench.refused, std::vector<int>{static_cast<int>(place)});
+    QCOMPARE(bench.stored.size(), std::size_t{6});
+    QVERIFY(status.refused && status.away && status.distance_known && std::abs(*status.distance_m - 0.6) < 0.01);
+
+    bench.controller.take();
+    bench.tracker->stand(0.6);
+    status = bench.controller.status();
+    QCOMPARE(bench.refused.size(), std::size_t{1});
+    QCOMPARE(bench.stored.size(), std::size_t{7});
+    QCOMPARE(bench.suspicions.back(), QString("taken away from its place, as asked"));
+    QCOMPARE(status.recorded->misfits.size(), std::size_t{1});
+    QVERIFY(status.recorded->misfits[0].place == place && std::abs(status.recorded->misfits[0].off_m - 0.6) < 0.01);
+    QVERIFY(status.recorded->states[place] == PlaceState::kSuspicious);
+
+    bench.controller.goTo(static_cast<int>(place));
+    bench.takeHere();
+    status = bench.controller.status();
+    QVERIFY(status.recorded->misfits.empty() && status.recorded->states[place] == PlaceState::kDone);
+  }
+
+  void aRefusedTakeIsForgottenWhereTheSensorComesHome() {
+    Bench bench(newPath());
+    for (int i = 0; i < 6; ++i) bench.takeHere();
+    const Pose right = bench.placePose(*bench.controller.status().current);
+    bench.tracker->carryTo({right.position_m + kElsewhere_m, right.orientation});
+    bench.controller.take();
+    QVERIFY(bench.controller.status().refused);
+    bench.tracker->carryTo(right);
+    QVERIFY(!bench.controller.status().refused);
+    bench.controller.take();
+    bench.tracker->stand(0.6);
+    QCOMPARE(bench.stored.size(), std::size_t{7});
+    QCOMPARE(bench.suspicions.back(), QString());
+  }
+
+  void anEarlierWrongTakeIsNamedByTheOthers() {
+    Bench bench(newPath());
+    for (int i = 0; i < 8; ++i) {
+      Pose place = bench.placePose(*bench.controller.status().current);
+      if (i == 1) place.position_m += kElsewhere_m;
+      bench.tracker->carryTo(place);
+      bench.controller.take();
+      bench.tracker->stand(0.51);
+    }
+    QVERIFY(bench.refused.empty());
+    const AcquisitionStatus status = bench.controller.status();
+    QCOMPARE(status.recorded->misfits.size(), std::size_t{1});
+    QCOMPARE(status.recorded->misfits[0].place, std::size_t{1});
+    QVERIFY(std::abs(status.recorded->misfits[0].off_m - 0.6) < 0.01);
+  }
+
+  void aSessionBeginsByHand() {
+    Bench bench(newPath());
+    bench.controller.setAutomatic(true);
+    bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 2, 2})).dump()));
+    QVERIFY(!bench.controller.status().automatic);
+    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->stand(5.0);
+    QVERIFY(bench.stored.empty());
+  }
+
   void retakeSkipUndoRedo() {
     Bench bench(newPath());
     for (int i = 0; i < 3; ++i) bench.takeHere();
     bench.controller.skip();
     auto status = bench.controller.status();
-    QVERIFY(status.states[3] == PlaceState::kSkipped && status.current == 4u && status.n_skipped == 1);
+    QVERIFY(status.recorded->states[3] == PlaceState::kSkipped && status.current == 4u &&
+            status.recorded->n_skipped == 1);
 
     bench.controller.goTo(1);
     status = bench.controller.status();
@@ -116,17 +199,20 @@ class AcquisitionControllerTest : public QObject {
 
     bench.controller.undo();
     status = bench.controller.status();
-    QVERIFY2(status.current == 1u && status.states[1] == PlaceState::kDone, "the take before is back");
+    QVERIFY2(status.current == 1u && status.recorded->states[1] == PlaceState::kDone, "the take before is back");
     bench.controller.undo();
-    QVERIFY(bench.controller.status().current == 3u && bench.controller.status().states[3] == PlaceState::kPlanned);
+    QVERIFY(bench.controller.status().current == 3u &&
+            bench.controller.status().recorded->states[3] == PlaceState::kPlanned);
     bench.controller.undo();
     status = bench.controller.status();
-    QVERIFY(status.current == 2u && status.states[2] == PlaceState::kPlanned && status.n_done == 2 && status.can_redo);
+    QVERIFY(status.current == 2u && status.recorded->states[2] == PlaceState::kPlanned &&
+            status.recorded->n_done == 2 && status.recorded->can_redo);
     for (int i = 0; i < 3; ++i) bench.controller.redo();
     status = bench.controller.status();
-    QVERIFY(status.n_done == 3 && status.n_skipped == 1 && status.current == 4u && !status.can_redo);
+    QVERIFY(status.recorded->n_done == 3 && status.recorded->n_skipped == 1 && status.current == 4u &&
+            !status.recorded->can_redo);
     for (int i = 0; i < 5; ++i) bench.controller.undo();
-    QVERIFY(!bench.controller.status().can_undo && bench.controller.status().n_done == 0);
+    QVERIFY(!bench.controller.status().recorded->can_undo && bench.controller.status().recorded->n_done == 0);
     bench.controller.undo();
     QVERIFY(bench.failures.isEmpty() && bench.take_failures.isEmpty());
     QVERIFY2((bench.tracker->guided.back().position_m - bench.placePose(0).position_m).norm() == 0.0,
@@ -156,9 +242,10 @@ class AcquisitionControllerTest : public QObject {
     QVERIFY2(bench.take_failures[0].contains("The cable was pulled."), qPrintable(bench.take_failures[0]));
     QVERIFY(bench.take_failures[0].startsWith("B1, pipe 1: "));
     auto status = bench.controller.status();
-    QVERIFY(status.attention && status.take == TakeState::kFailed && status.current == 1u && status.n_done == 1);
+    QVERIFY(status.attention && status.take == TakeState::kFailed && status.current == 1u &&
+            status.recorded->n_done == 1);
     bench.readTables();
-    QCOMPARE(bench.samples.rows.size(), std::size_t{60});
+    QCOMPARE(bench.readingsAtPlaces(), std::size_t{60});
     bench.controller.take();
     QCOMPARE(bench.take_failures.size(), 2);
     QVERIFY(bench.take_failures[1].contains("not connected"));
@@ -178,8 +265,23 @@ class AcquisitionControllerTest : public QObject {
     Bench bench(newPath());
     bench.tracker->lose();
     bench.tracker->lose();
-    QCOMPARE(bench.failures, QStringList{"The cable was pulled."});
+    QCOMPARE(bench.device_failures, QStringList{"The cable was pulled (trying again by itself)"});
+    QCOMPARE(bench.controller.status().device_text, bench.device_failures[0]);
+    QCOMPARE(bench.n_back, 0);
+    // The controller starts it again after a while; the fake one then runs at once.
+    QTRY_COMPARE(bench.n_back, 1);
+    QVERIFY(bench.controller.status().device == DeviceState::kRunning);
     QVERIFY(bench.take_failures.isEmpty());
+  }
+
+  void aLostTrackerIsNotStartedAgainWhereNobodyWantsIt() {
+    Bench bench(newPath());
+    bench.controller.setReconnects(false);
+    bench.tracker->lose();
+    QCOMPARE(bench.device_failures, QStringList{"The cable was pulled."});
+    QTest::qWait(1000);
+    QVERIFY(bench.controller.status().device == DeviceState::kFailed);
+    QCOMPARE(bench.n_back, 0);
   }
 
   void movedTakeStartsOverAndIsSuspicious() {
@@ -194,7 +296,7 @@ class AcquisitionControllerTest : public QObject {
     bench.tracker->stand(1.0);
     QCOMPARE(bench.stored, std::vector<int>{0});
     QCOMPARE(bench.suspicions, QStringList{"moved once while sampling"});
-    QVERIFY(bench.controller.status().states[0] == PlaceState::kSuspicious);
+    QVERIFY(bench.controller.status().recorded->states[0] == PlaceState::kSuspicious);
     QCOMPARE(bench.nodes[0].n_used, 60);
   }
 
@@ -256,8 +358,9 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(bench.opened_page, QString("compare"));
     QVERIFY(nlohmann::json::parse(bench.opened_plan.toStdString()) == toJson(planOf({3, 3, 2})));
     const auto status = bench.controller.status();
-    QVERIFY(status.current == 5u && status.n_done == 4 && status.n_skipped == 1 && status.can_undo);
-    QCOMPARE(status.session_path, path);
+    QVERIFY(status.current == 5u && status.recorded->n_done == 4 && status.recorded->n_skipped == 1 &&
+            status.recorded->can_undo);
+    QCOMPARE(status.session->path, path);
     bench.takeHere();
     bench.readTables();
     QCOMPARE(bench.table.nodes.size(), std::size_t{5});
@@ -267,12 +370,34 @@ class AcquisitionControllerTest : public QObject {
     QVERIFY(*bench.table.nodes[4].t_start_s > *bench.table.nodes[3].t_end_s);
   }
 
+  void clockGoesOnWhileTheSessionIsClosed_data() {
+    QTest::addColumn<double>("after_s");
+    QTest::addColumn<double>("resumed_s");
+    QTest::newRow("two hours later") << 7200.0 << 7200.0;
+    QTest::newRow("a clock set back") << -60.0 << 2.0;
+  }
+  void clockGoesOnWhileTheSessionIsClosed() {
+    QFETCH(double, after_s);
+    QFETCH(double, resumed_s);
+    const QString path = newPath();
+    {
+      Bench bench(path);
+      bench.takeHere();
+    }
+    Bench bench(path, {}, false, after_s);
+    bench.takeHere();
+    bench.readTables();
+    QCOMPARE(bench.table.nodes.size(), std::size_t{2});
+    const double begins_s = *bench.table.nodes[1].t_start_s;
+    QVERIFY2(begins_s >= resumed_s && begins_s < resumed_s + 2.0, qPrintable(QString::number(begins_s)));
+  }
+
   void metadataComesFromTheDevice() {
     Bench bench(newPath());
     bench.readTables();
     QVERIFY(bench.table.metadata.tracker == "fake" && bench.table.metadata.rate_hz == kRate_hz);
     QVERIFY(bench.table.metadata.rig == "wooden jig");
-    QCOMPARE(QString::fromStdString(*bench.table.metadata.date), QDate::currentDate().toString(Qt::ISODate));
+    QCOMPARE(*bench.table.metadata.date, std::string("2024-02-29"));
   }
 
   void badSessionsAreToldAndTheOpenOneStays() {
@@ -284,13 +409,13 @@ class AcquisitionControllerTest : public QObject {
     bench.controller.openSession(newPath(), "{\"grid\": \"5x5@1\"}");
     QCOMPARE(bench.failures.size(), 2);
     QVERIFY(bench.failures[1].contains("expected NXxNYxNZ"));
-    QCOMPARE(bench.controller.status().session_path, path);
+    QCOMPARE(bench.controller.status().session->path, path);
     bench.controller.openSession(path, {});
     QCOMPARE(bench.failures.size(), 2);
     bench.controller.connectDevice("nosuch:thing", {});
-    QCOMPARE(bench.failures.size(), 3);
+    QCOMPARE(bench.device_failures.size(), 1);
     bench.controller.connectDevice("simulated", folder_.filePath("none.scene.json"));
-    QCOMPARE(bench.failures.size(), 4);
+    QCOMPARE(bench.device_failures.size(), 2);
   }
 
   void takingWithoutASessionIsToldKindly() {
@@ -352,11 +477,11 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(bench.stored, expected);
     QCOMPARE(bench.n_finished, 1);
     QVERIFY(!bench.controller.status().current);
-    QCOMPARE(bench.controller.status().n_done, std::size_t{18});
+    QCOMPARE(bench.controller.status().recorded->n_done, std::size_t{18});
     QVERIFY2(bench.failures.isEmpty() && bench.take_failures.isEmpty(), qPrintable(bench.take_failures.join(' ')));
     bench.readTables();
     QCOMPARE(bench.table.nodes.size(), std::size_t{18});
-    QCOMPARE(bench.samples.rows.size(), std::size_t{18 * 60});
+    QCOMPARE(bench.readingsAtPlaces(), std::size_t{18 * 60});
     for (const Node& node : bench.nodes) {
       QCOMPARE(node.n_used, 60);
       const Pose expected_pose = inverse(bench.tracker->reference_from_tracker) * node.reference_from_sensor;
@@ -367,7 +492,53 @@ class AcquisitionControllerTest : public QObject {
       QCOMPARE(bench.stored.size(), std::size_t{18});
     }
   }
+
+  void anotherTrackerOnTheWayIsTold() {
+    QTemporaryDir folder;
+    const QString path = folder.filePath("two.fieldtrue");
+    {
+      Bench first(path);
+      first.takeHere();
+      QCOMPARE(first.stored.size(), std::size_t{1});
+    }
+    Bench second(path, {}, false);
+    QStringList remarks;
+    QObject::connect(&second.controller, &AcquisitionController::remarked,
+                     [&](const QString& remark) { remarks << remark; });
+    auto other = std::make_unique<testing::FakeTracker>();
+    second.tracker = other.get();
+    other->tracker_name = QStringLiteral("another");
+    second.controller.adoptDevice(std::move(other));
+    QCOMPARE(remarks.size(), 1);
+    QVERIFY2(remarks[0].contains("begun with fake") && remarks[0].contains("of another") &&
+                 remarks[0].contains("one calibration of both is wrong"),
+             qPrintable(remarks[0]));
+    // The table says so as soon as something was taken with it, and not before.
+    second.readTables();
+    QVERIFY(!second.table.metadata.other.contains(kOtherTracker));
+    second.takeHere();
+    QCOMPARE(second.stored.size(), std::size_t{1});
+    second.readTables();
+    QCOMPARE(QString::fromStdString(second.table.metadata.other[kOtherTracker]), QString("another"));
+    QCOMPARE(QString::fromStdString(*second.table.metadata.tracker), QString("fake"));
+  }
+
+  void aTrackerBeforeTheFirstTakeIsForgotten() {
+    QTemporaryDir folder;
+    Bench bench(folder.filePath("one.fieldtrue"));
+    QStringList remarks;
+    QObject::connect(&bench.controller, &AcquisitionController::remarked,
+                     [&](const QString& remark) { remarks << remark; });
+    auto other = std::make_unique<testing::FakeTracker>();
+    bench.tracker = other.get();
+    other->tracker_name = QStringLiteral("another");
+    bench.controller.adoptDevice(std::move(other));
+    bench.takeHere();
+    bench.readTables();
+    QCOMPARE(QString::fromStdString(*bench.table.metadata.tracker), QString("another"));
+    QVERIFY2(remarks.isEmpty() && !bench.table.metadata.other.contains(kOtherTracker), qPrintable(remarks.join('\n')));
+  }
 };
 
-QTEST_GUILESS_MAIN(AcquisitionControllerTest)
+FIELDTRUE_TEST(AcquisitionControllerTest)
 #include "acquisition_controller_test.moc"

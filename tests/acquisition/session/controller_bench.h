@@ -1,6 +1,8 @@
 #pragma once
 
-#include <QDate>
+#include <QDateTime>
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -11,14 +13,14 @@ namespace fieldtrue::testing {
 inline constexpr double kRate_hz = 120.0;
 
 /// A tracker whose every reading is the test's: the jig is carried, set down and unplugged by calls.
-class FakeTracker : public TrackerDevice {
+class FakeTracker : public acquisition::TrackerDevice {
  public:
   Pose reference_from_tracker{{0.1, -0.2, 0.05}, rotationFromVector({0.0, 0.0, 0.3})};
   Pose true_pose{{-1.0, -1.0, -1.0}, Eigen::Quaterniond::Identity()};
   std::vector<Pose> guided;
   QString tracker_name = QStringLiteral("fake");
 
-  void start() override { emit stateChanged(DeviceState::kRunning, "running"); }
+  void start() override { emit stateChanged(acquisition::DeviceState::kRunning, "running"); }
   void stop() override {}
   void guideTo(const Pose& pose) override { guided.push_back(pose); }
   TableMetadata describe() const override {
@@ -50,10 +52,10 @@ class FakeTracker : public TrackerDevice {
       send(true_pose);
     }
   }
-  void lose() { emit stateChanged(DeviceState::kFailed, "The cable was pulled."); }
+  void lose() { emit stateChanged(acquisition::DeviceState::kFailed, "The cable was pulled."); }
   void comeBack() {
     restartClock();
-    emit stateChanged(DeviceState::kRunning, "running");
+    emit stateChanged(acquisition::DeviceState::kRunning, "running");
   }
 
  private:
@@ -62,8 +64,8 @@ class FakeTracker : public TrackerDevice {
   std::uniform_real_distribution<double> uniform_{-1e-4, 1e-4};
 };
 
-inline Plan planOf(std::array<int, 3> counts) {
-  Plan plan;
+inline acquisition::Plan planOf(std::array<int, 3> counts) {
+  acquisition::Plan plan;
   plan.counts = counts;
   plan.pitch_m = {0.3, 0.3, 0.3};
   return plan;
@@ -71,23 +73,32 @@ inline Plan planOf(std::array<int, 3> counts) {
 
 /// One controller with its fake tracker and everything it said.
 struct Bench {
-  explicit Bench(const QString& path, const Plan& plan = planOf({3, 3, 2}), bool create = true) {
-    QObject::connect(&controller, &AcquisitionController::nodeStored,
+  explicit Bench(const QString& path, const acquisition::Plan& plan = planOf({3, 3, 2}), bool create = true,
+                 double after_s = 0.0)
+      : now(QDateTime({2024, 2, 29}, {12, 0}).toUTC().addMSecs(std::llround(1000.0 * after_s))) {
+    controller.setWallClock([this] { return now; });
+    QObject::connect(&controller, &acquisition::AcquisitionController::nodeStored,
                      [this](int place, const Node& node, const QString& suspicious) {
                        stored.push_back(place);
                        nodes.push_back(node);
                        suspicions << suspicious;
                      });
-    QObject::connect(&controller, &AcquisitionController::takeFailed,
+    QObject::connect(&controller, &acquisition::AcquisitionController::takeFailed,
                      [this](const QString& text) { take_failures << text; });
-    QObject::connect(&controller, &AcquisitionController::failed, [this](const QString& text) { failures << text; });
-    QObject::connect(&controller, &AcquisitionController::finished, [this] { ++n_finished; });
-    QObject::connect(&controller, &AcquisitionController::sessionOpened,
+    QObject::connect(&controller, &acquisition::AcquisitionController::takeRefused,
+                     [this](int place, double) { refused.push_back(place); });
+    QObject::connect(&controller, &acquisition::AcquisitionController::failed,
+                     [this](const QString& text) { failures << text; });
+    QObject::connect(&controller, &acquisition::AcquisitionController::deviceFailed,
+                     [this](const QString& text) { device_failures << text; });
+    QObject::connect(&controller, &acquisition::AcquisitionController::deviceBack, [this] { ++n_back; });
+    QObject::connect(&controller, &acquisition::AcquisitionController::finished, [this] { ++n_finished; });
+    QObject::connect(&controller, &acquisition::AcquisitionController::sessionOpened,
                      [this](const QString&, const QString& page, const QString& plan_json) {
                        opened_page = page;
                        opened_plan = plan_json;
                      });
-    QObject::connect(&controller, &AcquisitionController::tablesReady,
+    QObject::connect(&controller, &acquisition::AcquisitionController::tablesReady,
                      [this](const CalibrationTable& nodes_now, const SampleTable& samples_now) {
                        table = nodes_now;
                        samples = samples_now;
@@ -97,7 +108,9 @@ struct Bench {
     controller.adoptDevice(std::move(device));
     controller.openSession(path, create ? QString::fromStdString(toJson(plan).dump()) : QString());
   }
-  Pose placePose(std::size_t place) const { return controller.status().places.at(place).reference_from_sensor; }
+  Pose placePose(std::size_t place) const {
+    return controller.status().session->places.at(place).reference_from_sensor;
+  }
   /// Carries the jig to the current place and takes it as an operator does with the space bar.
   void takeHere() {
     tracker->carryTo(placePose(*controller.status().current));
@@ -105,13 +118,19 @@ struct Bench {
     tracker->stand(0.51);
   }
   void readTables() { controller.requestTables(); }
+  /// Rows of the sample table that belong to a place.
+  std::size_t readingsAtPlaces() const {
+    return static_cast<std::size_t>(
+        std::count_if(samples.rows.begin(), samples.rows.end(), [](const SampleRow& row) { return row.node >= 0; }));
+  }
 
-  AcquisitionController controller;
+  QDateTime now;  ///< What the wall clock says: it stands still unless it is set.
+  acquisition::AcquisitionController controller;
   FakeTracker* tracker = nullptr;
-  std::vector<int> stored;
+  std::vector<int> stored, refused;
   std::vector<Node> nodes;
-  QStringList suspicions, take_failures, failures;
-  int n_finished = 0;
+  QStringList suspicions, take_failures, failures, device_failures;
+  int n_finished = 0, n_back = 0;
   QString opened_page, opened_plan;
   CalibrationTable table;
   SampleTable samples;

@@ -9,8 +9,10 @@
 #include "acquisition/session/session_store.h"
 #include "tests/acquisition/session/session_samples.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using testing::fullMetadata;
 using testing::kSamples;
 using testing::sameSamples;
@@ -46,14 +48,14 @@ class SessionCrashTest : public QObject {
       FT_VERIFY_OK(store.limitSize(1));
       bool full = false;
       for (int take = 2; take < 50 && !full; ++take) {
-        const std::size_t n_before = store.nodeTable().nodes.size();
+        const std::size_t n_before = store.nodeTable().value().nodes.size();
         const auto stored = storeTake(store, std::size_t(take % 12), take);
         full = !stored;
         if (full) {
           QVERIFY(stored.error().code == ErrorCode::kIo);
           FT_VERIFY_MATCH(testing::holdsAll(stored.error().message, {"disk is full"}));
-          QCOMPARE(store.nodeTable().nodes.size(), n_before);
-          QCOMPARE(store.sampleTable().rows.size(), n_before * kSamples);
+          QCOMPARE(store.nodeTable().value().nodes.size(), n_before);
+          QCOMPARE(store.sampleTable().value().rows.size(), n_before * kSamples);
         }
       }
       QVERIFY(full);
@@ -61,9 +63,9 @@ class SessionCrashTest : public QObject {
       FT_VERIFY_OK(storeTake(store, 11, 99));
     }
     SessionStore store = opened(path);
-    QVERIFY(sameSamples(store.samples(0), samplesOf(1)));
-    QVERIFY(sameSamples(store.samples(11), samplesOf(99)));
-    QCOMPARE(store.sampleTable().rows.size(), store.nodeTable().nodes.size() * kSamples);
+    QVERIFY(sameSamples(store.samples(0).value(), samplesOf(1)));
+    QVERIFY(sameSamples(store.samples(11).value(), samplesOf(99)));
+    QCOMPARE(store.sampleTable().value().rows.size(), store.nodeTable().value().nodes.size() * kSamples);
   }
 
   /// The system itself refuses to let the file grow: the write fails in the middle of a take.
@@ -81,7 +83,8 @@ class SessionCrashTest : public QObject {
         if (storeTake(*store, std::size_t(take % 12), take)) {
           ++n_stored;
         } else {
-          const bool whole = store->sampleTable().rows.size() == store->nodeTable().nodes.size() * kSamples;
+          const bool whole =
+              store->sampleTable().value().rows.size() == store->nodeTable().value().nodes.size() * kSamples;
           _exit(whole && n_stored > 0 ? 0 : 3);
         }
       }
@@ -92,8 +95,8 @@ class SessionCrashTest : public QObject {
     QVERIFY(WIFEXITED(status));
     QCOMPARE(WEXITSTATUS(status), 0);
     SessionStore store = opened(path);
-    QVERIFY(!store.nodeTable().nodes.empty());
-    QCOMPARE(store.sampleTable().rows.size(), store.nodeTable().nodes.size() * kSamples);
+    QVERIFY(!store.nodeTable().value().nodes.empty());
+    QCOMPARE(store.sampleTable().value().rows.size(), store.nodeTable().value().nodes.size() * kSamples);
     FT_VERIFY_OK(storeTake(store, 0, 1));
   }
 
@@ -135,8 +138,9 @@ class SessionCrashTest : public QObject {
   int countTakes(const QString& path) {
     int n_takes = 0;
     SessionStore store = opened(path);
-    while (store.canUndo()) {
-      for (const Node& node : store.nodeTable().nodes) {
+    while (store.canUndo().value()) {
+      const CalibrationTable table = store.nodeTable().value();
+      for (const Node& node : table.nodes) {
         if (node.n_used + node.n_rejected != kSamples) qFatal("a take is not whole");
       }
       const auto place = store.undo();
@@ -145,11 +149,11 @@ class SessionCrashTest : public QObject {
     }
     for (int i = 0; i < n_takes; ++i) {
       const auto place = store.redo();
-      if (!place || store.samples(**place).size() != kSamples) qFatal("a take is not whole");
+      if (!place || store.samples(**place).value().size() != kSamples) qFatal("a take is not whole");
     }
     return n_takes;
   }
 };
 
-QTEST_GUILESS_MAIN(SessionCrashTest)
+FIELDTRUE_TEST(SessionCrashTest)
 #include "session_crash_test.moc"

@@ -9,8 +9,8 @@ namespace fieldtrue::testing {
 
 inline constexpr int kSamples = 60;
 
-inline Plan smallPlan() {
-  Plan plan;
+inline acquisition::Plan smallPlan() {
+  acquisition::Plan plan;
   plan.counts = {3, 2, 2};
   plan.pitch_m = {0.3, 0.3, 0.3};
   return plan;
@@ -53,7 +53,8 @@ inline std::vector<Sample> samplesOf(int take) {
   return samples;
 }
 
-inline Result<void> storeTake(SessionStore& store, std::size_t place, int take, const std::string& suspicious = {}) {
+inline Result<void> storeTake(acquisition::SessionStore& store, std::size_t place, int take,
+                              const std::string& suspicious = {}) {
   const std::vector<Sample> samples = samplesOf(take);
   return store.storeTake(place, samples, averageSamples(samples).value(), suspicious);
 }

@@ -4,19 +4,27 @@
 #include <unistd.h>
 
 #include <QCoreApplication>
+#include <QDir>
+#include <QFile>
 #include <QSignalSpy>
 #include <QTemporaryDir>
 #include <QTest>
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 
 #include "acquisition/devices/fastrak_device.h"
+#include "acquisition/devices/registry.h"
 #include "acquisition/emulators/emulator_runner.h"
 #include "acquisition/emulators/fastrak_emulator_core.h"
+#include "acquisition/emulators/pty_endpoint.h"
 #include "acquisition/transports/local_transport.h"
+#include "acquisition/transports/serial_ports.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -37,7 +45,10 @@ class LibserialportLineTest : public QObject {
   Q_OBJECT
  private slots:
   void init();
-  void cleanup() { emulator_.reset(); }
+  void cleanup() {
+    ::unsetenv("FIELDTRUE_FAKE_TTYS");
+    emulator_.reset();
+  }
   void libraryItselfReadsRecords_data();
   void libraryItselfReadsRecords();
   void driverReadsThroughIt_data();
@@ -45,8 +56,12 @@ class LibserialportLineTest : public QObject {
   void setsTheLine();
   void noticesThePull();
   void refusesTheSecond();
+  void listsThePortsOfAMachine();
+  void listsNothingWithoutAPort();
 
  private:
+  /// Makes a machine's /sys of its own and lets libserialport see it.
+  void haveATty(const QString& name, const QString& device, const QByteArray& product = {});
   std::unique_ptr<QTemporaryDir> folder_;
   std::unique_ptr<EmulatorRunner> emulator_;
   std::string name_;
@@ -163,6 +178,52 @@ void LibserialportLineTest::refusesTheSecond() {
   FT_VERIFY_MATCH(holdsAll(second.error().message, {"busy"}));
 }
 
+void LibserialportLineTest::haveATty(const QString& name, const QString& device, const QByteArray& product) {
+  const QString ttys = folder_->filePath("sys/class/tty");
+  ::setenv("FIELDTRUE_FAKE_TTYS", qPrintable(ttys), 1);
+  QVERIFY(QDir().mkpath(ttys));
+  if (name.isEmpty()) return;
+  const QString at = folder_->filePath("sys/devices/" + device);
+  QVERIFY(QDir().mkpath(at + "/device"));
+  QVERIFY(QFile::link("../../devices/" + device, ttys + "/" + name));
+  const std::vector<std::pair<QString, QByteArray>> attributes = {
+      {"busnum", "1"}, {"devnum", "2"}, {"idVendor", "067b"}, {"idProduct", "2303"}, {"product", product}};
+  for (const auto& [file, text] : attributes) {
+    if (product.isEmpty()) break;
+    QFile attribute(at + "/" + file);
+    QVERIFY(attribute.open(QIODevice::WriteOnly) && attribute.write(text + "\n") > 0);
+  }
+}
+
+// As sysfs has them: an adapter on USB, one that tells no name, a console, and a chip that answers to no driver.
+void LibserialportLineTest::listsThePortsOfAMachine() {
+  haveATty("ttyUSB70", "usb1/1-1/ttyUSB70", "USB-Serial Controller");
+  haveATty("ttyACM70", "platform/amba/ttyACM70");
+  haveATty("tty3", "virtual/tty/tty3");
+  haveATty("ttyS70", "platform/serial8250/tty/ttyS70");
+  std::vector<SerialPortInfo> ports = listSerialPorts();
+  std::sort(ports.begin(), ports.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
+  QCOMPARE(ports.size(), std::size_t{2});
+  QCOMPARE(ports[0].path, std::string("/dev/ttyACM70"));
+  QVERIFY(!ports[0].description.empty());
+  QCOMPARE(ports[1].path, std::string("/dev/ttyUSB70"));
+  FT_VERIFY_MATCH(holdsAll(ports[1].description, {"USB-Serial Controller"}));
+
+  std::vector<SerialLine> lines = serialLines();
+  std::sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
+  QCOMPARE(lines.size(), ports.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    QCOMPARE(lines[i].path, ports[i].path);
+    QCOMPARE(lines[i].description, ports[i].description);
+  }
+}
+
+void LibserialportLineTest::listsNothingWithoutAPort() {
+  haveATty({}, {});
+  QVERIFY(listSerialPorts().empty());
+  QVERIFY(serialLines().empty());
+}
+
 int main(int argc, char** argv) {
   const char* preloaded = std::getenv("LD_PRELOAD");
   if (!preloaded || !std::strstr(preloaded, FIELDTRUE_FAKE_MODEM_LINES)) {
@@ -174,7 +235,7 @@ int main(int argc, char** argv) {
   }
   QCoreApplication application(argc, argv);
   LibserialportLineTest test;
-  return QTest::qExec(&test, argc, argv);
+  return fieldtrue::testing::runTest(test, argc, argv);
 }
 
 #include "libserialport_line_test.moc"

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -57,7 +58,8 @@ class FileIoTest : public QObject {
   }
 
   void writesAndReads() {
-    const std::string text = std::string("a\0b\r\n", 5) + std::string(200000, 'x');
+    std::string text("a\0b\r\n", 5);
+    text.append(200000, 'x');
     FT_VERIFY_OK(writeText(path_, text));
     const auto back = readFile(path_);
     FT_VERIFY_OK(back);
@@ -115,6 +117,24 @@ class FileIoTest : public QObject {
     QCOMPARE(filesIn(path_.parent_path()), std::size_t{1});
   }
 
+  void sessionsAreNotWrittenOver() {
+    std::string database("SQLite format 3\0", 16);
+    database += "and a day's work";
+    const std::filesystem::path session = path_.parent_path() / "day.fieldtrue";
+    const std::filesystem::path link = path_.parent_path() / "link.csv";
+    FT_VERIFY_OK(writeText(session, "a name that does not exist yet is free"));
+    std::filesystem::create_symlink("day.fieldtrue", link);
+    FT_VERIFY_OK(writeText(path_, database));
+    for (const auto& path : {session, link, path_}) {
+      const auto before = readFile(path);
+      const auto written = writeText(path, "new");
+      QVERIFY(!written);
+      FT_VERIFY_MATCH(holdsAll(written.error().message,
+                               {QByteArray::fromStdString(path.string()), "it is a session", "unchanged"}));
+      QCOMPARE(*readFile(path), *before);
+    }
+  }
+
   void badPaths() {
     const std::filesystem::path absent = path_.parent_path() / "absent" / "table.csv";
     const auto written = writeText(absent, "text");
@@ -157,5 +177,5 @@ class FileIoTest : public QObject {
   std::filesystem::path path_;
 };
 
-QTEST_GUILESS_MAIN(FileIoTest)
+FIELDTRUE_TEST(FileIoTest)
 #include "file_io_test.moc"

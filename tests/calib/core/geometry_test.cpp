@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -261,5 +262,5 @@ class GeometryTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(GeometryTest)
+FIELDTRUE_TEST(GeometryTest)
 #include "geometry_test.moc"

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <random>
 
+#include "tests/support/test_main.h"
+
 using namespace fieldtrue;
 
 namespace {
@@ -73,5 +75,5 @@ class GridIndexTest : public QObject {
   void anEmptyTableHasNone() { QVERIFY(!gridIndex({})); }
 };
 
-QTEST_GUILESS_MAIN(GridIndexTest)
+FIELDTRUE_TEST(GridIndexTest)
 #include "grid_index_test.moc"

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -122,5 +123,5 @@ class PoseTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(PoseTest)
+FIELDTRUE_TEST(PoseTest)
 #include "pose_test.moc"

@@ -1,12 +1,15 @@
+#include "calib/core/quantum.h"
+
 #include <QTest>
 #include <cmath>
 #include <fstream>
 #include <random>
 
-#include "calib/core/csv_reader.h"
 #include "calib/core/statistics.h"
+#include "calib/tables/csv_reader.h"
 #include "tests/support/matchers.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -128,5 +131,5 @@ class QuantumTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(QuantumTest)
+FIELDTRUE_TEST(QuantumTest)
 #include "quantum_test.moc"

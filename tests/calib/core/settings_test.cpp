@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -204,5 +205,5 @@ class SettingsTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(SettingsTest)
+FIELDTRUE_TEST(SettingsTest)
 #include "settings_test.moc"

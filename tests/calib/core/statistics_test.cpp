@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -304,5 +305,5 @@ class StatisticsTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(StatisticsTest)
+FIELDTRUE_TEST(StatisticsTest)
 #include "statistics_test.moc"

@@ -4,11 +4,15 @@
 #include <set>
 
 #include "calib/correctors/automatic_choice.h"
+#include "calib/correctors/base/fit_rows.h"
+#include "calib/correctors/base/method.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -228,7 +232,7 @@ class AutomaticTest : public QObject {
     const auto model = fitPosition("auto", noisy(nothing_m, 0.003, static_cast<unsigned>(seed)));
     FT_VERIFY_OK(model);
     QCOMPARE(chosen(**model), std::string("none"));
-    FT_VERIFY_MATCH(holdsAll((*model)->note(), {"Chosen: none"}));
+    FT_VERIFY_MATCH(holdsAll((*model)->note(), {"Chosen: No correction"}));
   }
 
   void errsNoMoreThanTheBestCandidateAllows_data() {
@@ -303,5 +307,5 @@ class AutomaticTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(AutomaticTest)
+FIELDTRUE_TEST(AutomaticTest)
 #include "automatic_test.moc"

@@ -1,13 +1,15 @@
 #include <QTest>
 #include <cmath>
 
-#include "calib/correctors/bspline_fit.h"
-#include "calib/correctors/rbf_system.h"
+#include "calib/correctors/radial/rbf_system.h"
+#include "calib/correctors/splines/bspline_fit.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -204,5 +206,5 @@ class BsplineTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(BsplineTest)
+FIELDTRUE_TEST(BsplineTest)
 #include "bspline_test.moc"

@@ -17,7 +17,7 @@ inline Eigen::Vector3d linear_m(const Eigen::Vector3d& p) {
 }
 
 /// The data without one row.
-inline FitData without(FitData data, std::size_t row) {
+inline correctors::FitData without(correctors::FitData data, std::size_t row) {
   const auto drop = [row](auto& rows) {
     if (!rows.empty()) rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(row));
   };
@@ -31,7 +31,7 @@ inline FitData without(FitData data, std::size_t row) {
 }
 
 /// Row of a grid index.
-inline std::size_t rowAt(const FitData& data, const std::array<int, 3>& index) {
+inline std::size_t rowAt(const correctors::FitData& data, const std::array<int, 3>& index) {
   return static_cast<std::size_t>(std::find(data.index.begin(), data.index.end(), index) - data.index.begin());
 }
 
@@ -46,19 +46,20 @@ inline std::vector<Eigen::Vector3d> cube(double side_m, const Eigen::Vector3d& l
 using Given = std::map<std::string, std::string>;
 
 /// Fits what must be fitted.
-inline std::unique_ptr<PositionModel> fitted(const std::string& id, const FitData& data, const Given& given = {}) {
+inline std::unique_ptr<correctors::PositionModel> fitted(const std::string& id, const correctors::FitData& data,
+                                                         const Given& given = {}) {
   auto model = fitPosition(id, data, given);
   FT_CHECK(model.has_value());
   return *std::move(model);
 }
 
 /// A grid of cubes turned about z.
-inline FitData turnedGrid(double angle_rad, const std::array<int, 3>& counts) {
+inline correctors::FitData turnedGrid(double angle_rad, const std::array<int, 3>& counts) {
   std::vector<Eigen::Vector3d> points_m = shakenGrid(counts, 0.2, 0.0);
-  FitData straight = fitDataOf(points_m, linear_m);
+  correctors::FitData straight = fitDataOf(points_m, linear_m);
   const Eigen::AngleAxisd turn(angle_rad, Eigen::Vector3d::UnitZ());
   for (Eigen::Vector3d& p_m : points_m) p_m = turn * p_m;
-  FitData data = fitDataOf(points_m, linear_m);
+  correctors::FitData data = fitDataOf(points_m, linear_m);
   data.index = straight.index;
   return data;
 }

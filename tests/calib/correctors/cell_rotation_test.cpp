@@ -1,11 +1,13 @@
 #include <QTest>
 #include <cmath>
 
-#include "calib/correctors/place_rotations.h"
+#include "calib/correctors/base/place_rotations.h"
 #include "tests/calib/correctors/cell_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -225,5 +227,5 @@ class CellRotationTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(CellRotationTest)
+FIELDTRUE_TEST(CellRotationTest)
 #include "cell_rotation_test.moc"

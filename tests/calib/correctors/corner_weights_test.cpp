@@ -1,4 +1,4 @@
-#include "calib/correctors/corner_weights.h"
+#include "calib/correctors/cells/corner_weights.h"
 
 #include <QTest>
 #include <cmath>
@@ -6,8 +6,10 @@
 
 #include "tests/calib/correctors/cell_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -151,5 +153,5 @@ class CornerWeightsTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(CornerWeightsTest)
+FIELDTRUE_TEST(CornerWeightsTest)
 #include "corner_weights_test.moc"

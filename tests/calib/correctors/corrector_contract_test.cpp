@@ -5,11 +5,14 @@
 #include <set>
 
 #include "calib/core/pose.h"
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -369,5 +372,5 @@ class CorrectorContractTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(CorrectorContractTest)
+FIELDTRUE_TEST(CorrectorContractTest)
 #include "corrector_contract_test.moc"

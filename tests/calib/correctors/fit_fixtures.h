@@ -8,7 +8,8 @@
 #include <set>
 #include <vector>
 
-#include "calib/correctors/fit_data.h"
+#include "calib/correctors/base/fit_data.h"
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 
 namespace fieldtrue::testing {
@@ -57,10 +58,10 @@ inline std::vector<std::array<int, 3>> wholeGridIndex(const std::vector<Eigen::V
 
 /// Fit data whose truth is tracked + displacement, and, with an error rotation, q_tracked = q_error q_true. Places that
 /// fill a whole grid get their grid index.
-inline FitData fitDataOf(const std::vector<Eigen::Vector3d>& p_tracked_m, const Displacement& displacement_m,
-                         const Rotation& q_error = {},
-                         const Eigen::Quaterniond& q_true = Eigen::Quaterniond::Identity()) {
-  FitData data;
+inline correctors::FitData fitDataOf(const std::vector<Eigen::Vector3d>& p_tracked_m,
+                                     const Displacement& displacement_m, const Rotation& q_error = {},
+                                     const Eigen::Quaterniond& q_true = Eigen::Quaterniond::Identity()) {
+  correctors::FitData data;
   data.index = wholeGridIndex(p_tracked_m);
   for (std::size_t i = 0; i < p_tracked_m.size(); ++i) {
     data.p_tracked_m.push_back(p_tracked_m[i]);
@@ -75,20 +76,21 @@ inline FitData fitDataOf(const std::vector<Eigen::Vector3d>& p_tracked_m, const 
 
 /// Defaults of a method, with some settings given as text.
 template <class Model>
-Settings settingsOf(const CorrectionMethod<Model>& method, const std::map<std::string, std::string>& given = {}) {
+Settings settingsOf(const correctors::CorrectionMethod<Model>& method,
+                    const std::map<std::string, std::string>& given = {}) {
   return resolveSettings(method.id, method.settings, given).value();
 }
 
 /// Fits a method of the registry by id.
-inline Result<std::unique_ptr<PositionModel>> fitPosition(const std::string& id, const FitData& data,
-                                                          const std::map<std::string, std::string>& given = {}) {
-  const PositionMethod& method = *findPositionMethod(id).value();
+inline Result<std::unique_ptr<correctors::PositionModel>> fitPosition(
+    const std::string& id, const correctors::FitData& data, const std::map<std::string, std::string>& given = {}) {
+  const correctors::PositionMethod& method = *correctors::findPositionMethod(id).value();
   return method.fit(data, settingsOf(method, given), {});
 }
 
-inline Result<std::unique_ptr<OrientationModel>> fitOrientation(const std::string& id, const FitData& data,
-                                                                const std::map<std::string, std::string>& given = {}) {
-  const OrientationMethod& method = *findOrientationMethod(id).value();
+inline Result<std::unique_ptr<correctors::OrientationModel>> fitOrientation(
+    const std::string& id, const correctors::FitData& data, const std::map<std::string, std::string>& given = {}) {
+  const correctors::OrientationMethod& method = *correctors::findOrientationMethod(id).value();
   return method.fit(data, settingsOf(method, given), {});
 }
 

@@ -3,14 +3,16 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "calib/correctors/dense_solver.h"
-#include "calib/correctors/gaussian_process_likelihood.h"
-#include "calib/correctors/gaussian_process_posterior.h"
+#include "calib/correctors/gaussian_process/gaussian_process_likelihood.h"
+#include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
+#include "calib/correctors/numerics/dense_solver.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -244,5 +246,5 @@ class GaussianProcessTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(GaussianProcessTest)
+FIELDTRUE_TEST(GaussianProcessTest)
 #include "gaussian_process_test.moc"

@@ -1,31 +1,35 @@
-#include "calib/correctors/harmonic_field.h"
-
 #include <QTest>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "calib/core/geometry.h"
-#include "calib/correctors/harmonic_field_evidence.h"
-#include "calib/correctors/harmonic_field_linear.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/harmonic/harmonic_field_evidence.h"
+#include "calib/correctors/harmonic/harmonic_field_linear.h"
 #include "calib/effects/compact_metal.h"
 #include "calib/field/pose_solver.h"
+#include "calib/field/tracker_model.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
 
 /// A sphere beside the grid of `roomGrid`, 0.45 m from its nearest places.
-std::unique_ptr<CouplingDistortion> cabinet() {
-  return makeCompactMetal({2.0, 0.9, 0.1}, spherePolarizability_m3(0.2, false, 1.0) * Eigen::Matrix3d::Identity(), 0.2);
+std::unique_ptr<field::CouplingDistortion> cabinet() {
+  return effects::makeCompactMetal(
+      {2.0, 0.9, 0.1}, effects::spherePolarizability_m3(0.2, false, 1.0) * Eigen::Matrix3d::Identity(), 0.2);
 }
 
 /// Sheets of metal beside and above the grid, stronger in the middle than at the edge.
-class Plates final : public CouplingDistortion {
+class Plates final : public field::CouplingDistortion {
  public:
   Plates() {
     addPlate({1.3, 0.93, 0.07}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitZ());
@@ -45,17 +49,17 @@ class Plates final : public CouplingDistortion {
         const double u = (i + 0.5) / 5.0 - 1.0;
         const double v = (j + 0.5) / 5.0 - 1.0;
         const double strength_m3 = -0.004 * std::sqrt((1.0 - u * u) * (1.0 - v * v));
-        pieces_.push_back(
-            makeCompactMetal(center_m + 0.45 * (u * along + v * up), strength_m3 * normal * normal.transpose(), 0.0));
+        pieces_.push_back(effects::makeCompactMetal(center_m + 0.45 * (u * along + v * up),
+                                                    strength_m3 * normal * normal.transpose(), 0.0));
       }
     }
   }
-  std::vector<std::unique_ptr<CouplingDistortion>> pieces_;
+  std::vector<std::unique_ptr<field::CouplingDistortion>> pieces_;
 };
 
-Eigen::Vector3d tracked_m(const CouplingDistortion& metal, const Eigen::Vector3d& p_true_m) {
-  const Eigen::Matrix3d field = dipoleField(p_true_m, 1.0) + metal.fieldChange(p_true_m, 1.0, 0.0);
-  return solvePose(field, 1.0, p_true_m).value().tracker_from_sensor.position_m;
+Eigen::Vector3d tracked_m(const field::CouplingDistortion& metal, const Eigen::Vector3d& p_true_m) {
+  const Eigen::Matrix3d field = field::dipoleField(p_true_m, 1.0) + metal.fieldChange(p_true_m, 1.0, 0.0);
+  return field::solvePose(field, 1.0, p_true_m).value().tracker_from_sensor.position_m;
 }
 
 /// 6x6x5 true places 0.2 m apart beside the transmitter.
@@ -68,7 +72,7 @@ std::vector<Eigen::Vector3d> roomGrid() {
 }
 
 /// Truth off by the jig, readings exact.
-FitData roomData(const CouplingDistortion* metal, double jig_sd_m, unsigned seed) {
+FitData roomData(const field::CouplingDistortion* metal, double jig_sd_m, unsigned seed) {
   RandomGeometry random(seed);
   FitData data;
   for (const Eigen::Vector3d& p_m : roomGrid()) {
@@ -89,7 +93,7 @@ std::vector<Eigen::Vector3d> placesBetween(unsigned seed) {
   return places_m;
 }
 
-double rms_m(const PositionModel& model, const CouplingDistortion& metal,
+double rms_m(const PositionModel& model, const field::CouplingDistortion& metal,
              const std::vector<Eigen::Vector3d>& places_m) {
   double sum_m2 = 0.0;
   for (const Eigen::Vector3d& p_true_m : places_m) {
@@ -136,10 +140,10 @@ void HarmonicFieldTest::solvesAsTheTrackerDoes() {
   RandomGeometry random(1);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d p_m = random.between(0.3, 3.0) * random.direction();
-    const Eigen::Matrix3d field = dipoleField(p_m, 1.0) + 0.1 / std::pow(p_m.norm(), 3) * random.matrix();
-    const Eigen::Vector3d expected_m = solvePose(field, 1.0, p_m).value().tracker_from_sensor.position_m;
-    FT_VERIFY_MATCH(near(solvedPosition_m(field, p_m), expected_m, 1e-11));
-    FT_VERIFY_MATCH(near(solvedPosition_m(field, -p_m), Eigen::Vector3d(-expected_m), 1e-11));
+    const Eigen::Matrix3d field = field::dipoleField(p_m, 1.0) + 0.1 / std::pow(p_m.norm(), 3) * random.matrix();
+    const Eigen::Vector3d expected_m = field::solvePose(field, 1.0, p_m).value().tracker_from_sensor.position_m;
+    FT_VERIFY_MATCH(near(field::solvedPosition_m(field, p_m), expected_m, 1e-11));
+    FT_VERIFY_MATCH(near(field::solvedPosition_m(field, -p_m), Eigen::Vector3d(-expected_m), 1e-11));
   }
 }
 
@@ -147,14 +151,14 @@ void HarmonicFieldTest::differentiatesTheSolution() {
   RandomGeometry random(2);
   for (int i = 0; i < 50; ++i) {
     const Eigen::Vector3d p_m = random.between(0.5, 2.0) * random.direction();
-    const Eigen::Matrix3d field = dipoleField(p_m, 1.0) + 0.1 / std::pow(p_m.norm(), 3) * random.matrix();
-    const PositionDerivative derivative = solvedPositionDerivative(field, p_m);
+    const Eigen::Matrix3d field = field::dipoleField(p_m, 1.0) + 0.1 / std::pow(p_m.norm(), 3) * random.matrix();
+    const field::PositionDerivative derivative = field::solvedPositionDerivative(field, p_m);
     const double step = 1e-6 * field.norm();
     for (Eigen::Index element = 0; element < 9; ++element) {
       Eigen::Matrix3d change = Eigen::Matrix3d::Zero();
       change(element % 3, element / 3) = step;
       const Eigen::Vector3d expected =
-          (solvedPosition_m(field + change, p_m) - solvedPosition_m(field - change, p_m)) / (2.0 * step);
+          (field::solvedPosition_m(field + change, p_m) - field::solvedPosition_m(field - change, p_m)) / (2.0 * step);
       FT_VERIFY_MATCH(near(Eigen::Vector3d(derivative.col(element)), expected, 1e-6 * derivative.norm()));
     }
   }
@@ -195,9 +199,9 @@ void HarmonicFieldTest::followsTheFieldWithASource() {
 // (q^2/s - 6)/2 - 3 log(q^2 / (6 s)): for s = 10 and q^2 = 300 that is 12 - 3 log 5 = 7.1717.
 void HarmonicFieldTest::addsAGroupByItsEvidence() {
   const GroupedSystem system = twoGroups(10.0, std::sqrt(300.0));
-  SelectionOptions options;
+  GroupSelectionOptions options;
   options.least_gain = 7.05;  // The variance is looked for in quarter decades, which costs up to a tenth.
-  const Selection chosen = selectGroups(system, options, {});
+  const GroupSelection chosen = selectGroups(system, options, {});
   QCOMPARE(chosen.groups.size(), std::size_t{1});
   QCOMPARE(chosen.groups.front(), Eigen::Index{1});
   // MacKay's fixed point is the greatest evidence: v = (5 - 1)/10, shrinking q/s by v s / (1 + v s) = 0.8.
@@ -321,5 +325,5 @@ void HarmonicFieldTest::stops() {
   QVERIFY(!model && model.error().code == ErrorCode::kCancelled);
 }
 
-QTEST_GUILESS_MAIN(HarmonicFieldTest)
+FIELDTRUE_TEST(HarmonicFieldTest)
 #include "harmonic_field_test.moc"

@@ -4,10 +4,13 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/core/pose.h"
+#include "calib/correctors/base/method.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -138,5 +141,5 @@ class HmqHoldOutTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(HmqHoldOutTest)
+FIELDTRUE_TEST(HmqHoldOutTest)
 #include "hmq_hold_out_test.moc"

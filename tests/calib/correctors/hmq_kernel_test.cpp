@@ -1,15 +1,17 @@
-#include "calib/correctors/hmq_kernel.h"
+#include "calib/correctors/multiquadric/hmq_kernel.h"
 
 #include <QTest>
 #include <cmath>
 #include <random>
 #include <vector>
 
-#include "calib/correctors/hmq_field.h"
+#include "calib/correctors/multiquadric/hmq_field.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -186,7 +188,8 @@ class HmqKernelTest : public QObject {
     Eigen::MatrixXd truth(static_cast<Eigen::Index>(data.size()), 3);
     for (std::size_t i = 0; i < data.size(); ++i)
       truth.row(static_cast<Eigen::Index>(i)) = data.p_true_m[i].transpose();
-    const auto field = MultiquadricField::fit("Multiquadric", data.p_tracked_m, data.node, truth, 1e-4 * r2_cm2, {});
+    const auto field =
+        MultiquadricField::fit("Multiquadric", data.p_tracked_m, data.node, data.index, truth, 1e-4 * r2_cm2, {});
     FT_VERIFY_OK(field);
     Drawn fitted;
     for (std::size_t j = 0; j < field->size(); ++j) {
@@ -209,5 +212,5 @@ class HmqKernelTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(HmqKernelTest)
+FIELDTRUE_TEST(HmqKernelTest)
 #include "hmq_kernel_test.moc"

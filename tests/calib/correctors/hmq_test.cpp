@@ -4,10 +4,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/correctors/base/method.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -125,7 +128,7 @@ class HmqTest : public QObject {
     const auto model = fitPosition("hmq", data);
     QVERIFY(!model);
     QCOMPARE(model.error().code, ErrorCode::kDegenerate);
-    FT_VERIFY_MATCH(holdsAll(model.error().message, {"places 11 and 30", "same position"}));
+    FT_VERIFY_MATCH(holdsAll(model.error().message, {"A4, pipe 3 and C3, pipe 1", "same position"}));
   }
 
   void placesTooCloseForTheirSmoothnessAreRefused() {
@@ -214,5 +217,5 @@ class HmqTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(HmqTest)
+FIELDTRUE_TEST(HmqTest)
 #include "hmq_test.moc"

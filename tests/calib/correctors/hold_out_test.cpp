@@ -2,10 +2,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/correctors/base/method.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -232,5 +235,5 @@ class HoldOutTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(HoldOutTest)
+FIELDTRUE_TEST(HoldOutTest)
 #include "hold_out_test.moc"

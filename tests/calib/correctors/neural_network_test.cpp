@@ -3,11 +3,14 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "calib/correctors/neural_network_training.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/network/neural_network_training.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -256,5 +259,5 @@ class NeuralNetworkTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(NeuralNetworkTest)
+FIELDTRUE_TEST(NeuralNetworkTest)
 #include "neural_network_test.moc"

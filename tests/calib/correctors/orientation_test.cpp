@@ -1,10 +1,13 @@
 #include <QTest>
 #include <cmath>
 
+#include "calib/correctors/base/method.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -118,5 +121,5 @@ class OrientationTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(OrientationTest)
+FIELDTRUE_TEST(OrientationTest)
 #include "orientation_test.moc"

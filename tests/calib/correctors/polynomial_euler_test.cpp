@@ -4,8 +4,10 @@
 
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -125,9 +127,9 @@ class PolynomialEulerTest : public QObject {
     QVERIFY(!model);
     QCOMPARE(model.error().code, ErrorCode::kDegenerate);
     FT_VERIFY_MATCH(
-        holdsAll(model.error().message, {"Euler polynomial", "place ", "degrees in elevation", "quaternions"}));
+        holdsAll(model.error().message, {"Euler polynomial", ", pipe ", "degrees in elevation", "quaternions"}));
   }
 };
 
-QTEST_GUILESS_MAIN(PolynomialEulerTest)
+FIELDTRUE_TEST(PolynomialEulerTest)
 #include "polynomial_euler_test.moc"

@@ -2,11 +2,13 @@
 #include <QTest>
 #include <cmath>
 
-#include "calib/correctors/polynomial_field.h"
+#include "calib/correctors/polynomial/polynomial_field.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -175,5 +177,5 @@ class PolynomialTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(PolynomialTest)
+FIELDTRUE_TEST(PolynomialTest)
 #include "polynomial_test.moc"

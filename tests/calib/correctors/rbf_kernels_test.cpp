@@ -1,4 +1,4 @@
-#include "calib/correctors/rbf_kernels.h"
+#include "calib/correctors/radial/rbf_kernels.h"
 
 #include <QTest>
 #include <cmath>
@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -124,5 +126,5 @@ class RbfKernelsTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(RbfKernelsTest)
+FIELDTRUE_TEST(RbfKernelsTest)
 #include "rbf_kernels_test.moc"

@@ -1,17 +1,19 @@
-#include "calib/correctors/rbf_system.h"
+#include "calib/correctors/radial/rbf_system.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <QTest>
 #include <cmath>
 
-#include "calib/correctors/dense_solver.h"
-#include "calib/correctors/rbf_tuning.h"
+#include "calib/correctors/numerics/dense_solver.h"
+#include "calib/correctors/radial/rbf_tuning.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -320,5 +322,5 @@ class RbfSystemTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(RbfSystemTest)
+FIELDTRUE_TEST(RbfSystemTest)
 #include "rbf_system_test.moc"

@@ -2,12 +2,14 @@
 #include <QTest>
 #include <cmath>
 
-#include "calib/correctors/regrid_error.h"
-#include "calib/correctors/surrounding_tetrahedron.h"
+#include "calib/correctors/regrid/regrid_error.h"
+#include "calib/correctors/regrid/surrounding_tetrahedron.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -240,5 +242,5 @@ class RegridTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(RegridTest)
+FIELDTRUE_TEST(RegridTest)
 #include "regrid_test.moc"

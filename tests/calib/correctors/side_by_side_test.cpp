@@ -3,8 +3,10 @@
 #include <thread>
 
 #include "tests/calib/correctors/fit_fixtures.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -46,5 +48,5 @@ class SideBySideTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(SideBySideTest)
+FIELDTRUE_TEST(SideBySideTest)
 #include "side_by_side_test.moc"

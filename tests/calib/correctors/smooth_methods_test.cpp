@@ -3,11 +3,14 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/core/settings.h"
+#include "calib/correctors/base/method.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -237,5 +240,5 @@ class SmoothMethodsTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(SmoothMethodsTest)
+FIELDTRUE_TEST(SmoothMethodsTest)
 #include "smooth_methods_test.moc"

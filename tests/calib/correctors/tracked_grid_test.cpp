@@ -1,11 +1,13 @@
-#include "calib/correctors/tracked_grid.h"
+#include "calib/correctors/cells/tracked_grid.h"
 
 #include <QTest>
 
 #include "tests/calib/correctors/cell_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::correctors;
 using namespace fieldtrue::testing;
 
 class TrackedGridTest : public QObject {
@@ -108,5 +110,5 @@ class TrackedGridTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(TrackedGridTest)
+FIELDTRUE_TEST(TrackedGridTest)
 #include "tracked_grid_test.moc"

@@ -7,8 +7,10 @@
 #include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::holdsAll;
 using fieldtrue::testing::made;
 using fieldtrue::testing::near;
@@ -18,8 +20,8 @@ namespace {
 
 nlohmann::json jsonOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-std::unique_ptr<CouplingDistortion> loopAt(const Eigen::Vector3d& center_m, const Eigen::Vector3d& normal,
-                                           double radius_m) {
+std::unique_ptr<field::CouplingDistortion> loopAt(const Eigen::Vector3d& center_m, const Eigen::Vector3d& normal,
+                                                  double radius_m) {
   return made("closed_loop", {{"center_m", jsonOf(center_m)}, {"normal", jsonOf(normal)}, {"radius_m", radius_m}});
 }
 
@@ -94,8 +96,8 @@ void ClosedLoopTest::isADipoleFarAway() {
   const auto loop =
       made("closed_loop",
            {{"center_m", jsonOf(center_m)}, {"normal", jsonOf(n)}, {"radius_m", 0.05}, {"wire_radius_m", 0.001}});
-  const Eigen::Matrix3d expected =
-      dipoleField(p_m - center_m, 1.0 / (4.0 * std::numbers::pi)) * polarizability_m3 * dipoleField(center_m, 1.0);
+  const Eigen::Matrix3d expected = field::dipoleField(p_m - center_m, 1.0 / (4.0 * std::numbers::pi)) *
+                                   polarizability_m3 * field::dipoleField(center_m, 1.0);
   FT_VERIFY_MATCH(near((loop->fieldChange(p_m, 1.0, 0.0) - expected).norm() / expected.norm(), 0.0, 1e-3));
 }
 
@@ -140,18 +142,19 @@ void ClosedLoopTest::answersByItsStrength() {
 // metal sphere of 31 cm, of which 0.995 is in phase, and on pulsed direct current is gone after about a millisecond.
 void ClosedLoopTest::copperCableIsAsStrongAsTabulated() {
   const Eigen::Vector3d center_m(0.0, 0.0, 20.0);
-  const auto along_m3 = [&](const Excitation& excitation) {
+  const auto along_m3 = [&](const field::Excitation& excitation) {
     const auto loop = makeEffect(
         "closed_loop",
         {{"center_m", {0.0, 0.0, 20.0}}, {"radius_m", 0.5}, {"wire_radius_m", 0.001}, {"conductivity_s_per_m", 5.8e7}},
         excitation);
-    SensorSetting setting;
+    field::SensorSetting setting;
     setting.tracker_from_sensor.position_m = {0.0, 0.0, 40.0};
-    const double unit = dipoleField(center_m, 1.0)(2, 2) * dipoleField(center_m, 0.25 / std::numbers::pi)(2, 2);
+    const double unit =
+        field::dipoleField(center_m, 1.0)(2, 2) * field::dipoleField(center_m, 0.25 / std::numbers::pi)(2, 2);
     return loop.value()->at(setting).field_per_m3(2, 2) / unit;
   };
-  FT_VERIFY_MATCH(near(along_m3(Excitation{false, 1e4, 0.0}), -0.195, 0.001));
-  FT_VERIFY_MATCH(near(along_m3(Excitation{true, 0.0, 1e-3}) / -0.196, 0.013, 0.002));
+  FT_VERIFY_MATCH(near(along_m3(field::Excitation{false, 1e4, 0.0}), -0.195, 0.001));
+  FT_VERIFY_MATCH(near(along_m3(field::Excitation{true, 0.0, 1e-3}) / -0.196, 0.013, 0.002));
 }
 
 void ClosedLoopTest::leavesNoRoomInTheWire() {
@@ -174,5 +177,5 @@ void ClosedLoopTest::refusesWhatMakesNoSense() {
   FT_VERIFY_MATCH(holdsAll(around.error().message, {"transmitter", "wire"}));
 }
 
-QTEST_GUILESS_MAIN(ClosedLoopTest)
+FIELDTRUE_TEST(ClosedLoopTest)
 #include "closed_loop_test.moc"

@@ -1,13 +1,14 @@
-#include "calib/effects/coil_gain.h"
-
 #include <QTest>
 #include <cmath>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::couplingsWith;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::holdsAll;
@@ -32,7 +33,7 @@ void CoilGainTest::scalesColumnsAndRows() {
   const Eigen::Vector3d g(0.02, -0.01, 0.03);
   for (int i = 0; i < 50; ++i) {
     const Pose pose = random.poseInShell(0.3, 3.0);
-    const Eigen::Matrix3d S = couplings(dipoleField(pose.position_m, 1.0), pose.orientation);
+    const Eigen::Matrix3d S = field::couplings(field::dipoleField(pose.position_m, 1.0), pose.orientation);
     const Eigen::Matrix3d gains = Eigen::Matrix3d::Identity() + Eigen::Matrix3d(g.asDiagonal());
     const auto transmitter = effectOf("coil_gain", {{"transmitter_gain", {0.02, -0.01, 0.03}}});
     const auto receiver = effectOf("coil_gain", {{"receiver_gain", {0.02, -0.01, 0.03}}});
@@ -73,5 +74,5 @@ void CoilGainTest::doubtsAGainNoTrackerHas() {
   FT_VERIFY_MATCH(holdsAll(fitted.doubt, {"receiver gain y of -40 %", "-10 % to 10 %"}));
 }
 
-QTEST_GUILESS_MAIN(CoilGainTest)
+FIELDTRUE_TEST(CoilGainTest)
 #include "coil_gain_test.moc"

@@ -1,13 +1,14 @@
-#include "calib/effects/coil_nonorthogonality.h"
-
 #include <QTest>
 #include <cmath>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::couplingsWith;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::near;
@@ -32,7 +33,7 @@ void CoilNonorthogonalityTest::mixesTheCoilsOfAPair() {
   QVERIFY(std::abs(std::acos(mixing.col(0).dot(mixing.col(1))) - (std::acos(0.0) - 0.02)) < 1e-3);
   for (int i = 0; i < 50; ++i) {
     const Pose pose = random.poseInShell(0.3, 3.0);
-    const Eigen::Matrix3d S = couplings(dipoleField(pose.position_m, 1.0), pose.orientation);
+    const Eigen::Matrix3d S = field::couplings(field::dipoleField(pose.position_m, 1.0), pose.orientation);
     const auto transmitter = effectOf("coil_nonorthogonality", {{"transmitter_rad", {0.01, -0.02, 0.03}}});
     const auto receiver = effectOf("coil_nonorthogonality", {{"receiver_rad", {0.01, -0.02, 0.03}}});
     FT_VERIFY_MATCH(near((couplingsWith(*transmitter, settingAt(pose)) - S * mixing).norm() / S.norm(), 0.0, 1e-12));
@@ -63,5 +64,5 @@ void CoilNonorthogonalityTest::turnsAReadingAsWorkedByHand() {
   FT_VERIFY_MATCH(near(rotationVector_rad(seen.orientation), Eigen::Vector3d(0.0, 0.0, turn_share * e_rad), 2e-7));
 }
 
-QTEST_GUILESS_MAIN(CoilNonorthogonalityTest)
+FIELDTRUE_TEST(CoilNonorthogonalityTest)
 #include "coil_nonorthogonality_test.moc"

@@ -10,8 +10,10 @@
 #include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::made;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
@@ -79,12 +81,12 @@ void CompactMetalTest::conductorLetsNoFieldThroughItsSurface() {
   const Eigen::Vector3d center_m(6.0, -5.0, 6.0);
   const double radius_m = 0.1;
   const auto metal = made("compact_metal", {{"center_m", {6.0, -5.0, 6.0}}, {"radius_m", radius_m}});
-  const double field = dipoleField(center_m, 1.0).norm();
+  const double field = field::dipoleField(center_m, 1.0).norm();
   RandomGeometry random(1);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d n = random.direction();
     const Eigen::Vector3d p_m = center_m + radius_m * n;
-    const Eigen::Matrix3d total = dipoleField(p_m, 1.0) + metal->fieldChange(p_m, 1.0, 0.0);
+    const Eigen::Matrix3d total = field::dipoleField(p_m, 1.0) + metal->fieldChange(p_m, 1.0, 0.0);
     FT_VERIFY_MATCH(near((n.transpose() * total).norm() / field, 0.0, 0.05));
   }
 }
@@ -97,12 +99,12 @@ void CompactMetalTest::ferromagnetTakesTheFieldAtRightAngles() {
                                             {"radius_m", radius_m},
                                             {"material", "ferromagnetic"},
                                             {"relative_permeability", 1e6}});
-  const double field = dipoleField(center_m, 1.0).norm();
+  const double field = field::dipoleField(center_m, 1.0).norm();
   RandomGeometry random(2);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d n = random.direction();
     const Eigen::Vector3d p_m = center_m + radius_m * n;
-    const Eigen::Matrix3d total = dipoleField(p_m, 1.0) + metal->fieldChange(p_m, 1.0, 0.0);
+    const Eigen::Matrix3d total = field::dipoleField(p_m, 1.0) + metal->fieldChange(p_m, 1.0, 0.0);
     const Eigen::Matrix3d tangential = total - n * (n.transpose() * total);
     FT_VERIFY_MATCH(near(tangential.norm() / field, 0.0, 0.05));
   }
@@ -204,19 +206,19 @@ void CompactMetalTest::growsAndFallsWithTheDistances() {
 // A = (4/3) pi a^3 chi, chi of the table by Wait's formula: aluminium of 5 cm -1.46 at 10 kHz, steel -0.63; at rest
 // nothing and 2.91.
 void CompactMetalTest::answersTheCarrierAndTheDelay() {
-  const auto chi = [](const nlohmann::json& parameters, const Excitation& excitation) {
+  const auto chi = [](const nlohmann::json& parameters, const field::Excitation& excitation) {
     const Eigen::Vector3d center_m(1.0, 0.0, -1.0);
     const auto effect = makeEffect("compact_metal", parameters, excitation);
-    SensorSetting setting;
+    field::SensorSetting setting;
     setting.tracker_from_sensor.position_m = {1.5, 0.2, 0.1};
-    const Eigen::Matrix3d unit =
-        dipoleField(setting.tracker_from_sensor.position_m - center_m, 1.0) * dipoleField(center_m, 0.000125 / 3.0);
+    const Eigen::Matrix3d unit = field::dipoleField(setting.tracker_from_sensor.position_m - center_m, 1.0) *
+                                 field::dipoleField(center_m, 0.000125 / 3.0);
     return effect.value()->at(setting).field_per_m3(0, 0) / unit(0, 0);
   };
   const nlohmann::json aluminium{{"radius_m", 0.05}, {"conductivity_s_per_m", 3.5e7}};
   nlohmann::json steel{{"radius_m", 0.05}, {"conductivity_s_per_m", 6e6}, {"material", "ferromagnetic"}};
-  const Excitation carrier{false, 1e4, 0.0};
-  const Excitation late{true, 0.0, 10.0};
+  const field::Excitation carrier{false, 1e4, 0.0};
+  const field::Excitation late{true, 0.0, 10.0};
   FT_VERIFY_MATCH(near(chi(aluminium, carrier), -1.46, 0.006));
   FT_VERIFY_MATCH(near(chi(steel, carrier), -0.63, 0.006));
   FT_VERIFY_MATCH(near(chi(aluminium, late), 0.0, 1e-6));
@@ -251,5 +253,5 @@ void CompactMetalTest::refusesATransmitterInside() {
   FT_VERIFY_MATCH(testing::holdsAll(metal.error().message, {"compact_metal", "center_m", "(0.1, 0, 0)", "0.2 m"}));
 }
 
-QTEST_GUILESS_MAIN(CompactMetalTest)
+FIELDTRUE_TEST(CompactMetalTest)
 #include "compact_metal_test.moc"

@@ -5,12 +5,15 @@
 #include <limits>
 #include <set>
 
+#include "calib/effects/effect_row.h"
 #include "calib/effects/registry.h"
 #include "tests/calib/effects/fit_designs.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::fourTurns;
 using fieldtrue::testing::gridDesign;
 using fieldtrue::testing::near;
@@ -18,7 +21,7 @@ using fieldtrue::testing::OwnedDesign;
 using fieldtrue::testing::RandomGeometry;
 using fieldtrue::testing::scatteredDesign;
 
-Q_DECLARE_METATYPE(const fieldtrue::Effect*)
+Q_DECLARE_METATYPE(const fieldtrue::effects::Effect*)
 
 namespace {
 
@@ -47,20 +50,20 @@ std::vector<Eigen::VectorXd> allowedStarts(const EffectFit& way) {
 }
 
 /// Filled with what must be overwritten.
-std::vector<EffectResponse> emptyResponses(std::size_t count) {
-  EffectResponse nan;
+std::vector<field::EffectResponse> emptyResponses(std::size_t count) {
+  field::EffectResponse nan;
   nan.shift_m.setConstant(std::numeric_limits<double>::quiet_NaN());
   nan.turn_rad.setConstant(std::numeric_limits<double>::quiet_NaN());
   nan.field_per_m3.setConstant(std::numeric_limits<double>::quiet_NaN());
-  return std::vector<EffectResponse>(count, nan);
+  return std::vector<field::EffectResponse>(count, nan);
 }
 
-bool isFinite(const EffectResponse& response) {
+bool isFinite(const field::EffectResponse& response) {
   return response.shift_m.allFinite() && response.turn_rad.allFinite() && response.field_per_m3.allFinite();
 }
 
 /// All 15 numbers of a response.
-Eigen::Matrix<double, 15, 1> numbers(const EffectResponse& response) {
+Eigen::Matrix<double, 15, 1> numbers(const field::EffectResponse& response) {
   Eigen::Matrix<double, 15, 1> all;
   all << response.shift_m, response.turn_rad, response.field_per_m3.reshaped();
   return all;
@@ -105,7 +108,7 @@ class EffectFitContractTest : public QObject {
 void EffectFitContractTest::rows() {
   QTest::addColumn<const Effect*>("effect");
   QTest::addColumn<QString>("design_name");
-  for (const Effect& effect : effects()) {
+  for (const Effect& effect : effects::effects()) {
     if (effect.fits == nullptr) continue;
     for (const char* design : {"grid", "grid, four turns, times", "scattered", "scattered, positions only"}) {
       QTest::addRow("%s, %s", effect.id.c_str(), design) << &effect << QString(design);
@@ -118,7 +121,7 @@ void EffectFitContractTest::fitsEveryEffectThatMeansShow() {
   const std::set<std::string> shown_by_samples{"mains_interference", "range_noise", "correlated_samples",
                                                "quantization", "hemisphere_flip"};
   const OwnedDesign rich = designOf("grid, four turns, times");
-  for (const Effect& effect : effects()) {
+  for (const Effect& effect : effects::effects()) {
     QCOMPARE(effect.fits == nullptr, shown_by_samples.contains(effect.id));
     if (effect.fits != nullptr) QVERIFY2(!effect.fits(rich.design).empty(), effect.id.c_str());
   }
@@ -162,7 +165,7 @@ void EffectFitContractTest::respondsEverywhereItMayStart() {
   for (const auto& way : effect->fits(owned.design)) {
     const std::size_t count = way->linear().size();
     for (const Eigen::VectorXd& start : allowedStarts(*way)) {
-      std::vector<EffectResponse> responses = emptyResponses(owned.settings.size() * count);
+      std::vector<field::EffectResponse> responses = emptyResponses(owned.settings.size() * count);
       way->respond(owned.settings, start, responses);
       const bool all_finite = std::all_of(responses.begin(), responses.end(), isFinite);
       QVERIFY2(all_finite, (effect->id + " " + way->name()).c_str());
@@ -190,7 +193,7 @@ void EffectFitContractTest::makesTheSceneThatItFitted() {
       const FittedEffect fitted = way->describe(starts[which], linear);
       const auto made = makeEffect(effect->id, fitted.parameters, owned.design.excitation);
       FT_VERIFY_OK(made);
-      std::vector<EffectResponse> responses = emptyResponses(owned.settings.size() * count);
+      std::vector<field::EffectResponse> responses = emptyResponses(owned.settings.size() * count);
       way->respond(owned.settings, starts[which], responses);
       double difference = 0.0;
       double size = 0.0;
@@ -242,5 +245,5 @@ void EffectFitContractTest::leavesOutWhatADesignCannotShow() {
   QCOMPARE(findEffect("sensor_offset").value()->fits(blind.design).size(), std::size_t{1});
 }
 
-QTEST_GUILESS_MAIN(EffectFitContractTest)
+FIELDTRUE_TEST(EffectFitContractTest)
 #include "effect_fit_contract_test.moc"

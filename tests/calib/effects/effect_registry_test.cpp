@@ -5,16 +5,19 @@
 #include <set>
 
 #include "calib/effects/effect_listing.h"
+#include "calib/effects/effect_row.h"
 #include "calib/effects/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::holdsAll;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
-Q_DECLARE_METATYPE(const fieldtrue::Effect*)
+Q_DECLARE_METATYPE(const fieldtrue::effects::Effect*)
 
 namespace {
 
@@ -22,12 +25,12 @@ nlohmann::json defaultsOf(const Effect& effect) {
   return resolveEffectParameters(effect, nlohmann::json::object()).value();
 }
 
-std::unique_ptr<PhysicalEffect> madeByDefault(const Effect& effect) {
+std::unique_ptr<field::PhysicalEffect> madeByDefault(const Effect& effect) {
   return std::move(makeEffect(effect.id, nlohmann::json::object()).value());
 }
 
 /// Places in the open, away from the effect's metal at its defaults.
-std::vector<Eigen::Vector3d> openPlaces_m(const PhysicalEffect& effect) {
+std::vector<Eigen::Vector3d> openPlaces_m(const field::PhysicalEffect& effect) {
   RandomGeometry random(1);
   std::vector<Eigen::Vector3d> places_m;
   while (places_m.size() < 50) {
@@ -40,7 +43,7 @@ std::vector<Eigen::Vector3d> openPlaces_m(const PhysicalEffect& effect) {
 }
 
 /// Derivative of the field change along an axis.
-Eigen::Matrix3d slope(const CouplingDistortion& distortion, const Eigen::Vector3d& p_m, int axis) {
+Eigen::Matrix3d slope(const field::CouplingDistortion& distortion, const Eigen::Vector3d& p_m, int axis) {
   constexpr double kStep_m = 1e-4;
   const Eigen::Vector3d step_m = kStep_m * Eigen::Vector3d::Unit(axis);
   return (distortion.fieldChange(p_m + step_m, 1.0, 0.0) - distortion.fieldChange(p_m - step_m, 1.0, 0.0)) /
@@ -75,7 +78,7 @@ class EffectRegistryTest : public QObject {
 
 void EffectRegistryTest::rows() {
   QTest::addColumn<const Effect*>("effect");
-  for (const Effect& effect : effects()) QTest::newRow(effect.id.c_str()) << &effect;
+  for (const Effect& effect : effects::effects()) QTest::newRow(effect.id.c_str()) << &effect;
 }
 
 void EffectRegistryTest::describesEveryParameter() {
@@ -116,11 +119,11 @@ void EffectRegistryTest::isFiniteLinearAndRepeatable() {
   QFETCH(const Effect*, effect);
   const auto first = madeByDefault(*effect);
   const auto again = madeByDefault(*effect);
-  const auto* distortion = dynamic_cast<const CouplingDistortion*>(first.get());
+  const auto* distortion = dynamic_cast<const field::CouplingDistortion*>(first.get());
   for (const Eigen::Vector3d& p_m : openPlaces_m(*first)) {
-    const SensorSetting setting{{p_m, rotationFromVector(p_m)}, {}, std::nullopt, 100.0};
-    const EffectResponse response = first->at(setting);
-    const EffectResponse repeated = again->at(setting);
+    const field::SensorSetting setting{{p_m, rotationFromVector(p_m)}, {}, std::nullopt, 100.0};
+    const field::EffectResponse response = first->at(setting);
+    const field::EffectResponse repeated = again->at(setting);
     QVERIFY(response.field_per_m3.allFinite() && response.shift_m.allFinite() && response.turn_rad.allFinite());
     QVERIFY(response.field_per_m3 == repeated.field_per_m3 && response.shift_m == repeated.shift_m);
     QVERIFY(first->interference_per_m3(0.3).allFinite());
@@ -134,8 +137,8 @@ void EffectRegistryTest::isFiniteLinearAndRepeatable() {
 
 void EffectRegistryTest::makesAFieldWithoutSourcesInTheRoom_data() {
   QTest::addColumn<const Effect*>("effect");
-  for (const Effect& effect : effects()) {
-    const bool is_of_the_room = dynamic_cast<const CouplingDistortion*>(madeByDefault(effect).get()) != nullptr;
+  for (const Effect& effect : effects::effects()) {
+    const bool is_of_the_room = dynamic_cast<const field::CouplingDistortion*>(madeByDefault(effect).get()) != nullptr;
     if (is_of_the_room) QTest::newRow(effect.id.c_str()) << &effect;
   }
 }
@@ -145,7 +148,7 @@ void EffectRegistryTest::makesAFieldWithoutSourcesInTheRoom_data() {
 void EffectRegistryTest::makesAFieldWithoutSourcesInTheRoom() {
   QFETCH(const Effect*, effect);
   const auto made = madeByDefault(*effect);
-  const auto* distortion = dynamic_cast<const CouplingDistortion*>(made.get());
+  const auto* distortion = dynamic_cast<const field::CouplingDistortion*>(made.get());
   QVERIFY(distortion != nullptr);
   for (const Eigen::Vector3d& p_m : openPlaces_m(*distortion)) {
     const Eigen::Matrix3d d[3] = {slope(*distortion, p_m, 0), slope(*distortion, p_m, 1), slope(*distortion, p_m, 2)};
@@ -235,5 +238,5 @@ void EffectRegistryTest::acceptsAMatrixEitherWay() {
   QCOMPARE(rows->at("polarizability_m3").size(), std::size_t{9});
 }
 
-QTEST_GUILESS_MAIN(EffectRegistryTest)
+FIELDTRUE_TEST(EffectRegistryTest)
 #include "effect_registry_test.moc"

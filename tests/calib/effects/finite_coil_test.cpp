@@ -1,15 +1,16 @@
-#include "calib/effects/finite_coil.h"
-
 #include <QTest>
 #include <cmath>
 #include <numbers>
 
 #include "calib/effects/registry.h"
+#include "calib/effects/rows.h"
 #include "calib/field/pose_solver.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
@@ -17,7 +18,7 @@ namespace {
 
 Eigen::Matrix3d changeAt(const Pose& tracker_from_sensor, const nlohmann::json& parameters) {
   const auto effect = makeEffect("finite_coil", parameters);
-  SensorSetting setting;
+  field::SensorSetting setting;
   setting.tracker_from_sensor = tracker_from_sensor;
   return effect.value()->at(setting).field_per_m3;
 }
@@ -78,10 +79,10 @@ void FiniteCoilTest::receiverReadsTheMeanFieldOverItsDisc() {
         const double angle = 2.0 * std::numbers::pi * j / kAngles;
         const Eigen::Vector3d from_m =
             rho_m * (std::cos(angle) * R.col((axis + 1) % 3) + std::sin(angle) * R.col((axis + 2) % 3));
-        mean += R.col(axis).transpose() * dipoleField(pose.position_m + from_m, 1.0) / (kRings * kAngles);
+        mean += R.col(axis).transpose() * field::dipoleField(pose.position_m + from_m, 1.0) / (kRings * kAngles);
       }
     }
-    const Eigen::RowVector3d dipole = R.col(axis).transpose() * dipoleField(pose.position_m, 1.0);
+    const Eigen::RowVector3d dipole = R.col(axis).transpose() * field::dipoleField(pose.position_m, 1.0);
     FT_VERIFY_MATCH(near((mean - dipole - change.row(axis)).norm() / change.row(axis).norm(), 0.0, 2e-3));
   }
 }
@@ -122,8 +123,8 @@ void FiniteCoilTest::squareHasTheSecondMomentOfItsRing() {
 void FiniteCoilTest::errsAsItsSizeSquaredOverRange() {
   const auto error_m = [](const Eigen::Vector3d& p_m, double radius_m) {
     const Eigen::Matrix3d field =
-        dipoleField(p_m, 1.0) + changeAt({p_m, Eigen::Quaterniond::Identity()}, rings("transmitter", radius_m));
-    return Eigen::Vector3d(solvePose(field, 1.0, p_m)->tracker_from_sensor.position_m - p_m);
+        field::dipoleField(p_m, 1.0) + changeAt({p_m, Eigen::Quaterniond::Identity()}, rings("transmitter", radius_m));
+    return Eigen::Vector3d(field::solvePose(field, 1.0, p_m)->tracker_from_sensor.position_m - p_m);
   };
   const Eigen::Vector3d p_m(0.6, 0.3, -0.2);
   FT_VERIFY_MATCH(near(error_m(p_m, 0.02).norm() / error_m(p_m, 0.01).norm(), 4.0, 0.02));
@@ -145,5 +146,5 @@ void FiniteCoilTest::isFittedEitherWay() {
   QVERIFY(!inside_out.is_plausible && !inside_out.doubt.empty());
 }
 
-QTEST_GUILESS_MAIN(FiniteCoilTest)
+FIELDTRUE_TEST(FiniteCoilTest)
 #include "finite_coil_test.moc"

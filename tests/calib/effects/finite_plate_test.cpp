@@ -1,14 +1,15 @@
-#include "calib/effects/finite_plate.h"
-
 #include <QTest>
 #include <cmath>
 
 #include "calib/effects/compact_metal.h"
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::holdsAll;
 using fieldtrue::testing::made;
 using fieldtrue::testing::near;
@@ -18,7 +19,8 @@ namespace {
 
 nlohmann::json jsonOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-double apart(const CouplingDistortion& seen, const CouplingDistortion& expected, const Eigen::Vector3d& p_m) {
+double apart(const field::CouplingDistortion& seen, const field::CouplingDistortion& expected,
+             const Eigen::Vector3d& p_m) {
   const Eigen::Matrix3d wanted = expected.fieldChange(p_m, 1.0, 0.0);
   return (seen.fieldChange(p_m, 1.0, 0.0) - wanted).norm() / wanted.norm();
 }
@@ -122,11 +124,11 @@ void FinitePlateTest::doesNotCareWhichSideIsUp() {
 // side) (lowest mode of a thin square sheet), 0.19 ms in a foil of 0.1 mm and 0.6 m: gone after 2 ms.
 void FinitePlateTest::realMetalAnswersByCarrierAndDelay() {
   const Eigen::Vector3d p_m(1.2, 0.3, -0.2);
-  const auto plateOf = [&](double thickness_m, const Excitation& excitation) {
+  const auto plateOf = [&](double thickness_m, const field::Excitation& excitation) {
     return makeEffect("finite_plate", {{"conductivity_s_per_m", 3.5e7}, {"thickness_m", thickness_m}}, excitation);
   };
-  const auto change = [&](const Result<std::unique_ptr<PhysicalEffect>>& plate) {
-    SensorSetting setting;
+  const auto change = [&](const Result<std::unique_ptr<field::PhysicalEffect>>& plate) {
+    field::SensorSetting setting;
     setting.tracker_from_sensor.position_m = p_m;
     return Eigen::Matrix3d((*plate)->at(setting).field_per_m3);
   };
@@ -156,5 +158,5 @@ void FinitePlateTest::refusesWhatMakesNoSense() {
   FT_VERIFY_MATCH(holdsAll(messageOf({{"center_m", {0.1, 0.0, 0.0}}}), {"finite_plate", "transmitter"}));
 }
 
-QTEST_GUILESS_MAIN(FinitePlateTest)
+FIELDTRUE_TEST(FinitePlateTest)
 #include "finite_plate_test.moc"

@@ -10,15 +10,15 @@ namespace fieldtrue::testing {
 
 /// A design and the settings it points to.
 struct OwnedDesign {
-  std::vector<SensorSetting> settings;
-  FitDesign design;
+  std::vector<field::SensorSetting> settings;
+  effects::FitDesign design;
 };
 
 /// Where the rig stands in the designs below: shifted and turned, so that no axis of it is one of the tracker's.
 inline Pose rigInTracker() { return {{0.9, 0.05, -0.1}, rotationFromVector(Eigen::Vector3d(0.1, -0.2, 0.5))}; }
 
 inline void finish(OwnedDesign& owned, double pitch_m, bool has_times) {
-  FitDesign& design = owned.design;
+  effects::FitDesign& design = owned.design;
   design.pitch_m = pitch_m;
   for (std::size_t i = 0; i < owned.settings.size(); ++i) {
     owned.settings[i].time_s = has_times ? 20.0 + 6.0 * static_cast<double>(i) : 0.0;

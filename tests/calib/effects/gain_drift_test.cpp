@@ -1,13 +1,14 @@
-#include "calib/effects/gain_drift.h"
-
 #include <QTest>
 #include <cmath>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/fit_designs.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::gridDesign;
 using fieldtrue::testing::holdsAll;
@@ -22,8 +23,8 @@ namespace {
 const Pose kPlace{{1.2, -0.5, 0.3}, Eigen::Quaterniond::Identity()};
 
 /// Relative change of the couplings at a time.
-double gainAt(const PhysicalEffect& effect, double time_s) {
-  const Eigen::Matrix3d G = dipoleField(kPlace.position_m, 1.0);
+double gainAt(const field::PhysicalEffect& effect, double time_s) {
+  const Eigen::Matrix3d G = field::dipoleField(kPlace.position_m, 1.0);
   return effect.at(settingAt(kPlace, {}, time_s)).field_per_m3.cwiseProduct(G).sum() / G.squaredNorm();
 }
 
@@ -97,5 +98,5 @@ void GainDriftTest::isTriedFromShortToLongWarmUps() {
   }
 }
 
-QTEST_GUILESS_MAIN(GainDriftTest)
+FIELDTRUE_TEST(GainDriftTest)
 #include "gain_drift_test.moc"

@@ -1,13 +1,14 @@
-#include "calib/effects/global_gain.h"
-
 #include <QTest>
 #include <cmath>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
@@ -47,10 +48,10 @@ void GlobalGainTest::looksLikeALargerRig() {
   const auto larger = effectOf("grid_scale", {{"scale", {0.01, 0.01, 0.01}}});
   const auto weaker = effectOf("global_gain", {{"gain", std::pow(1.01, -3.0) - 1.0}});
   for (int i = 0; i < 20; ++i) {
-    const SensorSetting setting = settingAt(random.poseInShell(0.3, 3.0));
+    const field::SensorSetting setting = settingAt(random.poseInShell(0.3, 3.0));
     FT_VERIFY_MATCH(near(readingOf(*larger, setting), readingOf(*weaker, setting), 1e-10, 1e-8));
   }
 }
 
-QTEST_GUILESS_MAIN(GlobalGainTest)
+FIELDTRUE_TEST(GlobalGainTest)
 #include "global_gain_test.moc"

@@ -1,12 +1,13 @@
-#include "calib/effects/jig_layer_offset.h"
-
 #include <QTest>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/fit_designs.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::fourTurns;
 using fieldtrue::testing::gridDesign;
@@ -66,8 +67,8 @@ void JigLayerOffsetTest::findsTheLayersOfAGrid() {
 
 void JigLayerOffsetTest::takesVisitsOfOnePlaceAsOne() {
   OwnedDesign owned = gridDesign(fourTurns(), true, false);
-  std::vector<SensorSetting> columns;
-  for (const SensorSetting& setting : owned.settings) {
+  std::vector<field::SensorSetting> columns;
+  for (const field::SensorSetting& setting : owned.settings) {
     const bool is_on_a_pole = (*setting.index)[0] == 2 && (*setting.index)[1] < 2;
     if (is_on_a_pole) columns.push_back(setting);
   }
@@ -96,5 +97,5 @@ void JigLayerOffsetTest::refusesWhatMakesNoSense() {
   FT_VERIFY_MATCH(holdsAll(made.error().message, {"jig_layer_offset", fragment}));
 }
 
-QTEST_GUILESS_MAIN(JigLayerOffsetTest)
+FIELDTRUE_TEST(JigLayerOffsetTest)
 #include "jig_layer_offset_test.moc"

@@ -1,11 +1,12 @@
-#include "calib/effects/jig_tilt.h"
-
 #include <QTest>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::near;
 using fieldtrue::testing::settingAt;
@@ -29,7 +30,7 @@ class JigTiltTest : public QObject {
 void JigTiltTest::shearsByHeight() {
   const auto effect = effectOf("jig_tilt", {{"shear_rad", {0.01, 0.02, 0.03}}});
   const Pose place = turnedRig() * Pose{{0.1, 0.2, 0.5}, Eigen::Quaterniond::Identity()};
-  const EffectResponse response = effect->at(settingAt(place, turnedRig()));
+  const field::EffectResponse response = effect->at(settingAt(place, turnedRig()));
   FT_VERIFY_MATCH(near(response.shift_m, Eigen::Vector3d(-0.010, 0.011, 0.0), 1e-15));
   QCOMPARE(response.turn_rad.norm(), 0.0);
 }
@@ -38,12 +39,12 @@ void JigTiltTest::shearsByHeight() {
 // along (xz, yz, 1).
 void JigTiltTest::leansTheSensorWithItsPipe() {
   const auto effect = effectOf("jig_tilt", {{"shear_rad", {1e-4, -2e-4, 5e-3}}, {"turns_sensor", 1.0}});
-  const EffectResponse response = effect->at(settingAt(turnedRig(), turnedRig()));
+  const field::EffectResponse response = effect->at(settingAt(turnedRig(), turnedRig()));
   const Eigen::Quaterniond actual = rotationFromVector(response.turn_rad) * turnedRig().orientation;
   const Eigen::Vector3d axis_in_rig = turnedRig().orientation.conjugate() * (actual * Eigen::Vector3d::UnitZ());
   FT_VERIFY_MATCH(near(axis_in_rig, Eigen::Vector3d(1e-4, -2e-4, 1.0), 1e-7));
   QCOMPARE(response.shift_m.norm(), 0.0);
 }
 
-QTEST_GUILESS_MAIN(JigTiltTest)
+FIELDTRUE_TEST(JigTiltTest)
 #include "jig_tilt_test.moc"

@@ -1,14 +1,15 @@
-#include "calib/effects/mains_interference.h"
-
 #include <Eigen/QR>
 #include <QTest>
 #include <cmath>
 #include <numbers>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::holdsAll;
 using fieldtrue::testing::near;
@@ -18,7 +19,7 @@ namespace {
 constexpr int kReadings = 60;
 
 /// One coupling over 60 readings.
-Eigen::VectorXd seriesOf(const PhysicalEffect& effect, double rate_hz) {
+Eigen::VectorXd seriesOf(const field::PhysicalEffect& effect, double rate_hz) {
   Eigen::VectorXd series(kReadings);
   for (int i = 0; i < kReadings; ++i) series[i] = effect.interference_per_m3(i / rate_hz)(0, 1);
   return series;
@@ -119,5 +120,5 @@ void MainsInterferenceTest::refusesWhatMakesNoSense() {
   FT_VERIFY_MATCH(holdsAll(nowhere.error().message, {"direction is (0, 0, 0)"}));
 }
 
-QTEST_GUILESS_MAIN(MainsInterferenceTest)
+FIELDTRUE_TEST(MainsInterferenceTest)
 #include "mains_interference_test.moc"

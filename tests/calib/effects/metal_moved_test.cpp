@@ -1,21 +1,22 @@
-#include "calib/effects/metal_moved.h"
-
 #include <QTest>
 #include <algorithm>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::made;
 
 namespace {
 
 /// Forty places in a plane, one every ten seconds.
-std::vector<SensorSetting> places() {
-  std::vector<SensorSetting> settings;
+std::vector<field::SensorSetting> places() {
+  std::vector<field::SensorSetting> settings;
   for (int i = 0; i < 40; ++i) {
-    SensorSetting setting;
+    field::SensorSetting setting;
     setting.tracker_from_sensor.position_m = {0.8 + 0.15 * (i % 8), 0.15 * (i / 8), 0.0};
     setting.time_s = 10.0 * i;
     settings.push_back(setting);
@@ -23,13 +24,13 @@ std::vector<SensorSetting> places() {
   return settings;
 }
 
-FitDesign designOf(const std::vector<SensorSetting>& settings, bool has_times) {
+FitDesign designOf(const std::vector<field::SensorSetting>& settings, bool has_times) {
   FitDesign design;
   design.settings = settings;
   design.pitch_m = 0.15;
   design.has_times = has_times;
   design.end_s = 390.0;
-  for (const SensorSetting& setting : settings) design.places_m.extend(setting.tracker_from_sensor.position_m);
+  for (const field::SensorSetting& setting : settings) design.places_m.extend(setting.tracker_from_sensor.position_m);
   return design;
 }
 
@@ -67,14 +68,14 @@ void MetalMovedTest::isThereOnlyThen() {
 }
 
 void MetalMovedTest::isLookedForOnlyWithTimes() {
-  const std::vector<SensorSetting> settings = places();
+  const std::vector<field::SensorSetting> settings = places();
   const Effect& effect = *findEffect("metal_moved").value();
   QVERIFY(effect.fits(designOf(settings, false)).empty());
   QVERIFY(!effect.fits(designOf(settings, true)).empty());
 }
 
 void MetalMovedTest::looksForChangesThatBothSidesSpeakFor() {
-  const std::vector<SensorSetting> settings = places();
+  const std::vector<field::SensorSetting> settings = places();
   const auto ways = (*findEffect("metal_moved").value()).fits(designOf(settings, true));
   for (const auto& way : ways) {
     const std::vector<Eigen::VectorXd> starts = way->starts();
@@ -82,7 +83,7 @@ void MetalMovedTest::looksForChangesThatBothSidesSpeakFor() {
     for (Eigen::VectorXd start : starts) {
       QVERIFY(way->allows(start));
       const auto before = std::count_if(settings.begin(), settings.end(),
-                                        [&](const SensorSetting& setting) { return setting.time_s < start[3]; });
+                                        [&](const field::SensorSetting& setting) { return setting.time_s < start[3]; });
       QVERIFY(before >= 2 && before <= 38);
       start[3] = 5.0;
       QVERIFY(!way->allows(start));
@@ -92,5 +93,5 @@ void MetalMovedTest::looksForChangesThatBothSidesSpeakFor() {
   }
 }
 
-QTEST_GUILESS_MAIN(MetalMovedTest)
+FIELDTRUE_TEST(MetalMovedTest)
 #include "metal_moved_test.moc"

@@ -1,13 +1,14 @@
-#include "calib/effects/metal_plane.h"
-
 #include <QTest>
 #include <cmath>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::made;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
@@ -59,11 +60,11 @@ void MetalPlaneTest::satisfiesTheBoundaryCondition() {
                                             {"relative_permeability", kVeryPermeable}});
     const Eigen::Vector3d along_m = random.between(-2.0, 2.0) * n.unitOrthogonal();
     const Eigen::Vector3d p_m = distance_m * n + along_m;
-    const Eigen::Matrix3d total = dipoleField(p_m, 1.0) + plane->fieldChange(p_m, 1.0, 0.0);
+    const Eigen::Matrix3d total = field::dipoleField(p_m, 1.0) + plane->fieldChange(p_m, 1.0, 0.0);
     const Eigen::Matrix3d normal = n * (n.transpose() * total);
     const Eigen::Matrix3d vanishing = is_conductor ? normal : Eigen::Matrix3d(total - normal);
     FT_VERIFY_MATCH(near(vanishing.norm() / total.norm(), 0.0, is_conductor ? 1e-12 : 1e-5));
-    QVERIFY(total.norm() > 0.1 * dipoleField(p_m, 1.0).norm());
+    QVERIFY(total.norm() > 0.1 * field::dipoleField(p_m, 1.0).norm());
   }
 }
 
@@ -153,12 +154,12 @@ void MetalPlaneTest::growsAsPublished() {
 // Maxwell's receding image (Saslow 1992): 2 ms after the edge 1 mm of aluminium reflects as a perfect conductor whose
 // image is 9 cm deeper, that is, which itself is 4.5 cm farther; 20 um of foil reflect next to nothing.
 void MetalPlaneTest::sheetRecedesFromAPulsedTracker() {
-  SensorSetting setting;
+  field::SensorSetting setting;
   setting.tracker_from_sensor.position_m = {1.2, 0.3, 0.2};
-  const auto change = [&](const nlohmann::json& parameters, const Excitation& excitation) {
+  const auto change = [&](const nlohmann::json& parameters, const field::Excitation& excitation) {
     return Eigen::Matrix3d(makeEffect("metal_plane", parameters, excitation).value()->at(setting).field_per_m3);
   };
-  const Excitation pulsed{true, 0.0, 2e-3};
+  const field::Excitation pulsed{true, 0.0, 2e-3};
   const nlohmann::json sheet{{"distance_m", 1.0}, {"conductivity_s_per_m", 3.5e7}, {"thickness_m", 1e-3}};
   const nlohmann::json foil{{"distance_m", 1.0}, {"conductivity_s_per_m", 3.5e7}, {"thickness_m", 20e-6}};
   const Eigen::Matrix3d farther = change({{"distance_m", 1.0 + 0.5 * 0.09095}}, {});
@@ -181,5 +182,5 @@ void MetalPlaneTest::refusesNoDirection() {
   FT_VERIFY_MATCH(testing::holdsAll(plane.error().message, {"metal_plane", "toward", "(0, 0, 0)"}));
 }
 
-QTEST_GUILESS_MAIN(MetalPlaneTest)
+FIELDTRUE_TEST(MetalPlaneTest)
 #include "metal_plane_test.moc"

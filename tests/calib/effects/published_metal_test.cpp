@@ -3,36 +3,38 @@
 #include <numbers>
 
 #include "calib/effects/registry.h"
-#include "calib/field/coupling.h"
+#include "calib/field/dipole_field.h"
 #include "calib/field/metal_response.h"
 #include "calib/field/pose_solver.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 // What is reported of metal near alternating-current and pulsed direct-current trackers: Nixon, McCallum, Fright and
 // Price 1998, Presence 7 204, as told by Kindratenko 2000, Virtual Reality 5 169, section 2.2. The reports give no
 // sampling delay; the ones used here are stated with each test.
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::near;
 
 namespace {
 
-const Excitation kFastrak{false, 10016.0, 0.0};
+const field::Excitation kFastrak{false, 10016.0, 0.0};
 
-Excitation flock(double delay_s) { return {true, 0.0, delay_s}; }
+field::Excitation flock(double delay_s) { return {true, 0.0, delay_s}; }
 
 /// Position error of a tracker at the origin by one effect [m].
-double error_m(const std::string& id, const nlohmann::json& parameters, const Excitation& excitation,
+double error_m(const std::string& id, const nlohmann::json& parameters, const field::Excitation& excitation,
                const Eigen::Vector3d& p_m) {
   const auto effect = makeEffect(id, parameters, excitation);
-  SensorSetting setting;
+  field::SensorSetting setting;
   setting.tracker_from_sensor.position_m = p_m;
-  const Eigen::Matrix3d field = dipoleField(p_m, 1.0) + effect.value()->at(setting).field_per_m3;
-  return (solvePose(field, 1.0, p_m)->tracker_from_sensor.position_m - p_m).norm();
+  const Eigen::Matrix3d field = field::dipoleField(p_m, 1.0) + effect.value()->at(setting).field_per_m3;
+  return (field::solvePose(field, 1.0, p_m)->tracker_from_sensor.position_m - p_m).norm();
 }
 
 /// A square plate 0.4 m below the middle of a path of 0.6 m, level or turned by half a right angle.
-double plateError_m(double side_m, bool is_level, nlohmann::json metal, const Excitation& excitation) {
+double plateError_m(double side_m, bool is_level, nlohmann::json metal, const field::Excitation& excitation) {
   metal["center_m"] = {0.3, 0.0, -0.4};
   metal["normal"] = is_level ? nlohmann::json{0.0, 0.0, 1.0} : nlohmann::json{1.0, 0.0, 1.0};
   metal["side"] = {0.0, 1.0, 0.0};
@@ -76,7 +78,7 @@ void PublishedMetalTest::alternatingCurrentSeesEveryMetal_data() {
 void PublishedMetalTest::alternatingCurrentSeesEveryMetal() {
   QFETCH(double, conductivity_s_per_m);
   const double radius_m = 0.025 * std::cbrt(3.0 / (4.0 * std::numbers::pi));
-  QVERIFY(sphereSusceptibility(radius_m, Metal{conductivity_s_per_m, 1.0}, kFastrak) < -0.75);
+  QVERIFY(field::sphereSusceptibility(radius_m, field::Metal{conductivity_s_per_m, 1.0}, kFastrak) < -0.75);
 }
 
 // 25 mm cubes 3 ms after the edge: copper is left with a tenth of what an AC tracker sees of it, aluminium with a third
@@ -84,7 +86,7 @@ void PublishedMetalTest::alternatingCurrentSeesEveryMetal() {
 void PublishedMetalTest::pulsedDirectCurrentSeesCopperLongest() {
   const double radius_m = 0.025 * std::cbrt(3.0 / (4.0 * std::numbers::pi));
   const auto left = [&](double conductivity_s_per_m) {
-    return std::abs(sphereSusceptibility(radius_m, Metal{conductivity_s_per_m, 1.0}, flock(3e-3)) / 1.5);
+    return std::abs(field::sphereSusceptibility(radius_m, field::Metal{conductivity_s_per_m, 1.0}, flock(3e-3)) / 1.5);
   };
   QVERIFY(left(5.8e7) > 0.1);
   QVERIFY(left(3.5e7) < 0.4 * left(5.8e7));
@@ -100,8 +102,8 @@ void PublishedMetalTest::steelIsConductorToOneAndMagnetToTheOther() {
                              {"radius_m", 0.1},
                              {"center_m", {0.8, 0.0, -0.5}}};
   const Eigen::Vector3d p_m(1.0, 0.0, 0.0);
-  const auto change = [&](const Excitation& excitation) {
-    SensorSetting setting;
+  const auto change = [&](const field::Excitation& excitation) {
+    field::SensorSetting setting;
     setting.tracker_from_sensor.position_m = p_m;
     return Eigen::Matrix3d(makeEffect("compact_metal", steel, excitation).value()->at(setting).field_per_m3);
   };
@@ -112,10 +114,10 @@ void PublishedMetalTest::steelIsConductorToOneAndMagnetToTheOther() {
 
 // Ferrite conducts a millionth of what steel does: permeable at the carrier as at rest.
 void PublishedMetalTest::ferriteIsAMagnetToBoth() {
-  const Metal ferrite{1.0, 1000.0};
+  const field::Metal ferrite{1.0, 1000.0};
   const double at_rest = 3.0 * 999.0 / 1002.0;
-  FT_VERIFY_MATCH(near(sphereSusceptibility(0.02, ferrite, kFastrak), at_rest, 0.01));
-  FT_VERIFY_MATCH(near(sphereSusceptibility(0.02, ferrite, flock(3e-3)), at_rest, 0.01));
+  FT_VERIFY_MATCH(near(field::sphereSusceptibility(0.02, ferrite, kFastrak), at_rest, 0.01));
+  FT_VERIFY_MATCH(near(field::sphereSusceptibility(0.02, ferrite, flock(3e-3)), at_rest, 0.01));
 }
 
 void PublishedMetalTest::aluminiumDisappearsFromPulsedTrackers_data() {
@@ -138,7 +140,7 @@ void PublishedMetalTest::aluminiumDisappearsFromPulsedTrackers() {
   const nlohmann::json aluminium{{"conductivity_s_per_m", 3.5e7}, {"thickness_m", thickness_m}};
   const double alternating_m = plateError_m(0.3, true, aluminium, kFastrak);
   const auto left = [&](double delay_s) { return plateError_m(0.3, true, aluminium, flock(delay_s)) / alternating_m; };
-  FT_VERIFY_MATCH(near(gone_s / (4.7 * kMu0_h_per_m * 3.5e7 * thickness_m * 0.3 / 10.25), 1.0, 0.5));
+  FT_VERIFY_MATCH(near(gone_s / (4.7 * field::kMu0_h_per_m * 3.5e7 * thickness_m * 0.3 / 10.25), 1.0, 0.5));
   QVERIFY2(left(gone_s) < 0.01, qPrintable(QString::number(left(gone_s))));
   QVERIFY2(left(0.25 * gone_s) > 0.05, qPrintable(QString::number(left(0.25 * gone_s))));
 }
@@ -178,7 +180,7 @@ void PublishedMetalTest::caveErrorsHaveThePublishedSize() {
                              {"material", "ferromagnetic"},
                              {"relative_permeability", 100.0},
                              {"conductivity_s_per_m", 6e6}};
-  for (const Excitation& excitation : {kFastrak, flock(2e-3)}) {
+  for (const field::Excitation& excitation : {kFastrak, flock(2e-3)}) {
     const double at_range_m = error_m("metal_plane", floor, excitation, {3.0, 0.0, 0.0});
     QVERIFY(at_range_m > 3.0 * kFoot_m && at_range_m < 4.5 * kFoot_m);
     FT_VERIFY_MATCH(near(at_range_m / 3.0, 0.40, 0.05));
@@ -186,5 +188,5 @@ void PublishedMetalTest::caveErrorsHaveThePublishedSize() {
   }
 }
 
-QTEST_GUILESS_MAIN(PublishedMetalTest)
+FIELDTRUE_TEST(PublishedMetalTest)
 #include "published_metal_test.moc"

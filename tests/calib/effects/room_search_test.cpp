@@ -8,19 +8,21 @@
 #include "calib/effects/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
 namespace {
 
 /// A grid of 5 by 5 by 4 places beside the transmitter, the rig turned a little against it.
-std::vector<SensorSetting> gridPlaces() {
-  std::vector<SensorSetting> settings;
+std::vector<field::SensorSetting> gridPlaces() {
+  std::vector<field::SensorSetting> settings;
   Pose tracker_from_rig{Eigen::Vector3d::Zero(), rotationFromVector(Eigen::Vector3d(0.1, -0.05, 0.2))};
   for (int i = 0; i < 100; ++i) {
-    SensorSetting setting;
+    field::SensorSetting setting;
     const Eigen::Vector3d in_rig_m(0.6 + 0.25 * (i % 5), -0.5 + 0.25 * (i / 5 % 5), -0.3 + 0.25 * (i / 25));
     setting.tracker_from_reference = tracker_from_rig;
     setting.tracker_from_sensor = tracker_from_rig * Pose{in_rig_m, Eigen::Quaterniond::Identity()};
@@ -30,24 +32,25 @@ std::vector<SensorSetting> gridPlaces() {
   return settings;
 }
 
-FitDesign designOf(const std::vector<SensorSetting>& settings) {
+FitDesign designOf(const std::vector<field::SensorSetting>& settings) {
   FitDesign design;
   design.settings = settings;
   design.pitch_m = 0.25;
   design.has_times = true;
   design.end_s = 990.0;
-  for (const SensorSetting& setting : settings) design.places_m.extend(setting.tracker_from_sensor.position_m);
+  for (const field::SensorSetting& setting : settings) design.places_m.extend(setting.tracker_from_sensor.position_m);
   return design;
 }
 
 /// Field changes of one or more linear parameters as columns, weighted as a tracker's errors are: by r^4.
-Eigen::MatrixXd columnsOf(const std::vector<SensorSetting>& settings, std::span<const EffectResponse> responses,
-                          Eigen::Index count) {
+Eigen::MatrixXd columnsOf(const std::vector<field::SensorSetting>& settings,
+                          std::span<const field::EffectResponse> responses, Eigen::Index count) {
   Eigen::MatrixXd columns(9 * static_cast<Eigen::Index>(settings.size()), count);
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const double r4 = std::pow(settings[i].tracker_from_sensor.position_m.norm(), 4);
     for (Eigen::Index k = 0; k < count; ++k) {
-      const EffectResponse& response = responses[i * static_cast<std::size_t>(count) + static_cast<std::size_t>(k)];
+      const field::EffectResponse& response =
+          responses[i * static_cast<std::size_t>(count) + static_cast<std::size_t>(k)];
       columns.block<9, 1>(9 * static_cast<Eigen::Index>(i), k) = r4 * response.field_per_m3.reshaped();
     }
   }
@@ -55,9 +58,10 @@ Eigen::MatrixXd columnsOf(const std::vector<SensorSetting>& settings, std::span<
 }
 
 /// Largest share of an effect's energy that any start of a way explains.
-double bestShare(const EffectFit& way, const std::vector<SensorSetting>& settings, const Eigen::VectorXd& truth) {
+double bestShare(const EffectFit& way, const std::vector<field::SensorSetting>& settings,
+                 const Eigen::VectorXd& truth) {
   const auto count = static_cast<Eigen::Index>(way.linear().size());
-  std::vector<EffectResponse> responses(settings.size() * static_cast<std::size_t>(count));
+  std::vector<field::EffectResponse> responses(settings.size() * static_cast<std::size_t>(count));
   double best = 0.0;
   for (const Eigen::VectorXd& start : way.starts()) {
     way.respond(settings, start, responses);
@@ -70,10 +74,10 @@ double bestShare(const EffectFit& way, const std::vector<SensorSetting>& setting
 }
 
 Eigen::VectorXd truthOf(const std::string& id, const nlohmann::json& parameters,
-                        const std::vector<SensorSetting>& settings) {
+                        const std::vector<field::SensorSetting>& settings) {
   const auto effect = makeEffect(id, parameters);
-  std::vector<EffectResponse> responses;
-  for (const SensorSetting& setting : settings) responses.push_back(effect.value()->at(setting));
+  std::vector<field::EffectResponse> responses;
+  for (const field::SensorSetting& setting : settings) responses.push_back(effect.value()->at(setting));
   return columnsOf(settings, responses, 1).col(0);
 }
 
@@ -99,7 +103,7 @@ void RoomSearchTest::startsStandClear_data() {
 
 void RoomSearchTest::startsStandClear() {
   QFETCH(QString, id);
-  const std::vector<SensorSetting> settings = gridPlaces();
+  const std::vector<field::SensorSetting> settings = gridPlaces();
   for (const auto& way : (*findEffect(id.toStdString()).value()).fits(designOf(settings))) {
     const std::vector<Eigen::VectorXd> starts = way->starts();
     QVERIFY(starts.size() >= 60 && starts.size() <= 350);
@@ -107,7 +111,7 @@ void RoomSearchTest::startsStandClear() {
       QVERIFY(way->allows(start));
       const Eigen::Vector3d center_m = start.head<3>();
       QVERIFY(center_m.norm() >= 0.15);
-      for (const SensorSetting& setting : settings) {
+      for (const field::SensorSetting& setting : settings) {
         QVERIFY((setting.tracker_from_sensor.position_m - center_m).norm() >= 0.125);
       }
       start.head<3>() = settings[37].tracker_from_sensor.position_m;
@@ -121,7 +125,7 @@ void RoomSearchTest::startsStandClear() {
 // Bodies 0.35 m to 0.9 m from the nearest place, anywhere about the grid: from the best start on the larger part of
 // what they do is explained, so that a descent from there ends at them.
 void RoomSearchTest::someStartIsNearEveryBody() {
-  const std::vector<SensorSetting> settings = gridPlaces();
+  const std::vector<field::SensorSetting> settings = gridPlaces();
   const FitDesign design = designOf(settings);
   const RoomSearch search(design);
   const auto ways = (*findEffect("compact_metal").value()).fits(design);
@@ -140,7 +144,7 @@ void RoomSearchTest::someStartIsNearEveryBody() {
 }
 
 void RoomSearchTest::someStartIsNearEveryFloorAndWall() {
-  const std::vector<SensorSetting> settings = gridPlaces();
+  const std::vector<field::SensorSetting> settings = gridPlaces();
   const FitDesign design = designOf(settings);
   const RoomSearch search(design);
   const auto ways = (*findEffect("metal_plane").value()).fits(design);
@@ -180,5 +184,5 @@ void RoomSearchTest::chartIsSmoothAtTheRigsAxes() {
   }
 }
 
-QTEST_GUILESS_MAIN(RoomSearchTest)
+FIELDTRUE_TEST(RoomSearchTest)
 #include "room_search_test.moc"

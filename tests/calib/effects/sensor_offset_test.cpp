@@ -1,12 +1,13 @@
-#include "calib/effects/sensor_offset.h"
-
 #include <QTest>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
@@ -38,5 +39,5 @@ void SensorOffsetTest::isARigidMount() {
   }
 }
 
-QTEST_GUILESS_MAIN(SensorOffsetTest)
+FIELDTRUE_TEST(SensorOffsetTest)
 #include "sensor_offset_test.moc"

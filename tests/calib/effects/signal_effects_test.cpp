@@ -2,8 +2,10 @@
 
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::near;
 
@@ -19,7 +21,7 @@ class SignalEffectsTest : public QObject {
 };
 
 void SignalEffectsTest::noiseMultiplies() {
-  SignalModel signal;
+  field::SignalModel signal;
   effectOf("range_noise", {{"factor", 2.0}, {"power", 0.5}})->disturb(signal);
   effectOf("range_noise", {{"factor", 1.5}, {"power", 1.0}})->disturb(signal);
   QCOMPARE(signal.noise_factor, 3.0);
@@ -27,7 +29,7 @@ void SignalEffectsTest::noiseMultiplies() {
 }
 
 void SignalEffectsTest::theStrongerFilterHolds() {
-  SignalModel signal;
+  field::SignalModel signal;
   signal.correlation = 0.5;
   effectOf("correlated_samples", {{"correlation", 0.3}})->disturb(signal);
   QCOMPARE(signal.correlation, 0.5);
@@ -36,7 +38,7 @@ void SignalEffectsTest::theStrongerFilterHolds() {
 }
 
 void SignalEffectsTest::theCoarserStepHolds() {
-  SignalModel signal;
+  field::SignalModel signal;
   signal.quantum_m = 1e-3;
   effectOf("quantization", {{"quantum_m", 1e-4}, {"quantum_rad", 0.01}})->disturb(signal);
   QCOMPARE(signal.quantum_m, 1e-3);
@@ -45,11 +47,11 @@ void SignalEffectsTest::theCoarserStepHolds() {
 
 // Two independent reasons of 10 % and 20 %: 1 - 0.9 * 0.8.
 void SignalEffectsTest::eitherMayFlip() {
-  SignalModel signal;
+  field::SignalModel signal;
   effectOf("hemisphere_flip", {{"probability", 0.1}})->disturb(signal);
   effectOf("hemisphere_flip", {{"probability", 0.2}})->disturb(signal);
   FT_VERIFY_MATCH(near(signal.flip_probability, 0.28, 1e-15));
 }
 
-QTEST_GUILESS_MAIN(SignalEffectsTest)
+FIELDTRUE_TEST(SignalEffectsTest)
 #include "signal_effects_test.moc"

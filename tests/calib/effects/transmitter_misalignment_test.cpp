@@ -1,12 +1,13 @@
-#include "calib/effects/transmitter_misalignment.h"
-
 #include <QTest>
 
+#include "calib/effects/rows.h"
 #include "tests/calib/effects/reading_of.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::effects;
 using fieldtrue::testing::effectOf;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
@@ -43,5 +44,5 @@ void TransmitterMisalignmentTest::isARigidTransformToFirstOrder() {
   }
 }
 
-QTEST_GUILESS_MAIN(TransmitterMisalignmentTest)
+FIELDTRUE_TEST(TransmitterMisalignmentTest)
 #include "transmitter_misalignment_test.moc"

@@ -5,19 +5,23 @@
 #include <numeric>
 #include <random>
 
-#include "calib/correctors/corrector.h"
+#include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
 
 CalibrationTable readCondition(const std::string& condition) {
-  const Importer& importer = *findImporter("anser").value();
+  const importers::Importer& importer = *importers::findImporter("anser").value();
   const Settings settings = resolveSettings("anser", importer.settings, {{"condition", condition}}).value();
   return importer.read(*realData("anser_duplo/nodes.csv"), std::nullopt, settings).value().table.value();
 }
@@ -97,15 +101,16 @@ class AnserComparisonTest : public QObject {
     QFETCH(double, leave_one_out_mm);
     const CalibrationTable table = readCondition(condition.toStdString());
     QCOMPARE(table.nodes.size(), std::size_t{41});
-    const auto corrector =
-        Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice("none", "none").value(), AlignMode::kRigid);
+    const auto corrector = calibration::Corrector::fit(table.nodes, table.metadata,
+                                                       calibration::parseCorrectorChoice("none", "none").value(),
+                                                       calibration::AlignMode::kRigid);
     FT_VERIFY_OK(corrector);
     FT_VERIFY_MATCH(near(corrector->report().rms_before_mm, in_sample_mm, 0.01));
     FT_VERIFY_MATCH(near(1000.0 * corrector->report().rms_m, in_sample_mm, 0.01));
 
     const auto comparison = compareMethods(table, {});
     FT_VERIFY_OK(comparison);
-    QCOMPARE(comparison->align, AlignMode::kRigid);
+    QCOMPARE(comparison->align, calibration::AlignMode::kRigid);
     FT_VERIFY_MATCH(near(comparison->before_position_mm.rms, leave_one_out_mm, 0.01));
     QVERIFY(comparison->position.front().method == "none");
     FT_VERIFY_MATCH(near(comparison->position.front().stats.rms, leave_one_out_mm, 0.01));
@@ -139,8 +144,9 @@ class AnserComparisonTest : public QObject {
       FT_VERIFY_MATCH(holdsAll(score.notes.front(), {"one plane"}));
     }
     for (const std::string method : {"affine", "polynomial:degree=2", "hmq"}) {
-      const auto corrector =
-          Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice(method, "none").value(), AlignMode::kRigid);
+      const auto corrector = calibration::Corrector::fit(table.nodes, table.metadata,
+                                                         calibration::parseCorrectorChoice(method, "none").value(),
+                                                         calibration::AlignMode::kRigid);
       FT_VERIFY_OK(corrector);
       const Eigen::Vector3d p_m = table.nodes[12].tracker_from_sensor.position_m;
       QVERIFY(corrector->covers(p_m));
@@ -170,5 +176,5 @@ class AnserComparisonTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(AnserComparisonTest)
+FIELDTRUE_TEST(AnserComparisonTest)
 #include "anser_comparison_test.moc"

@@ -5,8 +5,10 @@
 
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -69,7 +71,7 @@ class CoverageTest : public QObject {
     QCOMPARE(coverage.missing, skipped);
     QCOMPARE(coverage.n_places, 343 - 27);
     QCOMPARE(coverage.holes.size(), std::size_t{1});
-    FT_VERIFY_MATCH(holdsAll(coverage.text, {"planned but skipped: places ", " and 19 more"}));
+    FT_VERIFY_MATCH(holdsAll(coverage.text, {"planned but skipped: ", ", pipe ", " and 21 more"}));
   }
 
   void aGridOfUnequalPitchHasNoHole() {
@@ -139,5 +141,5 @@ class CoverageTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(CoverageTest)
+FIELDTRUE_TEST(CoverageTest)
 #include "coverage_test.moc"

@@ -4,11 +4,14 @@
 #include <random>
 
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/noise_floor.h"
 #include "calib/evaluation/resampling.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -151,5 +154,5 @@ class GainTestTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(GainTestTest)
+FIELDTRUE_TEST(GainTestTest)
 #include "gain_test.moc"

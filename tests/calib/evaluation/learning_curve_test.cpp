@@ -5,8 +5,10 @@
 
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -104,5 +106,5 @@ class LearningCurveTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(LearningCurveTest)
+FIELDTRUE_TEST(LearningCurveTest)
 #include "learning_curve_test.moc"

@@ -5,12 +5,15 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -188,7 +191,7 @@ class OrientationDependenceTest : public QObject {
 
   void realLandmarksHaveNoOrientation() {
     FT_REQUIRE_REAL_DATA();
-    const Importer& importer = *findImporter("plus").value();
+    const importers::Importer& importer = *importers::findImporter("plus").value();
     const auto read = importer.read(*realData("pluslib_fcal/samples.csv"), std::nullopt,
                                     resolveSettings("plus", importer.settings, {}).value());
     FT_VERIFY_OK(read);
@@ -199,5 +202,5 @@ class OrientationDependenceTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(OrientationDependenceTest)
+FIELDTRUE_TEST(OrientationDependenceTest)
 #include "orientation_dependence_test.moc"

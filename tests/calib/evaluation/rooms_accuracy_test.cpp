@@ -3,28 +3,32 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/calibration/alignment.h"
 #include "calib/core/settings.h"
+#include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "calib/evaluation/noise_floor.h"
 #include "tests/studies/rooms.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
 
 struct Fitted {
-  Alignment alignment;
-  std::unique_ptr<PositionModel> model;
+  calibration::Alignment alignment;
+  std::unique_ptr<correctors::PositionModel> model;
 };
 
 Fitted fitIn(const RoomRecording& recording, const std::string& method_text) {
   const MethodText text = parseMethodText(method_text).value();
-  const PositionMethod& method = *findPositionMethod(text.id).value();
+  const correctors::PositionMethod& method = *correctors::findPositionMethod(text.id).value();
   const Settings settings = resolveSettings(text.id, method.settings, text.given).value();
-  const Alignment alignment = fitAlignment(recording.fit_nodes).value();
-  const FitData data = makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
+  const calibration::Alignment alignment = calibration::fitAlignment(recording.fit_nodes).value();
+  const correctors::FitData data = calibration::makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
   return {alignment, method.fit(data, settings, {}).value()};
 }
 
@@ -58,10 +62,10 @@ void RoomsAccuracyTest::roomsAreWhatTheySay() {
   QFETCH(QString, room);
   QFETCH(double, least_mm);
   QFETCH(double, most_mm);
-  const Scene scene = readRoom(FIELDTRUE_RESOURCES, room.toStdString());
+  const simulation::Scene scene = readRoom(FIELDTRUE_RESOURCES, room.toStdString());
   QCOMPARE(scene.rig.tolerance_m, 0.005);
   QVERIFY(!scene.rig.alignment_known && scene.tracker.correlation > 0.0);
-  const TrackerSimulator tracker = TrackerSimulator::make(scene, 1).value();
+  const simulation::TrackerSimulator tracker = simulation::TrackerSimulator::make(scene, 1).value();
   const auto tracked_m = [&](const Eigen::Vector3d& p_m) {
     return scene.reference_from_tracker *
            tracker.measureExactly({p_m, Eigen::Quaterniond::Identity()}, 0.0).tracker_from_sensor.position_m;
@@ -113,7 +117,7 @@ void RoomsAccuracyTest::theFieldItselfBeatsEveryMethodOfTheSurvey() {
 }
 
 void RoomsAccuracyTest::anEmptyRoomIsLeftAlone() {
-  const Scene scene = readRoom(FIELDTRUE_RESOURCES, "clean");
+  const simulation::Scene scene = readRoom(FIELDTRUE_RESOURCES, "clean");
   const RoomRecording recording = recordRoom(scene, 3);
   const Fitted ours = fitIn(recording, "harmonic_field");
   const Fitted nothing = fitIn(recording, "none");
@@ -124,5 +128,5 @@ void RoomsAccuracyTest::anEmptyRoomIsLeftAlone() {
   QVERIFY(roomRms_mm(*ours.model, ours.alignment, recording.exact_nodes) < aligned_mm + 0.5);
 }
 
-QTEST_GUILESS_MAIN(RoomsAccuracyTest)
+FIELDTRUE_TEST(RoomsAccuracyTest)
 #include "rooms_accuracy_test.moc"

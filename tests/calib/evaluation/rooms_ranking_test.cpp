@@ -1,11 +1,13 @@
 #include <QTest>
 #include <map>
 
+#include "calib/calibration/alignment.h"
 #include "calib/core/settings.h"
 #include "calib/correctors/registry.h"
 #include "tests/studies/rooms.h"
 #include "tests/studies/table2.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::testing;
@@ -15,13 +17,13 @@ namespace {
 /// Errors against exact truth of table 2's techniques in one recording of a room [mm], by technique.
 std::map<std::string, double> errorsIn(const std::string& room, std::uint64_t seed) {
   const RoomRecording recording = recordRoom(readRoom(FIELDTRUE_RESOURCES, room), seed);
-  const Alignment alignment = fitAlignment(recording.fit_nodes).value();
-  const FitData data = makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
+  const calibration::Alignment alignment = calibration::fitAlignment(recording.fit_nodes).value();
+  const correctors::FitData data = calibration::makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
   std::map<std::string, double> error_mm;
   for (const Technique& technique : techniquesOfTable2()) {
     for (const std::string& variant : technique.variants) {
       const MethodText text = parseMethodText(variant).value();
-      const auto method = findPositionMethod(text.id);
+      const auto method = correctors::findPositionMethod(text.id);
       if (!method) continue;
       const Settings settings = resolveSettings(text.id, (*method)->settings, text.given).value();
       const auto model = (*method)->fit(data, settings, {});
@@ -94,5 +96,5 @@ void RoomsRankingTest::disagreesWhereNoiseIsAllThereIs() {
   QVERIFY(errors.at("tetrahedral") > 1.5 * errors.at("polynomial of degree 4"));
 }
 
-QTEST_GUILESS_MAIN(RoomsRankingTest)
+FIELDTRUE_TEST(RoomsRankingTest)
 #include "rooms_ranking_test.moc"

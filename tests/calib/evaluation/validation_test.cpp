@@ -5,8 +5,10 @@
 #include "calib/evaluation/folds.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -136,5 +138,5 @@ class ValidationTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(ValidationTest)
+FIELDTRUE_TEST(ValidationTest)
 #include "validation_test.moc"

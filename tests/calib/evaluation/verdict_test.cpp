@@ -1,15 +1,19 @@
 #include <QTest>
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/limits.h"
 #include "calib/evaluation/resampling.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::evaluation;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -107,8 +111,8 @@ class VerdictTest : public QObject {
     FT_VERIFY_MATCH(near(comparison.verdict.worst_mm, *worst, 0.0));
     QCOMPARE(comparison.verdict.worst_node,
              comparison.places[static_cast<std::size_t>(worst - best.place_errors.begin())]);
-    FT_VERIFY_MATCH(holdsAll(comparison.verdict.text, {"Apply polynomial", "expect ", "mm inside the region and ",
-                                                       "mm near its edge", "mm at worst (place ", "limited by "}));
+    FT_VERIFY_MATCH(holdsAll(comparison.verdict.text, {"Apply Polynomial", "expect ", "mm inside the region and ",
+                                                       "mm near its edge", "mm at worst (", "limited by "}));
   }
 
   void outermostPlacesOfABoard() {
@@ -137,7 +141,7 @@ class VerdictTest : public QObject {
     table.nodes[62].reference_from_sensor.position_m.z() += 0.04;  // The middle place.
     const Comparison comparison = compared(table, {{"polynomial", {{"degree", "3"}}}});
     QCOMPARE(comparison.verdict.worst_node, table.nodes[62].node);
-    FT_VERIFY_MATCH(holdsAll(comparison.verdict.limited_by, {"place 62 alone"}));
+    FT_VERIFY_MATCH(holdsAll(comparison.verdict.limited_by, {"C3, pipe 3 alone"}));
   }
 
   void morePlacesWouldHelpWhereTheFieldIsCoarselySampled() {
@@ -153,6 +157,110 @@ class VerdictTest : public QObject {
     const Comparison comparison = compared(table, {{"hmq", {}}});
     QVERIFY(comparison.verdict.apply_position && !comparison.verdict.edge_mm);
     FT_VERIFY_MATCH(holdsAll(comparison.verdict.limited_by, {"detail of the field", "more places would help"}));
+  }
+
+  void readingsTurnedInsideOutAreNotApplied_data() {
+    QTest::addColumn<int>("slip");
+    QTest::newRow("two axes swapped") << 0;
+    QTest::newRow("one axis mirrored") << 1;
+    QTest::newRow("readings at other places") << 2;
+  }
+  void readingsTurnedInsideOutAreNotApplied() {
+    QFETCH(int, slip);
+    CalibrationTable table = bentTable(0.03, 0.0);
+    FT_VERIFY_MATCH(holdsAll(compared(table, {{"affine", {}}}).verdict.text, {"Apply Affine"}));
+    if (slip == 2) {
+      std::vector<Pose> readings;
+      for (const Node& node : table.nodes) readings.push_back(node.tracker_from_sensor);
+      std::shuffle(readings.begin(), readings.end(), std::mt19937_64(5));
+      // Some places keep their reading, so that a method finds something to gain.
+      for (std::size_t i = 0; i < table.nodes.size(); ++i)
+        if (i % 3 != 0) table.nodes[i].tracker_from_sensor = readings[i];
+    }
+    for (Node& node : table.nodes) {
+      Eigen::Vector3d& p_m = node.tracker_from_sensor.position_m;
+      if (slip == 0) std::swap(p_m.x(), p_m.y());
+      if (slip == 1) p_m.z() *= -1.0;
+    }
+    const Comparison comparison = compared(table, {{"none", {}}, {"affine", {}}});
+    const Verdict& verdict = comparison.verdict;
+    QVERIFY2(!verdict.apply_position && !verdict.apply_orientation && verdict.is_inside_out, verdict.text.c_str());
+    FT_VERIFY_MATCH(
+        holdsAll(verdict.text, {"Do not apply: Affine would take the error from ", "turned inside out in ",
+                                "axes are swapped or mirrored, readings stand at places that are not theirs"}));
+    QVERIFY(toJson(comparison).at("verdict").at("inside_out") == true);
+    FT_VERIFY_MATCH(holdsAll(compared(table, {{"none", {}}}).verdict.text,
+                             {"Do not apply: the readings are turned inside out", "no method does better"}));
+    // Held out, the correction of swapped axes looks splendid: nothing but the fold tells.
+    QVERIFY(slip == 2 || verdict.position.gain > 0.9);
+    QVERIFY(!verdict.position.apply);
+  }
+
+  void aRigMovedOnTheWayIsNotApplied() {
+    // 30 mm of smooth error; from the middle layer on the tracker says 1 m less in height, so that layers change
+    // places.
+    CalibrationTable table = bentTable(0.03, 0.0, {5, 5, 4});
+    for (std::size_t i = table.nodes.size() / 2; i < table.nodes.size(); ++i)
+      table.nodes[i].tracker_from_sensor.position_m.z() -= 1.0;
+    const Comparison comparison = compared(table, {{"none", {}}, {"gaussian_process", {}}});
+    QVERIFY2(!comparison.verdict.apply_position, comparison.verdict.text.c_str());
+  }
+
+  void repeatedPlacesAreHeldOutTogether() {
+    // Nothing but seating noise, and each reading twice, under two numbers: a fit that sees one of the two foretells
+    // the other, and nothing else.
+    CalibrationTable table = bentTable(0.0, 0.003);
+    const std::size_t n_places = table.nodes.size();
+    for (std::size_t i = 0; i < n_places; ++i) {
+      Node again = table.nodes[i];
+      again.node += 1000;
+      again.tracker_from_sensor.position_m.x() += 5e-5;
+      table.nodes.push_back(again);
+    }
+    const std::vector<MethodText> methods{{"none", {}}, {"rbf", {}}, {"gaussian_process", {}}};
+    const Comparison comparison = compared(table, methods);
+    QVERIFY2(!comparison.verdict.apply_position, comparison.verdict.text.c_str());
+    QCOMPARE(comparison.places.size(), n_places);
+    QVERIFY2(std::any_of(comparison.notes.begin(), comparison.notes.end(),
+                         [](const std::string& note) {
+                           return note.find("125 places have the true position of another") == 0 &&
+                                  note.find("held out together") != std::string::npos;
+                         }),
+             comparison.notes.empty() ? "no note" : comparison.notes.front().c_str());
+    // Nor does a role make another place of them.
+    for (std::size_t i = n_places; i < table.nodes.size(); ++i) table.nodes[i].role = NodeRole::kValidation;
+    ComparisonOptions options;
+    options.position_methods = methods;
+    const auto by_role = compareMethods(table, options);
+    QVERIFY(!by_role);
+    FT_VERIFY_MATCH(holdsAll(by_role.error().message, {"whose rows are all for fitting", "have the true position"}));
+    // Neighbours 20 cm apart are places of their own.
+    for (const std::string& note : compared(bentTable(0.03, 0.0), {{"none", {}}}).notes)
+      QVERIFY2(note.find("true position of another") == std::string::npos, note.c_str());
+  }
+
+  void aCornerDoesNotStandForTheRegion() {
+    CalibrationTable table = bentTable(0.03, 0.0, {6, 6, 6});
+    const auto told = [&] { return compared(table, {{"polynomial", {{"degree", "3"}}}}).verdict.text; };
+    for (Node& node : table.nodes)
+      node.role = (*node.index)[0] + (*node.index)[1] + (*node.index)[2] <= 2 ? NodeRole::kValidation : NodeRole::kFit;
+    // Levels 0 to 2 of 0 to 5, along three axes: (2/5)^3.
+    FT_VERIFY_MATCH(holdsAll(told(), {"places the fits did not see, which span only 6.4 % of the region"}));
+    for (Node& node : table.nodes) node.role = node.node % 3 == 0 ? NodeRole::kValidation : NodeRole::kFit;
+    QVERIFY2(told().find("span only") == std::string::npos, told().c_str());
+  }
+
+  void aFloorAboveWhatIsLeftIsTold() {
+    CalibrationTable table = bentTable(0.03, 0.0);
+    const auto toldOf = [](const Comparison& comparison) {
+      return std::count_if(comparison.notes.begin(), comparison.notes.end(),
+                           [](const std::string& note) { return note.find("another unit") != std::string::npos; });
+    };
+    QCOMPARE(toldOf(compared(table, {{"polynomial", {{"degree", "4"}}}})), 0);
+    // 0.03 mm an axis written as 0.03 m.
+    for (Node& node : table.nodes) node.covariance_m2 = Eigen::Matrix3d(9e-4 * Eigen::Matrix3d::Identity());
+    const Comparison comparison = compared(table, {{"polynomial", {{"degree", "4"}}}});
+    QVERIFY2(toldOf(comparison) == 1, std::to_string(comparison.floor_position_mm).c_str());
   }
 
   void truenessIsWhatTheFloorDoesNotExplain() {
@@ -196,5 +304,5 @@ class VerdictTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(VerdictTest)
+FIELDTRUE_TEST(VerdictTest)
 #include "verdict_test.moc"

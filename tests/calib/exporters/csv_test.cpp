@@ -4,12 +4,15 @@
 #include <fstream>
 #include <sstream>
 
-#include "calib/core/table_io.h"
+#include "calib/calibration/alignment.h"
 #include "calib/exporters/registry.h"
+#include "calib/tables/table_io.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::exporters;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -73,9 +76,11 @@ class CsvTest : public QObject {
   void holdsOneRowANodeWithErrorsBeforeAndAfter() {
     QFETCH(bool, has_orientation);
     const CalibrationTable table = bentTable(has_orientation);
-    const Corrector corrector =
-        Corrector::fit(table.nodes, table.metadata,
-                       parseCorrectorChoice("affine", has_orientation ? "rigid" : "none").value(), AlignMode::kRigid)
+    const calibration::Corrector corrector =
+        calibration::Corrector::fit(
+            table.nodes, table.metadata,
+            calibration::parseCorrectorChoice("affine", has_orientation ? "rigid" : "none").value(),
+            calibration::AlignMode::kRigid)
             .value();
     QTemporaryDir folder;
     const std::filesystem::path path = std::filesystem::path(folder.path().toStdString()) / "out.csv";
@@ -111,9 +116,11 @@ class CsvTest : public QObject {
 
   void headStatesWhatAReaderMustKnow() {
     const CalibrationTable table = bentTable(true);
-    const Corrector corrector = Corrector::fit(table.nodes, table.metadata,
-                                               parseCorrectorChoice("hmq:r2_cm2=50", "none").value(), AlignMode::kRigid)
-                                    .value();
+    const calibration::Corrector corrector =
+        calibration::Corrector::fit(table.nodes, table.metadata,
+                                    calibration::parseCorrectorChoice("hmq:r2_cm2=50", "none").value(),
+                                    calibration::AlignMode::kRigid)
+            .value();
     QTemporaryDir folder;
     const std::filesystem::path path = std::filesystem::path(folder.path().toStdString()) / "out.csv";
     FT_VERIFY_OK(findExporter("csv").value()->write(corrector, path));
@@ -126,8 +133,10 @@ class CsvTest : public QObject {
 
   void readsBackAsTheTableThatWasFitted() {
     const CalibrationTable table = bentTable(true);
-    const Corrector corrector =
-        Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice("affine", "none").value(), AlignMode::kRigid)
+    const calibration::Corrector corrector =
+        calibration::Corrector::fit(table.nodes, table.metadata,
+                                    calibration::parseCorrectorChoice("affine", "none").value(),
+                                    calibration::AlignMode::kRigid)
             .value();
     QTemporaryDir folder;
     const std::filesystem::path path = std::filesystem::path(folder.path().toStdString()) / "out.csv";
@@ -145,5 +154,5 @@ class CsvTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(CsvTest)
+FIELDTRUE_TEST(CsvTest)
 #include "csv_test.moc"

@@ -2,18 +2,22 @@
 #include <QTest>
 #include <set>
 
+#include "calib/calibration/alignment.h"
 #include "calib/core/file_io.h"
+#include "calib/exporters/exporter.h"
 #include "calib/exporters/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::exporters;
 using namespace fieldtrue::testing;
 
 namespace {
 
 /// Calibrations of every kind of table an exporter may meet.
-std::vector<Corrector> calibrations() {
+std::vector<calibration::Corrector> calibrations() {
   SyntheticOptions full;
   full.smooth_distortion_m = 0.02;
   full.orientation_error_rad = 0.1;
@@ -21,13 +25,14 @@ std::vector<Corrector> calibrations() {
   position_only.has_orientation = false;
   SyntheticOptions flat = position_only;
   flat.counts = {6, 6, 1};
-  std::vector<Corrector> made;
+  std::vector<calibration::Corrector> made;
   for (const auto& [options, position, orientation] :
        {std::tuple{full, "hmq", "polynomial_quaternion"}, std::tuple{position_only, "polynomial", "none"},
         std::tuple{flat, "affine", "none"}, std::tuple{full, "none", "none"}}) {
     const CalibrationTable table = syntheticTable(options);
-    made.push_back(Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice(position, orientation).value(),
-                                  AlignMode::kRigid)
+    made.push_back(calibration::Corrector::fit(table.nodes, table.metadata,
+                                               calibration::parseCorrectorChoice(position, orientation).value(),
+                                               calibration::AlignMode::kRigid)
                        .value());
   }
   return made;
@@ -41,7 +46,7 @@ class ExporterContractTest : public QObject {
  private slots:
   void rowsAreComplete() {
     std::set<std::string> ids;
-    for (const Exporter& exporter : exporters()) {
+    for (const Exporter& exporter : exporters::exporters()) {
       QVERIFY(!exporter.label.empty() && exporter.extension.starts_with('.') && !exporter.reads_it.empty() &&
               exporter.write);
       QVERIFY2(ids.insert(exporter.id).second, exporter.id.c_str());
@@ -54,7 +59,7 @@ class ExporterContractTest : public QObject {
 
   void writesTheSameBytesTwice_data() {
     QTest::addColumn<QString>("id");
-    for (const Exporter& exporter : exporters())
+    for (const Exporter& exporter : exporters::exporters())
       QTest::newRow(exporter.id.c_str()) << QString::fromStdString(exporter.id);
   }
   void writesTheSameBytesTwice() {
@@ -62,7 +67,7 @@ class ExporterContractTest : public QObject {
     const Exporter& exporter = *findExporter(id.toStdString()).value();
     QTemporaryDir folder;
     const std::filesystem::path base = folder.path().toStdString();
-    for (const Corrector& corrector : calibrations()) {
+    for (const calibration::Corrector& corrector : calibrations()) {
       FT_VERIFY_OK(exporter.write(corrector, base / ("first" + exporter.extension)));
       FT_VERIFY_OK(exporter.write(corrector, base / ("second" + exporter.extension)));
       const std::string first = readFile(base / ("first" + exporter.extension)).value();
@@ -82,5 +87,5 @@ class ExporterContractTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(ExporterContractTest)
+FIELDTRUE_TEST(ExporterContractTest)
 #include "exporter_contract_test.moc"

@@ -4,8 +4,10 @@
 #include <vector>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::field;
 using fieldtrue::testing::near;
 using fieldtrue::testing::sameBits;
 
@@ -115,5 +117,5 @@ void CouplingNoiseTest::repeatsWithItsSeedOnly() {
   QVERIFY(GaussianStream(1, 1).next() != GaussianStream(1, 2).next());
 }
 
-QTEST_GUILESS_MAIN(CouplingNoiseTest)
+FIELDTRUE_TEST(CouplingNoiseTest)
 #include "coupling_noise_test.moc"

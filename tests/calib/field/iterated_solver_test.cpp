@@ -1,12 +1,14 @@
 #include <QTest>
 #include <cmath>
 
-#include "calib/field/coupling.h"
+#include "calib/field/dipole_field.h"
 #include "calib/field/pose_solver.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::field;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
@@ -115,5 +117,5 @@ void IteratedSolverTest::refusesWhatTheClosedFormRefuses() {
   }
 }
 
-QTEST_GUILESS_MAIN(IteratedSolverTest)
+FIELDTRUE_TEST(IteratedSolverTest)
 #include "iterated_solver_test.moc"

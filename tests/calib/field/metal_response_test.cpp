@@ -5,8 +5,10 @@
 #include <numbers>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::field;
 using fieldtrue::testing::near;
 
 namespace {
@@ -25,7 +27,7 @@ Excitation pulsed(double delay_s) { return {true, 0.0, delay_s}; }
 
 }  // namespace
 
-Q_DECLARE_METATYPE(fieldtrue::Metal)
+Q_DECLARE_METATYPE(fieldtrue::field::Metal)
 
 class MetalResponseTest : public QObject {
   Q_OBJECT
@@ -220,5 +222,5 @@ void MetalResponseTest::cableLoopAnswersAsTabulated() {
   FT_VERIFY_MATCH(near(inductiveShare(rate_per_s, pulsed(0.0)), 1.0, 1e-12));
 }
 
-QTEST_GUILESS_MAIN(MetalResponseTest)
+FIELDTRUE_TEST(MetalResponseTest)
 #include "metal_response_test.moc"

@@ -4,13 +4,15 @@
 #include <cmath>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::field;
 using fieldtrue::testing::near;
 
-Q_DECLARE_METATYPE(fieldtrue::Metal)
+Q_DECLARE_METATYPE(fieldtrue::field::Metal)
 Q_DECLARE_METATYPE(std::optional<double>)
-Q_DECLARE_METATYPE(fieldtrue::Excitation)
+Q_DECLARE_METATYPE(fieldtrue::field::Excitation)
 
 class PlaneImagesTest : public QObject {
   Q_OBJECT
@@ -88,5 +90,5 @@ void PlaneImagesTest::recedeAsMaxwellSays() {
   FT_VERIFY_MATCH(near(depth_m(20e-6, 1e-3), 2.274, 0.01));
 }
 
-QTEST_GUILESS_MAIN(PlaneImagesTest)
+FIELDTRUE_TEST(PlaneImagesTest)
 #include "plane_images_test.moc"

@@ -5,11 +5,13 @@
 #include <QTest>
 #include <limits>
 
-#include "calib/field/coupling.h"
+#include "calib/field/dipole_field.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::field;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
@@ -233,5 +235,5 @@ void PoseSolverTest::refusesWhatHasNoPose() {
   QVERIFY_EXCEPTION_THROWN((void)solvePose(Eigen::Matrix3d::Identity(), 0.0, x), std::logic_error);
 }
 
-QTEST_GUILESS_MAIN(PoseSolverTest)
+FIELDTRUE_TEST(PoseSolverTest)
 #include "pose_solver_test.moc"

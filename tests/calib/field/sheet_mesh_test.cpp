@@ -5,8 +5,10 @@
 #include <numbers>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::field;
 using fieldtrue::testing::near;
 
 namespace {
@@ -95,5 +97,5 @@ void SheetMeshTest::answersGrowWithTheirSize() {
   FT_VERIFY_MATCH(near(tangentialMoment_m3(SheetMesh(0.8, 0.6), 0.04) / thin_m3, 8.0, 1e-9));
 }
 
-QTEST_GUILESS_MAIN(SheetMeshTest)
+FIELDTRUE_TEST(SheetMeshTest)
 #include "sheet_mesh_test.moc"

@@ -12,41 +12,41 @@ namespace fieldtrue::testing {
 
 /// A recording with one effect that the scene beside it does not have.
 struct Withheld {
-  Scene believed;
+  simulation::Scene believed;
   std::vector<PlannedPlace> plan;
   CalibrationTable table;
 };
 
 inline Withheld withheldFrom(const std::string& effect, const std::string& parameters, const GapPlan& plan = {},
-                             const Scene& believed = gapScene()) {
+                             const simulation::Scene& believed = gapScene()) {
   Withheld made{believed, gapPlan(plan), {}};
-  Scene actual = believed;
+  simulation::Scene actual = believed;
   actual.effects.push_back({effect, nlohmann::json::parse(parameters)});
   made.table = recordedIn(actual, made.plan);
   return made;
 }
 
 /// The gap is explained, by that effect or by one that this grid cannot tell from it.
-inline Match names(const GapReport& report, const std::string& effect) {
-  QByteArray seen(idOf(report.verdict).data());
+inline Match names(const gap::GapReport& report, const std::string& effect) {
+  QByteArray seen(gap::idOf(report.verdict).data());
   bool is_named = false;
-  for (const SelectedEffect& selected : report.selected) {
+  for (const gap::SelectedEffect& selected : report.selected) {
     seen += " " + QByteArray::fromStdString(selected.effect) + " (";
     for (const std::string& other : selected.equivalents) seen += QByteArray::fromStdString(other) + " ";
     seen += ")";
     is_named = is_named || std::count(selected.equivalents.begin(), selected.equivalents.end(), effect) > 0;
   }
   const bool is_alone = report.selected.size() == 1;
-  const bool is_explained = report.verdict == GapVerdict::kExplained;
+  const bool is_explained = report.verdict == gap::GapVerdict::kExplained;
   return {is_named && is_alone && is_explained, "seen " + seen + ", wanted " + QByteArray::fromStdString(effect)};
 }
 
 /// The scene with what was found added makes recordings in which it finds no gap.
-inline Match isSettled(const GapReport& report, const Withheld& made) {
-  const Scene updated = updatedScene(made.believed, report);
-  const auto again = diagnose(recordedIn(updated, made.plan, 7), nullptr, &updated);
+inline Match isSettled(const gap::GapReport& report, const Withheld& made) {
+  const simulation::Scene updated = gap::updatedScene(made.believed, report);
+  const auto again = gap::diagnose(recordedIn(updated, made.plan, 7), nullptr, &updated);
   if (!again) return {false, QByteArray::fromStdString(again.error().message)};
-  return {again->verdict == GapVerdict::kNoGap, QByteArray::fromStdString(again->text)};
+  return {again->verdict == gap::GapVerdict::kNoGap, QByteArray::fromStdString(again->text)};
 }
 
 }  // namespace fieldtrue::testing

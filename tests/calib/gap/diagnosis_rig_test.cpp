@@ -1,8 +1,10 @@
 #include <QTest>
 
 #include "tests/calib/gap/diagnosis_checks.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::gap;
 using namespace fieldtrue::testing;
 
 /// What is wrong with the tracker's coils, the rig or the time, withheld from the diagnosis and strong, is named.
@@ -55,7 +57,7 @@ class DiagnosisRigTest : public QObject {
   void namesWhatContradictsAStatedAlignment() {
     QFETCH(QByteArray, effect);
     QFETCH(QByteArray, parameters);
-    Scene believed = gapScene();
+    simulation::Scene believed = gapScene();
     believed.rig.alignment_known = true;
     believed.rig.alignment_tolerance_m = 0.001;
     believed.rig.alignment_tolerance_rad = 0.002;
@@ -81,5 +83,5 @@ class DiagnosisRigTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(DiagnosisRigTest)
+FIELDTRUE_TEST(DiagnosisRigTest)
 #include "diagnosis_rig_test.moc"

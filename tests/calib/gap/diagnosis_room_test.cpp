@@ -3,8 +3,10 @@
 
 #include "calib/gap/diagnosis.h"
 #include "tests/calib/gap/diagnosis_checks.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::gap;
 using namespace fieldtrue::testing;
 
 /// What stands in the room, withheld from the diagnosis and strong, is named, placed, and gone once it is added.
@@ -52,5 +54,5 @@ class DiagnosisRoomTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(DiagnosisRoomTest)
+FIELDTRUE_TEST(DiagnosisRoomTest)
 #include "diagnosis_room_test.moc"

@@ -5,9 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "calib/gap/json.h"
 #include "tests/calib/gap/diagnosis_checks.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::gap;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -124,7 +127,7 @@ class DiagnosisTest : public QObject {
     if (shape == 0) plan.counts = {5, 4, 2};
     if (shape == 2) plan.is_scattered = true;
     if (shape == 3) plan = {.counts = {4, 3, 3}, .orientations = threeTurns()};
-    Scene scene = gapScene();
+    simulation::Scene scene = gapScene();
     scene.effects.push_back({"compact_metal", nlohmann::json::parse(kBody)});
     SampleTable samples;
     CalibrationTable table = recordedIn(scene, gapPlan(plan), 1, shape == 6 ? &samples : nullptr);
@@ -151,7 +154,7 @@ class DiagnosisTest : public QObject {
 
   void believesWhatTheSceneHas() {
     const Withheld made = withheldFrom("compact_metal", kBody);
-    Scene complete = made.believed;
+    simulation::Scene complete = made.believed;
     complete.effects.push_back({"compact_metal", nlohmann::json::parse(kBody)});
     const auto report = diagnose(made.table, nullptr, &complete);
     FT_VERIFY_OK(report);
@@ -165,7 +168,7 @@ class DiagnosisTest : public QObject {
     const auto too_few = diagnose(few, nullptr, nullptr);
     QVERIFY(!too_few && too_few.error().code == ErrorCode::kTooFewNodes);
     FT_VERIFY_MATCH(holdsAll(too_few.error().message, {"8 places", "has 7"}));
-    Scene broken = gapScene();
+    simulation::Scene broken = gapScene();
     broken.effects.push_back({"ghost", {}});
     const auto unknown = diagnose(whole, nullptr, &broken);
     QVERIFY(!unknown && unknown.error().code == ErrorCode::kBadInput);
@@ -188,5 +191,5 @@ class DiagnosisTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(DiagnosisTest)
+FIELDTRUE_TEST(DiagnosisTest)
 #include "diagnosis_test.moc"

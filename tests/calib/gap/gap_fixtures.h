@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "calib/gap/gap_rows.h"
+#include "calib/identify/rows.h"
 #include "calib/simulation/simulator.h"
 
 namespace fieldtrue::testing {
@@ -50,20 +50,20 @@ inline std::vector<PlannedPlace> gapPlan(const GapPlan& options = {}, unsigned s
 }
 
 /// A Fastrak-like tracker half a metre beside the grid, turned; a jig of 1 mm and 3 mrad.
-inline Scene gapScene() {
-  Scene scene;
+inline simulation::Scene gapScene() {
+  simulation::Scene scene;
   scene.reference_from_tracker = {{-0.5, 0.35, 0.25}, rotationFromVector({0.05, -0.03, 0.2})};
   scene.rig.tolerance_m = 0.001;
   scene.rig.tolerance_rad = 0.003;
   return scene;
 }
 
-inline CalibrationTable recordedIn(const Scene& scene, const std::vector<PlannedPlace>& plan, std::uint64_t seed = 1,
-                                   SampleTable* samples = nullptr) {
-  SimulationOptions options;
+inline CalibrationTable recordedIn(const simulation::Scene& scene, const std::vector<PlannedPlace>& plan,
+                                   std::uint64_t seed = 1, SampleTable* samples = nullptr) {
+  simulation::SimulationOptions options;
   options.seed = seed;
   options.samples_per_node = samples != nullptr ? 60 : 20;
-  Simulation simulation = simulate(scene, plan, options).value();
+  simulation::Simulation simulation = simulation::simulate(scene, plan, options).value();
   if (samples != nullptr) *samples = std::move(simulation.samples);
   return std::move(simulation.table);
 }

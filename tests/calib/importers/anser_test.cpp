@@ -4,11 +4,14 @@
 #include <fstream>
 
 #include "calib/core/geometry.h"
+#include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::importers;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -148,5 +151,5 @@ class AnserTest : public QObject {
   std::filesystem::path path_;
 };
 
-QTEST_GUILESS_MAIN(AnserTest)
+FIELDTRUE_TEST(AnserTest)
 #include "anser_test.moc"

@@ -1,13 +1,14 @@
-#include "calib/importers/columns.h"
-
 #include <QTemporaryDir>
 #include <QTest>
 #include <cmath>
 #include <fstream>
 
+#include "calib/importers/rows.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::importers;
 using namespace fieldtrue::testing;
 
 class ColumnsTest : public QObject {
@@ -180,5 +181,5 @@ class ColumnsTest : public QObject {
   QTemporaryDir folder_;
 };
 
-QTEST_GUILESS_MAIN(ColumnsTest)
+FIELDTRUE_TEST(ColumnsTest)
 #include "columns_test.moc"

@@ -4,10 +4,14 @@
 #include <QTest>
 #include <fstream>
 
-#include "calib/core/table_io.h"
+#include "calib/importers/rows.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::importers;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -164,5 +168,5 @@ class FcsvTest : public QObject {
   std::filesystem::path truth_;
 };
 
-QTEST_GUILESS_MAIN(FcsvTest)
+FIELDTRUE_TEST(FcsvTest)
 #include "fcsv_test.moc"

@@ -3,10 +3,13 @@
 #include <fstream>
 #include <set>
 
+#include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::importers;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -15,7 +18,7 @@ Settings defaults(const Importer& importer) { return resolveSettings(importer.id
 
 void addRows() {
   QTest::addColumn<QByteArray>("id");
-  for (const Importer& importer : importers())
+  for (const Importer& importer : importers::importers())
     QTest::newRow(importer.id.c_str()) << QByteArray::fromStdString(importer.id);
 }
 
@@ -30,7 +33,7 @@ class ImporterContractTest : public QObject {
 
   void rowsAreComplete() {
     std::set<std::string> ids;
-    for (const Importer& importer : importers()) {
+    for (const Importer& importer : importers::importers()) {
       QVERIFY(ids.insert(importer.id).second);
       QVERIFY(!importer.label.empty() && !importer.source.empty() && importer.read != nullptr);
       std::set<std::string> keys;
@@ -94,5 +97,5 @@ class ImporterContractTest : public QObject {
   QTemporaryDir folder_;
 };
 
-QTEST_GUILESS_MAIN(ImporterContractTest)
+FIELDTRUE_TEST(ImporterContractTest)
 #include "importer_contract_test.moc"

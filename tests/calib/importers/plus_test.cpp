@@ -1,15 +1,16 @@
-#include "calib/importers/plus.h"
-
 #include <QTemporaryDir>
 #include <QTest>
 #include <fstream>
 #include <map>
 
-#include "calib/core/csv_reader.h"
+#include "calib/importers/rows.h"
+#include "calib/tables/csv_reader.h"
 #include "tests/support/matchers.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::importers;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -180,5 +181,5 @@ class PlusTest : public QObject {
   QTemporaryDir folder_;
 };
 
-QTEST_GUILESS_MAIN(PlusTest)
+FIELDTRUE_TEST(PlusTest)
 #include "plus_test.moc"

@@ -1,14 +1,15 @@
-#include "calib/importers/traj.h"
-
 #include <QTemporaryDir>
 #include <QTest>
 #include <cmath>
 #include <fstream>
 
+#include "calib/importers/rows.h"
 #include "tests/support/matchers.h"
 #include "tests/support/real_data.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::importers;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -102,5 +103,5 @@ class TrajTest : public QObject {
   std::filesystem::path path_;
 };
 
-QTEST_GUILESS_MAIN(TrajTest)
+FIELDTRUE_TEST(TrajTest)
 #include "traj_test.moc"

@@ -3,13 +3,18 @@
 #include <cmath>
 #include <numeric>
 
+#include "calib/core/quantum.h"
 #include "calib/core/statistics.h"
-#include "calib/core/table_io.h"
+#include "calib/effects/effect_row.h"
 #include "calib/effects/registry.h"
 #include "calib/simulation/simulator.h"
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::simulation;
 using fieldtrue::testing::holdsAll;
 using fieldtrue::testing::near;
 using fieldtrue::testing::sameBits;
@@ -261,9 +266,9 @@ void RecordingTest::namesAPlaceWithoutAPose_data() {
   QTest::addColumn<double>("z_m");
   QTest::addColumn<QList<QByteArray>>("fragments");
   using List = QList<QByteArray>;
-  QTest::newRow("too far") << 12.0 << 0.0 << List{"node 41", "visit 3", "12 m", "too weak", "9.14 m"};
-  QTest::newRow("too near") << 0.05 << 0.0 << List{"node 41", "0.05 m", "saturates", "0.1 m"};
-  QTest::newRow("in the metal") << 0.0 << -3.0 << List{"node 41", "3 m", "inside the metal", "effect 1 (metal_plane)"};
+  QTest::newRow("too far") << 12.0 << 0.0 << List{"P41", "visit 3", "12 m", "too weak", "9.14 m"};
+  QTest::newRow("too near") << 0.05 << 0.0 << List{"P41", "0.05 m", "saturates", "0.1 m"};
+  QTest::newRow("in the metal") << 0.0 << -3.0 << List{"P41", "3 m", "inside the metal", "effect 1 (metal_plane)"};
 }
 
 void RecordingTest::namesAPlaceWithoutAPose() {
@@ -347,8 +352,8 @@ void RecordingTest::meetsTheMainsAtAnotherPhaseOnEveryVisit() {
 
 void RecordingTest::repeatsWithEveryEffectAtOnce() {
   Scene scene;
-  for (const Effect& effect : effects()) {
-    scene.effects.push_back({effect.id, resolveEffectParameters(effect, nullptr).value()});
+  for (const effects::Effect& effect : effects::effects()) {
+    scene.effects.push_back({effect.id, effects::resolveEffectParameters(effect, nullptr).value()});
   }
   const std::vector<PlannedPlace> plan = lineOfPlaces(5, 1, 0.6, 0.1);
   const Simulation once = simulate(scene, plan, {}).value();
@@ -368,5 +373,5 @@ void RecordingTest::stopsWhenAsked() {
   QCOMPARE(simulate(Scene{}, lineOfPlaces(3, 1, 0.6, 0.2), {}, control).error().code, ErrorCode::kCancelled);
 }
 
-QTEST_GUILESS_MAIN(RecordingTest)
+FIELDTRUE_TEST(RecordingTest)
 #include "recording_test.moc"

@@ -5,11 +5,14 @@
 #include <fstream>
 
 #include "calib/core/file_io.h"
+#include "calib/effects/effect_row.h"
 #include "calib/effects/registry.h"
 #include "calib/simulation/simulator.h"
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::simulation;
 using fieldtrue::testing::holdsAll;
 
 namespace {
@@ -70,11 +73,11 @@ void SceneTest::readsBackWhatItWrote() {
   scene.tracker.nearest_range_m = 0.05;
   scene.reference_from_tracker = {{0.1, 0.2, 1.0 / 3.0}, Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5)};
   scene.rig = {"pegboard", 0.002, 0.01, true, 0.003, 0.02};
-  const Effect& metal = *findEffect("compact_metal").value();
+  const effects::Effect& metal = *effects::findEffect("compact_metal").value();
   scene.tracker.solver = "damped";
-  scene.effects.push_back({"compact_metal", resolveEffectParameters(metal, {{"radius_m", 0.3}}).value()});
-  for (const Effect& effect : effects()) {
-    scene.effects.push_back({effect.id, resolveEffectParameters(effect, nullptr).value()});
+  scene.effects.push_back({"compact_metal", effects::resolveEffectParameters(metal, {{"radius_m", 0.3}}).value()});
+  for (const effects::Effect& effect : effects::effects()) {
+    scene.effects.push_back({effect.id, effects::resolveEffectParameters(effect, nullptr).value()});
   }
   const nlohmann::json written = toJson(scene);
   const Result<Scene> read = sceneFromJson(nlohmann::json::parse(written.dump()), "written");
@@ -221,15 +224,15 @@ void SceneTest::exampleHoldsEveryKeyWithItsDefault() {
   const std::filesystem::path path = shippedScenes() / "example.scene.json";
   const auto raw = nlohmann::json::parse(readFile(path).value());
   Scene expected;
-  for (const Effect& effect : effects()) {
-    expected.effects.push_back({effect.id, resolveEffectParameters(effect, nullptr).value()});
+  for (const effects::Effect& effect : effects::effects()) {
+    expected.effects.push_back({effect.id, effects::resolveEffectParameters(effect, nullptr).value()});
   }
   expected.name = raw.at("name").get<std::string>();
-  QCOMPARE(raw.at("effects").size(), effects().size());
+  QCOMPARE(raw.at("effects").size(), effects::effects().size());
   std::string missing;
   QVERIFY2(holdsEveryKey(raw, toJson(expected), missing), missing.c_str());
   QVERIFY(toJson(readScene(path).value()) == toJson(expected));
 }
 
-QTEST_GUILESS_MAIN(SceneTest)
+FIELDTRUE_TEST(SceneTest)
 #include "scene_test.moc"

@@ -4,12 +4,14 @@
 #include <cmath>
 
 #include "calib/effects/registry.h"
-#include "calib/field/coupling.h"
+#include "calib/field/dipole_field.h"
 #include "calib/field/pose_solver.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
+#include "tests/support/test_main.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::simulation;
 using fieldtrue::testing::holdsAll;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
@@ -104,10 +106,12 @@ void SimulatorTest::addsItsEffects() {
   const Pose truth{{1.4, 0.2, 0.3}, RandomGeometry(3).rotation()};
   const Eigen::Vector3d& p_m = truth.position_m;
   const Eigen::Matrix3d field =
-      dipoleField(p_m, 1.0) +
-      dynamic_cast<const CouplingDistortion&>(*makeEffect("metal_plane", floor).value()).fieldChange(p_m, 1.0, 0.0) +
-      dynamic_cast<const CouplingDistortion&>(*makeEffect("compact_metal", body).value()).fieldChange(p_m, 1.0, 0.0);
-  const Pose expected = solvePose(couplings(field, truth.orientation), 1.0, p_m)->tracker_from_sensor;
+      field::dipoleField(p_m, 1.0) +
+      dynamic_cast<const field::CouplingDistortion&>(*effects::makeEffect("metal_plane", floor).value())
+          .fieldChange(p_m, 1.0, 0.0) +
+      dynamic_cast<const field::CouplingDistortion&>(*effects::makeEffect("compact_metal", body).value())
+          .fieldChange(p_m, 1.0, 0.0);
+  const Pose expected = field::solvePose(field::couplings(field, truth.orientation), 1.0, p_m)->tracker_from_sensor;
   const Pose seen = simulatorOf(scene).measureExactly(truth, 0.0).tracker_from_sensor;
   FT_VERIFY_MATCH(near(seen, expected, 1e-12, 1e-12));
   QVERIFY((seen.position_m - p_m).norm() > 0.01);
@@ -388,5 +392,5 @@ void SimulatorTest::refusesBadScenes() {
   FT_VERIFY_MATCH(holdsAll(TrackerSimulator::make(scene, 1).error().message, {"attic", "effect 2", "metal_roof"}));
 }
 
-QTEST_GUILESS_MAIN(SimulatorTest)
+FIELDTRUE_TEST(SimulatorTest)
 #include "simulator_test.moc"

@@ -16,13 +16,14 @@
 
 #include "tests/support/matchers.h"
 #include "tests/widgets/gap_fixture.h"
-#include "widgets/pages/main_window.h"
-#include "widgets/views/field_view.h"
-#include "widgets/views/gap_bar_view.h"
-#include "widgets/views/gl_format.h"
-#include "widgets/views/theme.h"
+#include "tests/widgets/window_test.h"
+#include "widgets/shell/main_window.h"
+#include "widgets/style/theme.h"
+#include "widgets/views/charts/gap_bar_view.h"
+#include "widgets/views/field/field_view.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::widgets;
 using namespace fieldtrue::testing;
 
 namespace {
@@ -30,8 +31,8 @@ namespace {
 constexpr int kWaitMs = 120000;
 
 /// Runs until it is stopped, as a long diagnosis would.
-Result<GapReport> runUntilStopped(const CalibrationTable&, const SampleTable*, const Scene*,
-                                  const RunControl& control) {
+Result<gap::GapReport> runUntilStopped(const CalibrationTable&, const SampleTable*, const simulation::Scene*,
+                                       const RunControl& control) {
   while (!control.stop.stop_requested()) {
     control.progress(0.4);
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -75,7 +76,7 @@ class GapPageTest : public QObject {
 
  private:
   /// A page on the known room whose diagnosis answers at once.
-  std::unique_ptr<GapPage> pageThatAnswers(const GapReport& report);
+  std::unique_ptr<GapPage> pageThatAnswers(const gap::GapReport& report);
 
   QTemporaryDir folder_;
   KnownRoom room_;
@@ -93,11 +94,11 @@ void GapPageTest::initTestCase() {
   workbench_ = std::make_unique<Workbench>();
 }
 
-std::unique_ptr<GapPage> GapPageTest::pageThatAnswers(const GapReport& report) {
+std::unique_ptr<GapPage> GapPageTest::pageThatAnswers(const gap::GapReport& report) {
   runs_ = 0;
   effects_believed_.clear();
-  const auto answer = [this, report](const CalibrationTable&, const SampleTable*, const Scene* scene,
-                                     const RunControl&) -> Result<GapReport> {
+  const auto answer = [this, report](const CalibrationTable&, const SampleTable*, const simulation::Scene* scene,
+                                     const RunControl&) -> Result<gap::GapReport> {
     ++runs_;
     effects_believed_.push_back(scene ? scene->effects.size() : 0);
     return report;
@@ -130,13 +131,13 @@ void GapPageTest::tooFewPlacesSayWhatIsMissing() {
 }
 
 void GapPageTest::showsWhatTheReportSays() {
-  const GapReport report = writtenReport();
+  const gap::GapReport report = writtenReport();
   const auto page = pageThatAnswers(report);
   QCOMPARE(textOf(*page, "headline"),
            QStringLiteral("Partly explained: ") + QString::fromStdString(effectLabel("compact_metal")));
   QCOMPARE(textOf(*page, "gapSentence"), QString::fromStdString(report.text));
   QVERIFY(textOf(*page, "gapNext").contains(QString::fromStdString(report.next_measurement)));
-  QVERIFY(textOf(*page, "gapPrediction").contains(QStringLiteral("Place 2 falls from 31 to 12 +- 4 mm")));
+  QVERIFY(textOf(*page, "gapPrediction").contains(QStringLiteral("P2 falls from 31 to 12 +- 4 mm")));
 
   const GapBarChart& probability = chart(*page, "probability");
   QCOMPARE(probability.bars.size(), std::size_t{3});
@@ -162,7 +163,7 @@ void GapPageTest::showsWhatTheReportSays() {
 }
 
 void GapPageTest::switchShowsWhatIsLeft() {
-  const GapReport report = writtenReport();
+  const gap::GapReport report = writtenReport();
   const auto page = pageThatAnswers(report);
   const ErrorField& field = find<FieldView>(*page, "gapField")->field();
   QCOMPARE(field.arrows.size(), report.nodes.size());
@@ -227,7 +228,7 @@ void GapPageTest::otherRowsDropTheReport() {
 }
 
 void GapPageTest::whyItFailedIsTold() {
-  GapPage page(*workbench_, [](auto&&...) -> Result<GapReport> {
+  GapPage page(*workbench_, [](auto&&...) -> Result<gap::GapReport> {
     return fail(ErrorCode::kTooFewNodes, "Diagnosis needs 12 places, got 3");
   });
   page.setRecording(room_.table, {});
@@ -253,7 +254,7 @@ void GapPageTest::goesWhileRunning() {
 
 void GapPageTest::realDiagnosisStopsSoon() {
   auto page = std::make_unique<GapPage>(*workbench_);
-  page->setRecording(room_.table, room_.samples);
+  page->setRecording(room_.table, [this] { return room_.samples; });
   find<QPushButton>(*page, "diagnose")->click();
   QTest::qWait(300);
   page.reset();
@@ -280,7 +281,7 @@ void GapPageTest::windowFindsTheMetal() {
   QTest::mouseClick(find<QWidget>(window, "step_gap"), Qt::LeftButton);
   auto* page = window.findChild<GapPage*>();
   QVERIFY(page && page->isVisible());
-  page->setRecording(room_.table, room_.samples);
+  page->setRecording(room_.table, [this] { return room_.samples; });
   QTest::mouseClick(find<QWidget>(*page, "diagnose"), Qt::LeftButton);
   QVERIFY(page->isDiagnosing());
   QTRY_VERIFY_WITH_TIMEOUT(!page->isDiagnosing(), kWaitMs);
@@ -305,16 +306,5 @@ void GapPageTest::windowFindsTheMetal() {
   QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-after.png")));
 }
 
-int main(int argc, char** argv) {
-  if (qEnvironmentVariableIsEmpty("DISPLAY")) {
-    qInfo("skipped: there is no display; run it under xvfb-run");
-    return 0;
-  }
-  setDefaultGlFormat();
-  QApplication application(argc, argv);
-  QApplication::setApplicationName(QStringLiteral("fieldtrue-test"));
-  GapPageTest test;
-  return QTest::qExec(&test, argc, argv);
-}
-
+FIELDTRUE_WINDOW_TEST(GapPageTest)
 #include "gap_page_test.moc"

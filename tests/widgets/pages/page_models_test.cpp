@@ -6,36 +6,39 @@
 #include <QTemporaryDir>
 #include <QTest>
 
-#include "widgets/pages/compared_methods.h"
-#include "widgets/pages/field_scales.h"
-#include "widgets/pages/node_facts.h"
+#include "acquisition/plan/place_state.h"
+#include "calib/evaluation/error_stats.h"
+#include "tests/support/test_main.h"
+#include "widgets/compare/field_scales.h"
+#include "widgets/compare/node_facts.h"
+#include "widgets/compare/score_model.h"
+#include "widgets/figures/field_scale.h"
+#include "widgets/forms/settings_form.h"
 #include "widgets/pages/place_list_model.h"
-#include "widgets/pages/score_model.h"
-#include "widgets/pages/settings_form.h"
-#include "widgets/pages/units.h"
-#include "widgets/views/field_scale.h"
+#include "widgets/style/unit_texts.h"
+#include "widgets/workbench/compared_methods.h"
 
-namespace fieldtrue {
+namespace fieldtrue::widgets {
 namespace {
 
-ErrorStats statsOf(double rms) { return {rms, rms, rms, rms, rms, rms, rms}; }
+evaluation::ErrorStats statsOf(double rms) { return {rms, rms, rms, rms, rms, rms, rms}; }
 
 // Two places; polynomial halves the error, hmq doubles it, affine cannot be used.
-Comparison smallComparison() {
-  Comparison comparison;
+evaluation::Comparison smallComparison() {
+  evaluation::Comparison comparison;
   comparison.places = {3, 7};
   comparison.before_position_mm = statsOf(10.0);
   comparison.before_place_mm = {10.0, 10.0};
   comparison.before_residual_m = {Eigen::Vector3d(0.01, 0, 0), Eigen::Vector3d(0, 0.01, 0)};
   auto score = [](const char* method, double rms) {
-    MethodScore result;
+    evaluation::MethodScore result;
     result.method = method;
     result.stats = statsOf(rms);
     result.place_errors = {rms, rms};
     result.residual_m = {Eigen::Vector3d(rms / 1000.0, 0, 0), Eigen::Vector3d(0, rms / 1000.0, 0)};
     return result;
   };
-  MethodScore unusable;
+  evaluation::MethodScore unusable;
   unusable.method = "affine";
   unusable.skipped = "Affine needs 4 places, got 2";
   comparison.position = {score("none", 10.0), score("polynomial", 5.0), score("hmq", 20.0), unusable};
@@ -116,7 +119,7 @@ class PageModelsTest : public QObject {
   }
 
   void fieldArrowsStandAtTheTruePlaces() {
-    const Comparison comparison = smallComparison();
+    const evaluation::Comparison comparison = smallComparison();
     CalibrationTable table;
     for (int number : {3, 7}) {
       Node node;
@@ -141,8 +144,8 @@ class PageModelsTest : public QObject {
   }
 
   void differencesToTheBestAreMarked() {
-    Comparison comparison = smallComparison();
-    MethodScore close = comparison.position[1];
+    evaluation::Comparison comparison = smallComparison();
+    evaluation::MethodScore close = comparison.position[1];
     close.method = "rbf";
     close.stats = statsOf(5.2);
     close.rms_to_best = 0.2;
@@ -180,7 +183,7 @@ class PageModelsTest : public QObject {
   }
 
   void residualsOfAPlaceAreSorted() {
-    Comparison comparison = smallComparison();
+    evaluation::Comparison comparison = smallComparison();
     comparison.position[2].place_covered = {true, false};
     const std::vector<PlaceResidual> residuals = positionResiduals(comparison, 7);
     QCOMPARE(residuals.size(), std::size_t{3});
@@ -238,7 +241,7 @@ class PageModelsTest : public QObject {
     planned[1].node = 1;
     PlaceListModel model;
     model.setPlaces(planned);
-    model.setStates({PlaceState::kDone, PlaceState::kSkipped}, std::nullopt);
+    model.setStates({acquisition::PlaceState::kDone, acquisition::PlaceState::kSkipped}, std::nullopt);
     CalibrationTable table;
     Node node;
     node.n_used = 58;
@@ -254,7 +257,7 @@ class PageModelsTest : public QObject {
     QCOMPARE(text(0, 3), QStringLiteral("2.00"));
     QCOMPARE(text(0, 4), QStringLiteral("2"));
     QCOMPARE(text(1, 1), QStringLiteral("skipped"));
-    model.setStates({PlaceState::kDone, PlaceState::kSkipped}, 1);
+    model.setStates({acquisition::PlaceState::kDone, acquisition::PlaceState::kSkipped}, 1);
     QCOMPARE(text(1, 1), QStringLiteral("next"));
   }
 
@@ -271,21 +274,26 @@ class PageModelsTest : public QObject {
   }
   void threeFigures() {
     QFETCH(double, value);
-    QTEST(fieldtrue::threeFigures(value), "text");
+    QTEST(fieldtrue::widgets::threeFigures(value), "text");
   }
 
  private:
   QTemporaryDir folder_;
 };
 
-}  // namespace fieldtrue
+}  // namespace fieldtrue::widgets
 
-int main(int argc, char** argv) {
+namespace {
+
+int runOffscreen(int argc, char** argv) {
   qputenv("QT_QPA_PLATFORM", "offscreen");
   QApplication application(argc, argv);
   QApplication::setApplicationName(QStringLiteral("fieldtrue-test"));
-  fieldtrue::PageModelsTest test;
-  return QTest::qExec(&test, argc, argv);
+  fieldtrue::widgets::PageModelsTest test;
+  return fieldtrue::testing::runTest(test, argc, argv);
 }
 
+}  // namespace
+
+FIELDTRUE_TEST_PROGRAM(runOffscreen)
 #include "page_models_test.moc"

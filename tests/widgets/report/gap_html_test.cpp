@@ -1,22 +1,30 @@
 #include <QFile>
+#include <QImage>
+#include <QProcess>
+#include <QProcessEnvironment>
 #include <QTemporaryDir>
 #include <QTest>
 
 #include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
 #include "tests/support/xml_tree.h"
 #include "tests/widgets/gap_fixture.h"
+#include "widgets/figures/gap_bars.h"
+#include "widgets/figures/gap_field.h"
 #include "widgets/report/gap_section.h"
 #include "widgets/report/report.h"
-#include "widgets/views/gap_bars.h"
+#include "widgets/views/draw_picture.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::widgets;
 using namespace fieldtrue::testing;
 
 namespace {
 
-std::unique_ptr<XmlElement> parsed(const GapReport& report, bool with_pictures) {
+std::unique_ptr<XmlElement> parsed(const gap::GapReport& report, bool with_pictures) {
   QString error;
-  auto page = parseXml(QByteArray::fromStdString(gapHtml(report, with_pictures)), error);
+  auto page =
+      parseXml(QByteArray::fromStdString(gapHtml(report, with_pictures ? DrawPictures(drawPictures) : nullptr)), error);
   if (!error.isEmpty()) qFatal("%s", qPrintable(error));
   return page;
 }
@@ -34,7 +42,7 @@ class GapHtmlTest : public QObject {
 
  private slots:
   void tellsWhatTheReportSays() {
-    const GapReport report = writtenReport();
+    const gap::GapReport report = writtenReport();
     const auto page = parsed(report, false);
     for (const std::string& words :
          {gapHeadline(report), report.text, report.next_measurement, report.findings[0].text, predictionText(report)})
@@ -43,7 +51,7 @@ class GapHtmlTest : public QObject {
   }
 
   void everyBarIsDrawnToScale() {
-    const GapReport report = writtenReport();
+    const gap::GapReport report = writtenReport();
     const auto page = parsed(report, false);
     for (const GapBarChart& chart : gapCharts(report)) {
       const XmlElement* drawn = figure(*page, QStringLiteral("gap-") + QString::fromStdString(chart.id));
@@ -59,7 +67,7 @@ class GapHtmlTest : public QObject {
   }
 
   void longNotesAreWholeAndStayBetweenBars() {
-    GapReport report = writtenReport();
+    gap::GapReport report = writtenReport();
     std::string doubt = "first";
     for (int i = 0; i < 60; ++i) doubt += " word" + std::to_string(i);
     report.candidates[0].is_plausible = false;
@@ -80,7 +88,7 @@ class GapHtmlTest : public QObject {
   }
 
   void wordsOfAReportCannotBreakThePage() {
-    GapReport report = writtenReport();
+    gap::GapReport report = writtenReport();
     report.text = "a < b & \"c\" </p><script>x</script>";
     const auto page = parsed(report, false);
     QVERIFY(page->text.contains(QString::fromStdString(report.text)));
@@ -88,20 +96,54 @@ class GapHtmlTest : public QObject {
   }
 
   void anEmptyReportIsAPage() {
-    const auto page = parsed(GapReport{}, false);
+    const auto page = parsed(gap::GapReport{}, false);
     QVERIFY(page->text.contains(QStringLiteral("The simulation matches the recording")));
     QVERIFY(!figure(*page, QStringLiteral("gap-waterfall")));
   }
 
-  void fieldsAreDrawnOrTheReasonIsTold() {
+  void fieldsAreDrawn() {
+    QString why;
+    if (renderPicture({FieldPicture{}, 64, 64, false}, &why).isNull())
+      QSKIP(qPrintable("this machine draws no pictures: " + why));
     const auto page = parsed(writtenReport(), true);
-    const bool drawn = figure(*page, QStringLiteral("gap-before")) && figure(*page, QStringLiteral("gap-after"));
-    QVERIFY(drawn || page->text.contains(QStringLiteral("Picture could not be drawn:")));
+    for (const char* id : {"gap-before", "gap-after"}) {
+      const XmlElement* drawn = figure(*page, QString::fromLatin1(id));
+      QVERIFY2(drawn, id);
+      const QString source = drawn->all("img").front()->attributes["src"].section(',', 1);
+      QVERIFY(!QImage::fromData(QByteArray::fromBase64(source.toLatin1()), "PNG").isNull());
+    }
+    QVERIFY(!page->text.contains(QStringLiteral("could not be drawn")));
+  }
+
+  void withoutGraphicsTheReasonIsTold() {
+    // EGL is asked for its drivers once in a process: the page without them is made in another one.
+    constexpr const char* kNoDrivers = "__EGL_VENDOR_LIBRARY_FILENAMES";
+    if (!qEnvironmentVariableIsSet(kNoDrivers)) {
+      QProcess without;
+      auto environment = QProcessEnvironment::systemEnvironment();
+      environment.insert(QString::fromLatin1(kNoDrivers), QStringLiteral("/no/such/driver.json"));
+      without.setProcessEnvironment(environment);
+      without.start(QCoreApplication::applicationFilePath(),
+                    {QStringLiteral("gap_html_test"), QStringLiteral("withoutGraphicsTheReasonIsTold")});
+      QVERIFY(without.waitForFinished());
+      const QByteArray said = without.readAllStandardOutput() + without.readAllStandardError();
+      QVERIFY2(without.exitStatus() == QProcess::NormalExit && without.exitCode() == 0, said.constData());
+      return;
+    }
+    const auto page = parsed(writtenReport(), true);
+    QVERIFY(!figure(*page, QStringLiteral("gap-before")) && !figure(*page, QStringLiteral("gap-after")));
+    QVERIFY(page->text.contains(QStringLiteral("Pictures could not be drawn: pictures need OpenGL 3.2")));
+  }
+
+  void aPageOfItsOwnHasATitle() {
+    const auto page = parsed(writtenReport(), false);
+    QCOMPARE(page->all("title").front()->text, QStringLiteral("Simulation and reality"));
+    QCOMPARE(page->all("h1").size(), std::size_t{1});
+    QCOMPARE(page->all("h1").front()->text, QStringLiteral("Simulation and reality"));
   }
 
   void theSessionsReportTellsItToo() {
     ReportInput input;
-    input.with_pictures = false;
     QVERIFY(htmlReport(input).find("Simulation and reality") == std::string::npos);
     input.gap = writtenReport();
     QString error;
@@ -115,13 +157,13 @@ class GapHtmlTest : public QObject {
   void writingWhereNobodyCanIsAnError() {
     QTemporaryDir folder;
     const auto path = (folder.path() + QStringLiteral("/no/such/gap.html")).toStdString();
-    const auto written = writeGapHtml(GapReport{}, path);
+    const auto written = writeGapHtml(gap::GapReport{}, drawPictures, path);
     QVERIFY(!written.has_value());
     QVERIFY(written.error().code == ErrorCode::kIo);
   }
 
   void bodiesStandInTheRigsFrame() {
-    GapReport report = writtenReport();
+    gap::GapReport report = writtenReport();
     report.tracker_from_reference = {{0.0, 0.0, 1.0}, rotationFromVector({0.0, 0.0, M_PI / 2.0})};
     const ErrorField field = gapField(report, false);
     // x_tracker = Rz(90) x_rig + (0, 0, 1): the tracker's (0.9, 0.1, -0.4) is the rig's (0.1, -0.9, -1.4).
@@ -131,28 +173,28 @@ class GapHtmlTest : public QObject {
   }
 
   void planesAndLoopsKeepTheirShape() {
-    GapReport report = writtenReport();
-    SelectedEffect plane;
+    gap::GapReport report = writtenReport();
+    gap::SelectedEffect plane;
     plane.effect = "metal_plane";
     plane.location_m = Eigen::Vector3d(0.0, 0.0, -1.2);
     plane.scene_parameters = {{"toward", {0.0, 0.0, -1.0}}, {"distance_m", 1.2}};
     plane.parameters = {{"distance_m", "m", 1.2, 1.15, 1.3}};
-    SelectedEffect loop;
+    gap::SelectedEffect loop;
     loop.effect = "closed_loop";
     loop.location_m = Eigen::Vector3d(1.0, 0.0, 0.0);
     loop.scene_parameters = {{"center_m", {1.0, 0.0, 0.0}}, {"normal", {0.0, 2.0, 0.0}}, {"radius_m", 0.3}};
     report.selected = {plane, loop};
     const auto bodies = gapField(report, false).bodies;
     QCOMPARE(bodies.size(), std::size_t{2});
-    QVERIFY(bodies[0].kind == BodyKind::kPlane);
+    QVERIFY(bodies[0].shape == effects::DrawnShape::kPlane);
     FT_VERIFY_MATCH(near(*bodies[0].nearest_m, -0.05, 1e-12));
     FT_VERIFY_MATCH(near(*bodies[0].farthest_m, 0.1, 1e-12));
     QVERIFY(bodyLabel(bodies[0]).ends_with("10 cm"));
-    QVERIFY(bodies[1].kind == BodyKind::kLoop);
+    QVERIFY(bodies[1].shape == effects::DrawnShape::kLoop);
     QCOMPARE(bodies[1].radius_m, 0.3);
     FT_VERIFY_MATCH(near(bodies[1].normal, Eigen::Vector3d(0.0, 1.0, 0.0), 1e-12));
   }
 };
 
-QTEST_GUILESS_MAIN(GapHtmlTest)
+FIELDTRUE_TEST(GapHtmlTest)
 #include "gap_html_test.moc"

@@ -4,7 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "calib/core/number_text.h"
+#include "tests/support/test_main.h"
+
 using namespace fieldtrue;
+using namespace fieldtrue::widgets;
 
 class NumbersTest : public QObject {
   Q_OBJECT
@@ -53,7 +57,7 @@ class NumbersTest : public QObject {
   void decimals() {
     QFETCH(double, value);
     QFETCH(int, count);
-    QCOMPARE(QString::fromStdString(decimalText(value, count)), expectedText());
+    QCOMPARE(QString::fromStdString(fixedText(value, count)), expectedText());
   }
 
   void durations_data() {
@@ -77,5 +81,5 @@ class NumbersTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(NumbersTest)
+FIELDTRUE_TEST(NumbersTest)
 #include "numbers_test.moc"

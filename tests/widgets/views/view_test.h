@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "acquisition/session/session_store.h"
-#include "widgets/views/error_field.h"
-#include "widgets/views/gl_format.h"
-#include "widgets/views/theme.h"
+#include "tests/support/test_main.h"
+#include "widgets/figures/error_field.h"
+#include "widgets/style/theme.h"
+#include "widgets/views/host/gl_format.h"
 
-namespace fieldtrue::test {
+namespace fieldtrue::widgets::test {
 
 inline bool hasDisplay() { return QGuiApplication::platformName() != QLatin1String("offscreen"); }
 
@@ -74,10 +75,9 @@ int runViewTest(int argc, char** argv) {
   QApplication application(argc, argv);
   applyTheme(application, false);
   Test test;
-  return QTest::qExec(&test, argc, argv);
+  return fieldtrue::testing::runTest(test, argc, argv);
 }
 
-}  // namespace fieldtrue::test
+}  // namespace fieldtrue::widgets::test
 
-#define VIEW_TEST_MAIN(Test) \
-  int main(int argc, char** argv) { return fieldtrue::test::runViewTest<Test>(argc, argv); }
+#define VIEW_TEST(Test) FIELDTRUE_TEST_PROGRAM(::fieldtrue::widgets::test::runViewTest<Test>)

@@ -8,15 +8,17 @@
 #include <memory>
 #include <numbers>
 
+#include "acquisition/plan/place_state.h"
 #include "tests/widgets/views/view_test.h"
-#include "widgets/views/chart_views.h"
-#include "widgets/views/field_view.h"
-#include "widgets/views/picture.h"
-#include "widgets/views/projection.h"
-#include "widgets/views/room_view.h"
+#include "widgets/views/charts/chart_views.h"
+#include "widgets/views/draw_picture.h"
+#include "widgets/views/field/field_view.h"
+#include "widgets/views/host/projection.h"
+#include "widgets/views/room/room_view.h"
 
 using namespace fieldtrue;
-using namespace fieldtrue::test;
+using namespace fieldtrue::widgets;
+using namespace fieldtrue::widgets::test;
 
 namespace {
 
@@ -243,15 +245,15 @@ class ViewsDisplayTest : public QObject {
     const std::vector<PlannedPlace> places = gridPlaces();
     view.setPlaces(places);
     show(view);
-    std::vector<PlaceState> states(places.size(), PlaceState::kPlanned);
+    std::vector<acquisition::PlaceState> states(places.size(), acquisition::PlaceState::kPlanned);
     const auto count = [&view](const QColor& color) {
       const QImage image = shot(view);
       return countColor(image, color, 3, QRect(150, 0, image.width() - 150, image.height()));
     };
     QCOMPARE(count(theme().done), 0);
     QCOMPARE(count(theme().accent), 0);
-    states[0] = PlaceState::kDone;
-    states[1] = PlaceState::kSuspicious;
+    states[0] = acquisition::PlaceState::kDone;
+    states[1] = acquisition::PlaceState::kSuspicious;
     view.setStates(states, 2);
     QVERIFY(count(theme().done) > 50);
     QVERIFY(count(theme().attention) > 50);
@@ -267,7 +269,7 @@ class ViewsDisplayTest : public QObject {
     const QImage still = shot(view);
     QTest::qWait(400);
     QCOMPARE(shot(view), still);
-    view.setStates(std::vector<PlaceState>(places.size(), PlaceState::kPlanned), 13);
+    view.setStates(std::vector<acquisition::PlaceState>(places.size(), acquisition::PlaceState::kPlanned), 13);
     const QImage pulse = shot(view);
     QTRY_VERIFY(shot(view) != pulse);
   }
@@ -312,7 +314,8 @@ class ViewsDisplayTest : public QObject {
     const QImage before = shot(view);
     view.makeCurrent();
     QString why;
-    const QImage picture = renderFieldPicture(uniformField({0.0, 0.04, 0.0}), 60.0, 1.0, {400, 300}, false, &why);
+    const QImage picture =
+        renderPicture({FieldPicture{uniformField({0.0, 0.04, 0.0}), 60.0, 1.0}, 400, 300, false}, &why);
     QVERIFY2(!picture.isNull(), qPrintable(why));
     QCOMPARE(QOpenGLContext::currentContext(), view.context());
     view.doneCurrent();
@@ -329,5 +332,5 @@ class ViewsDisplayTest : public QObject {
   }
 };
 
-VIEW_TEST_MAIN(ViewsDisplayTest)
+VIEW_TEST(ViewsDisplayTest)
 #include "views_display_test.moc"

@@ -1,15 +1,18 @@
+#include "acquisition/plan/place_state.h"
+#include "tests/support/test_main.h"
 #include "tests/widgets/views/view_test.h"
-#include "widgets/views/picture.h"
+#include "widgets/views/draw_picture.h"
 
 using namespace fieldtrue;
-using namespace fieldtrue::test;
+using namespace fieldtrue::widgets;
+using namespace fieldtrue::widgets::test;
 
 namespace {
 
 const QSize kSize(800, 500);
 
 QImage fieldPicture(const ErrorField& field, double scale_max_mm = 60.0, bool dark = false, QString* why = nullptr) {
-  return renderFieldPicture(field, scale_max_mm, 3.0, kSize, dark, why);
+  return renderPicture({FieldPicture{field, scale_max_mm, 3.0}, kSize.width(), kSize.height(), dark}, why);
 }
 
 }  // namespace
@@ -59,15 +62,16 @@ class ViewsPictureTest : public QObject {
 
   void roomPictureTellsStates() {
     const std::vector<PlannedPlace> places = gridPlaces();
-    std::vector<PlaceState> states(places.size(), PlaceState::kPlanned);
+    std::vector<acquisition::PlaceState> states(places.size(), acquisition::PlaceState::kPlanned);
     const auto count = [&](const QColor& color) {
-      return countColor(renderRoomPicture(places, states, Pose{}, kSize, false), color, 3, QRect(150, 0, 650, 500));
+      return countColor(renderPicture({RoomPicture{places, states, Pose{}}, kSize.width(), kSize.height(), false}),
+                        color, 3, QRect(150, 0, 650, 500));
     };
     const Theme& t = Theme::of(false);
     QCOMPARE(count(t.done), 0);
     QCOMPARE(count(t.attention), 0);
-    states[4] = PlaceState::kDone;
-    states[9] = PlaceState::kSuspicious;
+    states[4] = acquisition::PlaceState::kDone;
+    states[9] = acquisition::PlaceState::kSuspicious;
     QVERIFY(count(t.done) > 50);
     QVERIFY(count(t.attention) > 50);
   }
@@ -78,7 +82,8 @@ class ViewsPictureTest : public QObject {
       before.push_back(20.0 + 0.4 * k);
       after.push_back(0.1 * k);
     }
-    const QImage image = renderHistogramPicture({"Before", "After"}, {before, after}, "error (mm)", kSize, false);
+    const QImage image = renderPicture(
+        {HistogramPicture{{"Before", "After"}, {before, after}, "error (mm)"}, kSize.width(), kSize.height(), false});
     QCOMPARE(image.size(), kSize);
     QVERIFY(countColor(image, Theme::of(false).accent, 2, QRect(0, 100, 300, 400)) > 500);
     QVERIFY(countColor(image, QColor(0x8b, 0x97, 0xa3), 2, QRect(400, 100, 400, 400)) > 500);
@@ -86,10 +91,10 @@ class ViewsPictureTest : public QObject {
 
   void tooLargeIsRefusedInWords() {
     QString why;
-    QVERIFY(renderFieldPicture(uniformField({0.01, 0.0, 0.0}), 60.0, 1.0, QSize(20000, 100), false, &why).isNull());
+    QVERIFY(renderPicture({FieldPicture{uniformField({0.01, 0.0, 0.0}), 60.0, 1.0}, 20000, 100, false}, &why).isNull());
     QVERIFY2(why.contains("20000"), qPrintable(why));
   }
 };
 
-QTEST_GUILESS_MAIN(ViewsPictureTest)
+FIELDTRUE_TEST(ViewsPictureTest)
 #include "views_picture_test.moc"

@@ -5,12 +5,15 @@
 #include <QTest>
 #include <numbers>
 
-#include "widgets/views/camera.h"
-#include "widgets/views/histogram_scene.h"
-#include "widgets/views/overlay.h"
-#include "widgets/views/scene_space.h"
+#include "calib/core/number_text.h"
+#include "tests/support/test_main.h"
+#include "widgets/figures/scene_space.h"
+#include "widgets/views/charts/histogram_scene.h"
+#include "widgets/views/host/camera.h"
+#include "widgets/views/host/overlay.h"
 
 using namespace fieldtrue;
+using namespace fieldtrue::widgets;
 
 namespace {
 
@@ -217,5 +220,5 @@ class ViewsSceneTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(ViewsSceneTest)
+FIELDTRUE_TEST(ViewsSceneTest)
 #include "views_scene_test.moc"

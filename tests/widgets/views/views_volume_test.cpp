@@ -9,16 +9,19 @@
 #include <numbers>
 #include <set>
 
+#include "tests/support/test_main.h"
 #include "tests/widgets/views/view_test.h"
-#include "widgets/views/camera.h"
-#include "widgets/views/curve_scene.h"
-#include "widgets/views/field_scene.h"
-#include "widgets/views/histogram_scene.h"
-#include "widgets/views/offscreen_gl.h"
-#include "widgets/views/volume_field.h"
+#include "widgets/style/color_scale.h"
+#include "widgets/views/charts/curve_scene.h"
+#include "widgets/views/charts/histogram_scene.h"
+#include "widgets/views/field/field_scene.h"
+#include "widgets/views/field/volume_field.h"
+#include "widgets/views/host/camera.h"
+#include "widgets/views/host/offscreen_gl.h"
 
 using namespace fieldtrue;
-using namespace fieldtrue::test;
+using namespace fieldtrue::widgets;
+using namespace fieldtrue::widgets::test;
 
 namespace {
 
@@ -225,5 +228,5 @@ class ViewsVolumeTest : public QObject {
   }
 };
 
-QTEST_GUILESS_MAIN(ViewsVolumeTest)
+FIELDTRUE_TEST(ViewsVolumeTest)
 #include "views_volume_test.moc"

@@ -1,0 +1,158 @@
+#include "acquisition/sampling/node_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "acquisition/sampling/shift_test.h"
+#include "acquisition/sampling/stillness.h"
+
+namespace fieldtrue::acquisition {
+
+namespace {
+
+constexpr double kSuspiciousRejectedShare = 0.1;
+constexpr double kSuspiciousSpreadRatio = 3.0;
+constexpr std::size_t kMinNeighbours = 3;
+constexpr double kMinSpread_m = 1e-4;  ///< An SD below this is never suspicious.
+constexpr double kRadToDeg = 57.29577951308232;
+
+std::string format(const char* pattern, double value) {
+  char text[96];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+std::string millimetres(double value_m) { return format(value_m < 0.01 ? "%.1f mm" : "%.0f mm", value_m * 1e3); }
+
+std::string times(int count) {
+  if (count == 1) return "once";
+  return count == 2 ? "twice" : std::to_string(count) + " times";
+}
+
+}  // namespace
+
+NodeSampler::NodeSampler(SamplerOptions options) : options_(std::move(options)) {
+  FT_CHECK(options_.samples_per_node >= 1 && options_.block >= 1 && options_.time_limit_s > 0.0);
+}
+
+void NodeSampler::start() {
+  cancel();
+  state_ = TakeState::kCollecting;
+}
+
+void NodeSampler::cancel() {
+  state_ = TakeState::kIdle;
+  collected_ = restarts_ = bad_ = 0;
+  last_status_.clear();
+  last_motion_.clear();
+  first_time_s_.reset();
+  message_.clear();
+  samples_.clear();
+  abandoned_.clear();
+  statistics_.reset();
+}
+
+TakeState NodeSampler::add(const Sample& sample) {
+  if (state_ != TakeState::kCollecting) return state_;
+  if (!first_time_s_) first_time_s_ = sample.time_s;
+  samples_.push_back(sample);
+  if (isGood(sample)) {
+    ++collected_;
+  } else {
+    ++bad_;
+    last_status_ = sample.status;
+  }
+  const bool complete = collected_ >= options_.samples_per_node;
+  if (isGood(sample) && (complete || collected_ % options_.block == 0)) {
+    if (const auto moved = motion()) {
+      startOver(*moved);
+    } else if (complete) {
+      finish();
+    }
+  }
+  if (state_ == TakeState::kCollecting && sample.time_s - *first_time_s_ >= options_.time_limit_s) {
+    state_ = TakeState::kFailed;
+    message_ = timeLimitReason();
+  }
+  return state_;
+}
+
+std::optional<std::string> NodeSampler::motion() const {
+  std::vector<Eigen::Vector3d> positions_m, turns_rad;
+  std::optional<Eigen::Quaterniond> first;
+  for (const Sample& sample : samples_) {
+    if (!isGood(sample)) continue;
+    const Pose& pose = sample.tracker_from_sensor;
+    const Eigen::Quaterniond orientation = pose.orientation.normalized();
+    if (!first) first = orientation;
+    positions_m.push_back(pose.position_m);
+    turns_rad.push_back(rotationVector_rad(orientation * first->conjugate()));
+  }
+  const Shift shift = largestShift(positions_m, options_.block, options_.still_floor_m, options_.still_sigmas);
+  if (shift.moved()) return "moved " + millimetres(shift.size);
+  const Shift turn = largestShift(turns_rad, options_.block, options_.still_floor_rad, options_.still_sigmas);
+  if (turn.moved()) return "turned " + format("%.1f degrees", turn.size * kRadToDeg);
+  return std::nullopt;
+}
+
+void NodeSampler::startOver(const std::string& motion) {
+  ++restarts_;
+  last_motion_ = motion;
+  message_ = "retaking: " + motion;
+  collected_ = 0;
+  abandoned_.insert(abandoned_.end(), samples_.begin(), samples_.end());
+  samples_.clear();
+}
+
+void NodeSampler::finish() {
+  const Result<NodeStatistics> averaged = averageSamples(samples_, options_.averaging);
+  if (!averaged) {
+    state_ = TakeState::kFailed;
+    message_ = averaged.error().message;
+    return;
+  }
+  statistics_ = *averaged;
+  state_ = TakeState::kDone;
+  message_.clear();
+}
+
+std::string NodeSampler::timeLimitReason() const {
+  std::string text = format("not finished within %g s: ", options_.time_limit_s) + std::to_string(collected_) + " of " +
+                     std::to_string(options_.samples_per_node) + " good samples";
+  if (restarts_ > 0) text += ", started over " + times(restarts_) + " (" + last_motion_ + "); let the sensor rest";
+  if (bad_ > 0) {
+    text += ", " + std::to_string(bad_) + " not usable";
+    if (!last_status_.empty()) text += " (the tracker reports error " + last_status_ + ")";
+  }
+  return text;
+}
+
+std::string suspicionOf(const NodeStatistics& statistics, int restarts, std::vector<NeighbourTake> neighbours) {
+  std::vector<std::string> reasons;
+  const std::size_t rejected = statistics.rejections.size();
+  const std::size_t total = statistics.n_used + rejected;
+  if (static_cast<double>(rejected) > kSuspiciousRejectedShare * static_cast<double>(total)) {
+    reasons.push_back(std::to_string(rejected) + " of " + std::to_string(total) + " samples left out");
+  }
+  if (restarts > 0) reasons.push_back("moved " + times(restarts) + " while sampling");
+  const double spread_m = std::sqrt(std::max(statistics.covariance_m2.trace(), 0.0));
+  const double range_m = statistics.mean.position_m.norm();
+  if (neighbours.size() >= kMinNeighbours) {
+    std::vector<double> expected_m;
+    for (const NeighbourTake& neighbour : neighbours) {
+      const double farther = neighbour.range_m > 0.0 ? std::max(range_m / neighbour.range_m, 1.0) : 1.0;
+      expected_m.push_back(neighbour.spread_m * std::pow(farther, 4));
+    }
+    const double usual_m = median(expected_m);
+    if (spread_m > kMinSpread_m && spread_m > kSuspiciousSpreadRatio * usual_m) {
+      reasons.push_back("SD " + format("%.2g mm", spread_m * 1e3) + " where its neighbours lead one to expect " +
+                        format("%.2g mm", usual_m * 1e3));
+    }
+  }
+  std::string text;
+  for (const std::string& reason : reasons) text += (text.empty() ? "" : "; ") + reason;
+  return text;
+}
+
+}  // namespace fieldtrue::acquisition

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/core/calibration_table.h"
+
+namespace fieldtrue::acquisition {
+
+/// Whether a sample may enter an average: no error status, and finite numbers.
+bool isGood(const Sample& sample);
+
+/// Watches the stream of one sensor and says whether it stands still, with the reason in words.
+class StillnessDetector {
+ public:
+  /// @param window_s how much of the stream is judged, in the samples' own time
+  /// @param floor_m drift over the window up to this is never motion
+  explicit StillnessDetector(double window_s = 0.5, double floor_m = 0.0005);
+  void add(const Sample& sample);
+  void clear();
+  bool still() const;
+  double speed_m_s() const;    ///< Drift of the mean over the window.
+  double spread_m() const;     ///< 3-D SD within the window.
+  std::string reason() const;  ///< "still", "hold still: moving 4 mm/s", "no signal: ..."
+
+ private:
+  struct Judgement {
+    bool still = false;
+    double speed_m_s = 0.0;
+    double spread_m = 0.0;
+    std::string reason = "waiting for the tracker";
+  };
+  const Judgement& judgement() const;
+  Judgement judge() const;
+
+  double window_s_;
+  double floor_m_;
+  std::vector<Sample> samples_;
+  mutable std::optional<Judgement> judgement_;  ///< Of samples_, kept until the next sample.
+};
+
+}  // namespace fieldtrue::acquisition

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <span>
+
+#include "calib/core/calibration_table.h"
+#include "calib/core/error.h"
+#include "calib/correctors/base/fit_data.h"
+
+namespace fieldtrue::calibration {
+
+/// How tracker and rig frames are related: the nuisance part that is refitted everywhere unless the alignment is known.
+/// reference_from_sensor = reference_from_tracker * tracker_from_sensor * sensor_from_mount.
+struct Alignment {
+  Pose reference_from_tracker;
+  Eigen::Quaterniond sensor_from_mount =
+      Eigen::Quaterniond::Identity();  ///< Constant rotation of the sensor in its holder.
+};
+
+enum class AlignMode { kNone, kRigid };
+
+/// `rigid` unless the table says the alignment is known.
+AlignMode defaultAlignMode(const TableMetadata& metadata);
+
+/// Fits the rigid part from positions, and the constant mounting rotation from orientations when present. Sensors held
+/// in several orientations tell the mounting from a mean rotation error of the tracker, which is left to be corrected.
+/// @error kTooFewNodes, kDegenerate as fitRigid
+Result<Alignment> fitAlignment(std::span<const Node> nodes);
+
+/// Rows of a table as fit data in the tracker frame: truth brought there by the inverse alignment. The grid index is
+/// the table's, or found from the true positions where they stand on a grid along the rig's axes.
+correctors::FitData makeFitData(std::span<const Node> nodes, const TableMetadata& metadata, const Alignment& alignment);
+
+}  // namespace fieldtrue::calibration

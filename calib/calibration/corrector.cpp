@@ -1,0 +1,182 @@
+#include "calib/calibration/corrector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/calibration/alignment.h"
+#include "calib/core/spacing.h"
+#include "calib/core/statistics.h"
+#include "calib/correctors/baked/baked_lattice_maker.h"
+#include "calib/correctors/base/fit_checks.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/registry.h"
+
+namespace fieldtrue::calibration {
+namespace {
+
+/// A place is inside when it is nearer to a measured one than a quarter of the usual spacing: readings at the outermost
+/// places scatter around the hull, while half a spacing out the next row of the grid would have been due.
+constexpr double kMarginOfSpacing = 0.25;
+
+template <class Model>
+Result<Settings> resolveMethod(const Result<const correctors::CorrectionMethod<Model>*>& method,
+                               const MethodText& text) {
+  if (!method) return tl::unexpected(method.error());
+  return resolveSettings(text.id, (*method)->settings, text.given);
+}
+
+FitReport reportOf(std::span<const Node> nodes, const Corrector& corrector) {
+  FitReport report;
+  report.n_nodes = nodes.size();
+  const Alignment& alignment = corrector.alignment();
+  double before_squares_m2 = 0.0;
+  double after_squares_m2 = 0.0;
+  double angle_squares_rad2 = 0.0;
+  std::size_t n_orientations = 0;
+  for (const Node& node : nodes) {
+    const Eigen::Vector3d& p_true_m = node.reference_from_sensor.position_m;
+    const Pose corrected = corrector.correct(node.tracker_from_sensor);
+    before_squares_m2 +=
+        (alignment.reference_from_tracker * node.tracker_from_sensor.position_m - p_true_m).squaredNorm();
+    const double after_m = (corrected.position_m - p_true_m).norm();
+    after_squares_m2 += after_m * after_m;
+    report.max_m = std::max(report.max_m, after_m);
+    if (!node.has_orientation) continue;
+    const double angle_rad = angleBetween_rad(corrected.orientation, node.reference_from_sensor.orientation);
+    angle_squares_rad2 += angle_rad * angle_rad;
+    ++n_orientations;
+  }
+  const auto n_rows = static_cast<double>(nodes.size());
+  report.rms_before_mm = 1000.0 * std::sqrt(before_squares_m2 / n_rows);
+  report.rms_m = std::sqrt(after_squares_m2 / n_rows);
+  if (n_orientations > 0)
+    report.orientation_rms_rad = std::sqrt(angle_squares_rad2 / static_cast<double>(n_orientations));
+  return report;
+}
+
+}  // namespace
+
+Result<CorrectorChoice> parseCorrectorChoice(const std::string& position_text, const std::string& orientation_text) {
+  const auto position = parseMethodText(position_text);
+  if (!position) return tl::unexpected(position.error());
+  const auto orientation = parseMethodText(orientation_text);
+  if (!orientation) return tl::unexpected(orientation.error());
+  auto position_settings = resolveMethod(correctors::findPositionMethod(position->id), *position);
+  if (!position_settings) return tl::unexpected(position_settings.error());
+  auto orientation_settings = resolveMethod(correctors::findOrientationMethod(orientation->id), *orientation);
+  if (!orientation_settings) return tl::unexpected(orientation_settings.error());
+  return CorrectorChoice{position->id, *std::move(position_settings), orientation->id,
+                         *std::move(orientation_settings)};
+}
+
+Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadata& metadata,
+                                 const CorrectorChoice& choice, AlignMode align, const RunControl& control) {
+  const auto position_method = correctors::findPositionMethod(choice.position_id);
+  if (!position_method) return tl::unexpected(position_method.error());
+  const auto orientation_method = correctors::findOrientationMethod(choice.orientation_id);
+  if (!orientation_method) return tl::unexpected(orientation_method.error());
+
+  Corrector corrector;
+  corrector.choice_ = choice;
+  corrector.align_ = align;
+  corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
+  if (align == AlignMode::kRigid) {
+    auto alignment = fitAlignment(nodes);
+    if (!alignment) return tl::unexpected(alignment.error());
+    corrector.alignment_ = *alignment;
+  }
+  const correctors::FitData data = makeFitData(nodes, metadata, corrector.alignment_);
+  if (auto checked = correctors::checkPositions(data, "A calibration"); !checked)
+    return tl::unexpected(checked.error());
+
+  auto position = (*position_method)->fit(data, choice.position_settings, control);
+  if (!position) return tl::unexpected(position.error());
+  auto orientation = (*orientation_method)->fit(data, choice.orientation_settings, control);
+  if (!orientation) return tl::unexpected(orientation.error());
+  corrector.position_ = *std::move(position);
+  corrector.orientation_ = *std::move(orientation);
+  corrector.region_ = Region::around(data.p_tracked_m, data.dimension,
+                                     kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
+  corrector.report_ = reportOf(nodes, corrector);
+  for (const std::string& note : {correctors::planeNote(data, "nothing is claimed off it"), corrector.position_->note(),
+                                  corrector.orientation_->note()}) {
+    std::vector<std::string>& notes = corrector.report_.notes;
+    if (!note.empty() && std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+  }
+  return corrector;
+}
+
+Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& control) const {
+  if (!(max_deviation_m > 0.0) || !std::isfinite(max_deviation_m))
+    return fail(ErrorCode::kBadInput, "A lattice needs a largest deviation above 0 to be baked to");
+  if (is_baked_)
+    return fail(ErrorCode::kUnsupported,
+                "This calibration is baked already; bake anew from the one that was fitted, or fit it again");
+  std::vector<Eigen::Vector3d> places_m;
+  for (const Node& node : table_.nodes) places_m.push_back(node.tracker_from_sensor.position_m);
+  auto lattice = correctors::bakeLattice(*position_, region_, places_m, max_deviation_m, control);
+  if (!lattice) return tl::unexpected(lattice.error());
+  Corrector corrector = *this;
+  corrector.is_baked_ = true;
+  corrector.position_ = *std::move(lattice);
+  corrector.report_ = reportOf(table_.nodes, corrector);
+  corrector.report_.notes = report_.notes;
+  corrector.report_.notes.push_back(corrector.position_->note());
+  return corrector;
+}
+
+Pose Corrector::correct(const Pose& tracker_from_sensor) const {
+  const Eigen::Vector3d& p_tracked_m = tracker_from_sensor.position_m;
+  Pose corrected;
+  corrected.position_m = correctPosition_m(p_tracked_m);
+  const Eigen::Quaterniond q_true = orientation_->covers(p_tracked_m)
+                                        ? orientation_->correct(p_tracked_m, tracker_from_sensor.orientation)
+                                        : tracker_from_sensor.orientation;
+  corrected.orientation = alignment_.reference_from_tracker.orientation * q_true * alignment_.sensor_from_mount;
+  return corrected;
+}
+
+void Corrector::correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor) const {
+  FT_CHECK(tracker_from_sensor.size() == reference_from_sensor.size());
+  std::vector<Eigen::Vector3d> p_m;
+  std::vector<std::size_t> covered;
+  for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
+    if (!position_->covers(tracker_from_sensor[i].position_m)) continue;
+    covered.push_back(i);
+    p_m.push_back(tracker_from_sensor[i].position_m);
+  }
+  position_->correct(p_m, p_m);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
+    const Pose tracked = tracker_from_sensor[i];
+    const bool is_covered = next < covered.size() && covered[next] == i;
+    const Eigen::Vector3d p_true_m = is_covered ? p_m[next++] : tracked.position_m;
+    const Eigen::Quaterniond q_true = orientation_->covers(tracked.position_m)
+                                          ? orientation_->correct(tracked.position_m, tracked.orientation)
+                                          : tracked.orientation;
+    reference_from_sensor[i].position_m = alignment_.reference_from_tracker * p_true_m;
+    reference_from_sensor[i].orientation =
+        alignment_.reference_from_tracker.orientation * q_true * alignment_.sensor_from_mount;
+  }
+}
+
+Eigen::Vector3d Corrector::correctPosition_m(const Eigen::Vector3d& p_tracked_m) const {
+  if (!position_->covers(p_tracked_m)) return alignment_.reference_from_tracker * p_tracked_m;
+  const Eigen::Vector3d p_true_m = p_tracked_m + position_->displacement_m(p_tracked_m);
+  return alignment_.reference_from_tracker * p_true_m;
+}
+
+std::optional<double> Corrector::uncertainty_m(const Eigen::Vector3d& p_tracked_m) const {
+  return position_->covers(p_tracked_m) ? position_->uncertainty_m(p_tracked_m) : std::nullopt;
+}
+
+bool Corrector::covers(const Eigen::Vector3d& p_tracked_m) const {
+  return region_.contains(p_tracked_m) && position_->covers(p_tracked_m);
+}
+
+Eigen::Matrix3d Corrector::jacobian(const Eigen::Vector3d& p_tracked_m) const {
+  const Eigen::Matrix3d rotation = alignment_.reference_from_tracker.orientation.toRotationMatrix();
+  return position_->covers(p_tracked_m) ? Eigen::Matrix3d(rotation * position_->jacobian(p_tracked_m)) : rotation;
+}
+
+}  // namespace fieldtrue::calibration

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/calibration/alignment.h"
+#include "calib/core/calibration_table.h"
+#include "calib/core/error.h"
+#include "calib/core/geometry.h"
+#include "calib/core/run_control.h"
+#include "calib/core/settings.h"
+#include "calib/correctors/base/fit_data.h"
+#include "calib/correctors/base/orientation_model.h"
+#include "calib/correctors/base/position_model.h"
+
+namespace fieldtrue::calibration {
+
+/// Which methods to fit, with their settings.
+struct CorrectorChoice {
+  std::string position_id = "none";
+  Settings position_settings;
+  std::string orientation_id = "none";
+  Settings orientation_settings;
+};
+
+/// Parses `method[:key=value,...]` for both parts and checks the settings.
+/// @error kBadInput
+Result<CorrectorChoice> parseCorrectorChoice(const std::string& position_text, const std::string& orientation_text);
+
+/// How a fit went on the nodes it saw. Errors after correction, in-sample: never a verdict.
+struct FitReport {
+  std::size_t n_nodes = 0;
+  double rms_before_mm = 0.0;  ///< After the rigid alignment, if one is fitted.
+  double rms_m = 0.0;
+  double max_m = 0.0;
+  std::optional<double> orientation_rms_rad;
+  std::vector<std::string> notes;
+};
+
+/// A fitted calibration: alignment, position part and orientation part, the region it holds in, and where it came from.
+/// Immutable; copies share the models.
+class Corrector {
+ public:
+  /// Fits on the rows given (the caller leaves out skipped and held-out rows).
+  /// @error as the methods' fits
+  static Result<Corrector> fit(std::span<const Node> nodes, const TableMetadata& metadata,
+                               const CorrectorChoice& choice, AlignMode align, const RunControl& control = {});
+
+  /// reference_from_sensor of a tracked pose. Where a part does not cover the position, only the alignment is applied.
+  Pose correct(const Pose& tracker_from_sensor) const;
+  void correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor) const;
+  Eigen::Vector3d correctPosition_m(const Eigen::Vector3d& p_tracked_m) const;
+
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const;
+  /// Inside the calibrated region, and covered by the method; otherwise the result is an extrapolation.
+  bool covers(const Eigen::Vector3d& p_tracked_m) const;
+  Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
+
+  /// The same calibration with its position part baked to a dense lattice: 64 coefficients a sample whatever the method
+  /// was, and it needs nothing else. Covers what it covered, up to a cell more at holes and edges of a local method.
+  /// The report holds the lattice's figures, and the largest deviation that was seen as a note.
+  /// @param max_deviation_m bound of the distance between both corrected positions inside the region, positive [m]
+  /// @error kBadInput for a bound that is not positive; kUnsupported when baked already, or when no lattice within the
+  ///        memory allowed stays within the bound; kDegenerate without a region; kCancelled
+  Result<Corrector> baked(double max_deviation_m, const RunControl& control = {}) const;
+  bool isBaked() const { return is_baked_; }
+
+  const CorrectorChoice& choice() const { return choice_; }
+  AlignMode align() const { return align_; }
+  const Alignment& alignment() const { return alignment_; }
+  const Region& region() const { return region_; }
+  const FitReport& report() const { return report_; }
+  const CalibrationTable& table() const { return table_; }  ///< The rows it was fitted on, with their metadata.
+
+  /// Writes `*.ftcal.json`, atomically. @error kIo
+  Result<void> save(const std::filesystem::path& path) const;
+  std::string toText() const;  ///< The file's content.
+  /// @error kIo; kBadInput for damaged content or a checksum that does not match; kNewerVersion
+  static Result<Corrector> load(const std::filesystem::path& path);
+  static Result<Corrector> fromText(const std::string& text, const std::string& name);
+
+ private:
+  Corrector() = default;
+  CorrectorChoice choice_;
+  AlignMode align_ = AlignMode::kNone;
+  Alignment alignment_;
+  std::shared_ptr<const correctors::PositionModel> position_;
+  bool is_baked_ = false;  ///< position_ is a lattice, not the method's own model.
+  std::shared_ptr<const correctors::OrientationModel> orientation_;
+  Region region_;
+  FitReport report_;
+  CalibrationTable table_;
+};
+
+}  // namespace fieldtrue::calibration

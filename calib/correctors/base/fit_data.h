@@ -1,0 +1,29 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "calib/core/calibration_table.h"
+#include "calib/core/geometry.h"
+
+namespace fieldtrue::correctors {
+
+/// What a correction method is fitted to: matching true and tracked poses, all in the tracker frame [m].
+/// The truth has already been brought there by the alignment (or is there by declaration).
+struct FitData {
+  std::vector<Eigen::Vector3d> p_tracked_m;
+  std::vector<Eigen::Vector3d> p_true_m;
+  std::vector<Eigen::Quaterniond> q_tracked;  ///< Empty when the table has no orientation.
+  std::vector<Eigen::Quaterniond> q_true;     ///< Same length as q_tracked.
+  std::vector<int> node;                      ///< Place of each row, for messages and for grouping visits.
+  std::vector<std::array<int, 3>> index;      ///< Grid index of each row; empty when the places are scattered.
+  std::vector<Eigen::Matrix3d> noise_m2;      ///< Covariance of each row's mean tracked position, tracker frame; empty
+                                              ///< when the table states none.
+  double jig_sd_m = 0.0;                      ///< SD of placing, per axis: noise of p_true_m; 0 = not stated.
+  int dimension = 3;                          ///< Spread of the true positions: 3 volume, 2 one plane, 1 line, 0 point.
+
+  std::size_t size() const { return p_tracked_m.size(); }
+  bool hasOrientation() const { return !q_tracked.empty(); }
+};
+
+}  // namespace fieldtrue::correctors

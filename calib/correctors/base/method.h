@@ -1,0 +1,70 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/core/error.h"
+#include "calib/core/run_control.h"
+#include "calib/core/settings.h"
+#include "calib/correctors/base/fit_data.h"
+#include "calib/correctors/base/orientation_model.h"
+#include "calib/correctors/base/position_model.h"
+
+namespace fieldtrue::correctors {
+
+/// Fits that leave rows out, from one factorisation of the fit to all rows. The methods that can are linear in their
+/// true values; settings chosen from the data stay as all rows chose them.
+template <class Model>
+class HoldOutFits {
+ public:
+  virtual ~HoldOutFits() = default;
+
+  /// The model that a fit to all rows but these gives.
+  /// @param rows of the fit data, ascending
+  /// @param fold_from_data rigid change of the true positions: the fit is to fold_from_data * p_true_m, in which the
+  ///        alignment was found without the rows left out
+  /// @error kDegenerate when the rest does not determine the method
+  virtual Result<std::unique_ptr<Model>> without(std::span<const std::size_t> rows,
+                                                 const Pose& fold_from_data) const = 0;
+};
+
+/// Where a method comes from. Baselines are looked at beside all others.
+enum class MethodOrigin { kBaseline, kSurvey, kLater };
+
+/// Ranks in simplicity, above none, rigid, affine and polynomials by degree (0 to 7).
+namespace simplicity {
+inline constexpr int kPhysical = 9;        ///< Fields that obey the physics.
+inline constexpr int kSmoothing = 10;      ///< Smoothing fits that follow any field.
+inline constexpr int kInterpolating = 20;  ///< What passes through every place.
+}  // namespace simplicity
+
+/// Settings with which the automatic choice tries a method.
+struct AutomaticTry {
+  std::string settings;  ///< As after the colon of a method's text; empty = the defaults.
+  int rank = 0;          ///< Among equally good ones the lowest is chosen.
+};
+
+/// One row of a method registry.
+template <class Model>
+struct CorrectionMethod {
+  std::string id;
+  std::string label;
+  std::string source;  ///< Author, year, section and equation.
+  std::vector<Setting> settings;
+  /// @error when the data does not determine the method
+  Result<std::unique_ptr<Model>> (*fit)(const FitData&, const Settings&, const RunControl&) = nullptr;
+  Result<std::unique_ptr<Model>> (*load)(const nlohmann::json& parameters) = nullptr;
+  /// Fits with rows left out, without fitting anew; null where the method has no closed form.
+  Result<std::unique_ptr<HoldOutFits<Model>>> (*hold_out)(const FitData&, const Settings&, const RunControl&) = nullptr;
+  /// A comparison refits a costly method at most so often, over larger folds; 0 = as often as asked.
+  int most_folds = 0;
+  MethodOrigin origin = MethodOrigin::kSurvey;
+  /// What the automatic choice tries of it; empty = nothing.
+  std::vector<AutomaticTry> tries = {};
+};
+using PositionMethod = CorrectionMethod<PositionModel>;
+using OrientationMethod = CorrectionMethod<OrientationModel>;
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "calib/core/pose.h"
+
+namespace fieldtrue::correctors {
+
+/// A fitted, immutable position correction p_true = p_tracked + d(p_tracked), both in the tracker frame [m].
+class PositionModel {
+ public:
+  virtual ~PositionModel() = default;
+
+  /// d at a tracked position [m].
+  virtual Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const = 0;
+
+  /// Corrected positions of a batch; the default loops, fast methods override.
+  /// @param p_corrected_m same length as p_tracked_m; may be the same memory
+  virtual void correct(std::span<const Eigen::Vector3d> p_tracked_m, std::span<Eigen::Vector3d> p_corrected_m) const;
+
+  /// d p_corrected / d p_tracked (3x3, dimensionless); the default takes central differences of 0.1 mm.
+  virtual Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
+
+  /// SD of the corrected position [m], when the method knows it.
+  virtual std::optional<double> uncertainty_m(const Eigen::Vector3d&) const { return std::nullopt; }
+
+  /// Whether the method can be evaluated there at all. Local methods cannot outside their cells; global ones always
+  /// can.
+  virtual bool covers(const Eigen::Vector3d&) const { return true; }
+
+  /// What the user should know about this fit ("nodes lie in one plane: fitted in the plane"); empty when nothing.
+  virtual std::string note() const { return {}; }
+
+  /// Everything `load` needs to rebuild the same model to the same bits.
+  virtual nlohmann::json parameters() const = 0;
+};
+
+}  // namespace fieldtrue::correctors

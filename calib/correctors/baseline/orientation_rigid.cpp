@@ -1,0 +1,50 @@
+#include "calib/core/statistics.h"
+#include "calib/correctors/base/error_rotation.h"
+#include "calib/correctors/base/fit_checks.h"
+#include "calib/correctors/base/json_values.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+class ConstantErrorRotation : public ErrorRotationModel {
+ public:
+  ConstantErrorRotation(ErrorFrame frame, const Eigen::Quaterniond& q_error)
+      : ErrorRotationModel(frame), q_error_(q_error) {}
+
+ protected:
+  Eigen::Quaterniond errorRotation(const Eigen::Vector3d&) const override { return q_error_; }
+  nlohmann::json errorParameters() const override { return {{"q_error_wxyz", jsonOf(q_error_)}}; }
+
+ private:
+  Eigen::Quaterniond q_error_;
+};
+
+Result<std::unique_ptr<OrientationModel>> fitConstant(const FitData& data, const Settings& settings,
+                                                      const RunControl&) {
+  if (auto checked = checkOrientations(data, "Rigid orientation fit"); !checked) return tl::unexpected(checked.error());
+  const ErrorFrame frame = errorFrame(settings);
+  return std::make_unique<ConstantErrorRotation>(frame, canonical(meanRotation(errorRotations(data, frame))));
+}
+
+Result<std::unique_ptr<OrientationModel>> loadConstant(const nlohmann::json& parameters) {
+  return guarded<std::unique_ptr<OrientationModel>>(
+      "parameters of rigid (orientation)", [&]() -> Result<std::unique_ptr<OrientationModel>> {
+        return std::make_unique<ConstantErrorRotation>(errorFrameFrom(parameters),
+                                                       quaternionFrom(parameters.at("q_error_wxyz")));
+      });
+}
+
+}  // namespace
+
+OrientationMethod rigidOrientation() {
+  return {.id = "rigid",
+          .label = "Constant rotation",
+          .source = "Markley, Cheng, Crassidis, Oshman 2007, eq. 12-13, over the error rotations",
+          .settings = {errorFrameSetting()},
+          .fit = fitConstant,
+          .load = loadConstant};
+}
+
+}  // namespace fieldtrue::correctors

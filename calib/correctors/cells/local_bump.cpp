@@ -1,0 +1,29 @@
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/cells/local_interpolation.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+Result<std::unique_ptr<PositionModel>> fitLocalBump(const FitData& data, const Settings& settings, const RunControl&) {
+  return fitLocalPosition(data, weightRule(WeightKind::kBrysonBump, settings), "Bryson's bump interpolation");
+}
+
+Result<std::unique_ptr<PositionModel>> loadLocalBump(const nlohmann::json& parameters) {
+  return loadLocalPosition(parameters, "local_bump");
+}
+
+}  // namespace
+
+PositionMethod localBumpPosition() {
+  return {.id = "local_bump",
+          .label = "Local, bump (Bryson)",
+          .source = "Bryson 1992; survey by Kindratenko, section 3.3, eq. 8-10",
+          .settings = {lengthUnitSetting(), bumpEndSetting()},
+          .fit = fitLocalBump,
+          .load = loadLocalBump,
+          .origin = MethodOrigin::kSurvey,
+          .tries = {{"", simplicity::kInterpolating}}};
+}
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,43 @@
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/cells/local_interpolation.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+Result<std::unique_ptr<PositionModel>> fitLocalKindratenko(const FitData& data, const Settings& settings,
+                                                           const RunControl&) {
+  return fitLocalPosition(data, weightRule(weightKind(choiceSetting(settings, "weight")), settings),
+                          "Kindratenko's local interpolation");
+}
+
+Result<std::unique_ptr<PositionModel>> loadLocalKindratenko(const nlohmann::json& parameters) {
+  return loadLocalPosition(parameters, "local_kindratenko");
+}
+
+Setting weightSetting() {
+  return {.key = "weight",
+          .label = "Weights",
+          .type = SettingType::kChoice,
+          .unit = "",
+          .min = 0.0,
+          .max = 0.0,
+          .default_value = std::string("linear"),
+          .choices = {"linear", "quadratic", "log"},
+          .help = "How a corner's weight falls to 0 at half the longest diagonal of the cell."};
+}
+
+}  // namespace
+
+PositionMethod localKindratenkoPosition() {
+  return {.id = "local_kindratenko",
+          .label = "Local (Kindratenko)",
+          .source = "Kindratenko, Bennett 2000; survey by Kindratenko, section 3.3, eq. 8, 9 and 11",
+          .settings = {weightSetting()},
+          .fit = fitLocalKindratenko,
+          .load = loadLocalKindratenko,
+          .origin = MethodOrigin::kSurvey,
+          .tries = {{"", simplicity::kInterpolating}}};
+}
+
+}  // namespace fieldtrue::correctors

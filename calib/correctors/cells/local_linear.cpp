@@ -1,0 +1,30 @@
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/cells/local_interpolation.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+Result<std::unique_ptr<PositionModel>> fitLocalLinear(const FitData& data, const Settings& settings,
+                                                      const RunControl&) {
+  return fitLocalPosition(data, weightRule(WeightKind::kBrysonLinear, settings), "Bryson's linear interpolation");
+}
+
+Result<std::unique_ptr<PositionModel>> loadLocalLinear(const nlohmann::json& parameters) {
+  return loadLocalPosition(parameters, "local_linear");
+}
+
+}  // namespace
+
+PositionMethod localLinearPosition() {
+  return {.id = "local_linear",
+          .label = "Local, linear (Bryson)",
+          .source = "Bryson 1992; survey by Kindratenko, section 3.3, eq. 8-10",
+          .settings = {},
+          .fit = fitLocalLinear,
+          .load = loadLocalLinear,
+          .origin = MethodOrigin::kSurvey,
+          .tries = {{"", simplicity::kInterpolating}}};
+}
+
+}  // namespace fieldtrue::correctors

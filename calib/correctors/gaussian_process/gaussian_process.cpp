@@ -1,0 +1,300 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <mutex>
+
+#include "calib/correctors/base/fit_memory.h"
+#include "calib/correctors/base/json_values.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
+#include "calib/correctors/gaussian_process/gaussian_process_tuning.h"
+#include "calib/correctors/radial/rbf_system.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+constexpr std::size_t kMaxPlaces = 10000;  // 800 MB for the matrix.
+const std::string kName = "Gaussian process";
+/// Displacements that a linear trend explains this well [m] leave nothing to find scales from.
+constexpr double kNoResidual_m = 1e-9;
+/// Alive at once: the covariance, its projection and what is factorised; later the inverse.
+constexpr double kMatrices = 3.0;
+
+/// The posterior, factorised when it is first asked for: views ask, evaluation does not, and at 5,000 places it takes
+/// seconds and 200 MB.
+struct LazyPosterior {
+  std::once_flag once;
+  std::optional<GaussianProcessPosterior> posterior;
+};
+
+class GaussianProcessPosition : public PositionModel {
+ public:
+  GaussianProcessPosition(RadialField field, const GaussianProcessScales& scales, Eigen::VectorXd noise_m2,
+                          std::string note)
+      : field_(std::move(field)), scales_(scales), noise_m2_(std::move(noise_m2)), note_(std::move(note)) {}
+
+  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
+    return field_.value(p_tracked_m);
+  }
+  Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const override {
+    return Eigen::Matrix3d::Identity() + field_.gradient(p_tracked_m);
+  }
+  /// 3-D, of the smooth field and of what the fit found neither smooth nor stated as noise.
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
+    std::call_once(lazy_->once, [this] {
+      const auto n = static_cast<double>(field_.centers_m().size());
+      if (checkMemory("The uncertainty of a Gaussian process", kMatrices * 8.0 * n * n))
+        lazy_->posterior = GaussianProcessPosterior::of(field_, scales_, noise_m2_);
+    });
+    if (!lazy_->posterior) return std::nullopt;
+    const double field_m2 = lazy_->posterior->variance_m2(field_, p_tracked_m);
+    return std::sqrt(3.0 * (field_m2 + scales_.nugget_sd_m * scales_.nugget_sd_m));
+  }
+  std::string note() const override { return note_; }
+  nlohmann::json parameters() const override {
+    nlohmann::json json = field_.toJson();
+    json["signal_sd_m"] = scales_.signal_sd_m;
+    json["nugget_sd_m"] = scales_.nugget_sd_m;
+    json["length_m"] = jsonOf(scales_.length_m);
+    json["noise_m2"] = std::vector<double>(noise_m2_.begin(), noise_m2_.end());
+    json["note"] = note_;
+    return json;
+  }
+
+ private:
+  RadialField field_;
+  GaussianProcessScales scales_;
+  Eigen::VectorXd noise_m2_;
+  std::string note_;
+  std::unique_ptr<LazyPosterior> lazy_ = std::make_unique<LazyPosterior>();
+};
+
+/// Everything a fit and its hold-outs share.
+struct GaussianProcessSystem {
+  Places places;
+  RadialKernel kernel = RadialKernel::kMatern52;
+  GaussianProcessScales scales;
+  FieldFrame frame;  ///< In units of the lengths.
+  std::vector<double> noise_m2;
+  std::string note;
+  MemoryBooking memory;
+
+  Eigen::VectorXd noise() const {
+    return Eigen::Map<const Eigen::VectorXd>(noise_m2.data(), static_cast<Eigen::Index>(noise_m2.size()));
+  }
+};
+
+std::string lengthText_mm(const GaussianProcessScales& scales, int dimension) {
+  std::string text;
+  for (int axis = 0; axis < dimension; ++axis)
+    text += (axis == 0              ? ""
+             : axis + 1 < dimension ? ", "
+                                    : " and ") +
+            std::to_string(std::lround(1000.0 * scales.length_m[axis]));
+  return text + " mm";
+}
+
+std::string noteOf(const FitData& data, const GaussianProcessSystem& system, std::size_t n_used) {
+  std::array<char, 96> sds{};
+  std::snprintf(sds.data(), sds.size(), "field SD %.3g mm, unexplained SD %.2g mm", 1000.0 * system.scales.signal_sd_m,
+                1000.0 * system.scales.nugget_sd_m);
+  const std::string plane = planeNote(data, "fitted in the plane, and nothing is claimed off it");
+  return plane + (plane.empty() ? "" : " ") + "Correlation lengths " + lengthText_mm(system.scales, data.dimension) +
+         ", " + sds.data() + ", by restricted likelihood on " +
+         (n_used == system.places.size()
+              ? "all places."
+              : std::to_string(n_used) + " of " + std::to_string(system.places.size()) + " places.");
+}
+
+/// Scales for displacements that have no residual to find them from: nothing but the trend is left.
+GaussianProcessScales scalesOfTrend(double spread_m) {
+  return {Eigen::Vector3d::Constant(spread_m), kNoResidual_m, kNoResidual_m};
+}
+
+Result<GaussianProcessScales> chooseScales(const GaussianProcessSystem& system, std::span<const std::size_t> used,
+                                           int restarts, const RunControl& control) {
+  const Eigen::MatrixXd all_y = displacementMatrix(system.places);
+  std::vector<Eigen::Vector3d> p_m;
+  Eigen::MatrixXd y(static_cast<Eigen::Index>(used.size()), 3);
+  Eigen::VectorXd noise_m2(y.rows());
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    p_m.push_back(system.places.p_tracked_m[used[i]]);
+    y.row(row) = all_y.row(static_cast<Eigen::Index>(used[i]));
+    noise_m2[row] = system.noise_m2[used[i]];
+  }
+  const auto projection = TailProjection::of(system.frame.tail(p_m));
+  if (!projection) return tl::unexpected(degenerateTail(kName, system.places.size()));
+  const Eigen::MatrixXd residual = projection->toComplement(y);
+  if (residual.norm() <= kNoResidual_m * std::sqrt(static_cast<double>(residual.size())))
+    return scalesOfTrend(rmsSpread_m(p_m));
+  const auto scales = fitScales(system.kernel, system.frame, p_m, y, noise_m2, restarts, control);
+  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
+  if (!scales)
+    return fail(ErrorCode::kDegenerate, kName + ": no scales fit these " + std::to_string(p_m.size()) +
+                                            " places; they may repeat, or hold one reading far off all others");
+  return *scales;
+}
+
+Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& settings, const RunControl& control) {
+  auto places = smoothFitPlaces(data, kName);
+  if (!places) return tl::unexpected(places.error());
+  if (places->size() > kMaxPlaces)
+    return fail(ErrorCode::kUnsupported, "A Gaussian process takes at most " + std::to_string(kMaxPlaces) +
+                                             " places, got " + std::to_string(places->size()) +
+                                             "; use a polynomial or B-splines");
+  GaussianProcessSystem system;
+  system.places = *std::move(places);
+  auto memory = bookSquareMatrices(kName, kMatrices, system.places.size(), control);
+  if (!memory) return tl::unexpected(memory.error());
+  system.memory = *std::move(memory);
+  system.kernel = choiceSetting(settings, "nu") == "1.5" ? RadialKernel::kMatern32 : RadialKernel::kMatern52;
+  const Eigen::VectorXd noise_m2 = placeNoise_m2(data, system.places);
+  system.noise_m2.assign(noise_m2.begin(), noise_m2.end());
+  const std::vector<Eigen::Vector3d>& p_m = system.places.p_tracked_m;
+  system.frame = FieldFrame::around(p_m, data.dimension, rmsSpread_m(p_m));
+  const auto used = spreadPlaces(p_m, static_cast<std::size_t>(integerSetting(settings, "tuning_places")));
+  const auto scales = chooseScales(system, used, static_cast<int>(integerSetting(settings, "restarts")), control);
+  if (!scales) return tl::unexpected(scales.error());
+  system.scales = *scales;
+  system.frame = scaledFrame(system.frame, system.scales);
+  system.note = noteOf(data, system, used.size());
+  return system;
+}
+
+Eigen::MatrixXd matrixOf(const GaussianProcessSystem& system) {
+  return covarianceMatrix(system.kernel, system.frame, system.scales, system.places.p_tracked_m, system.noise());
+}
+
+tl::unexpected<Error> notSolvable(const GaussianProcessSystem& system) {
+  if (!TailProjection::of(system.frame.tail(system.places.p_tracked_m)))
+    return tl::unexpected(degenerateTail(kName, system.places.size()));
+  return fail(ErrorCode::kDegenerate, kName +
+                                          ": rounding spoils the solution, since its noise is too small beside the "
+                                          "field; state the places' noise or the jig's tolerance");
+}
+
+/// @param solution of the covariance matrix, so that its coefficients lack the signal's variance
+std::unique_ptr<PositionModel> modelOf(const GaussianProcessSystem& system, std::span<const std::size_t> out,
+                                       RadialSolution solution) {
+  solution.coefficients *= system.scales.signal_sd_m * system.scales.signal_sd_m;
+  const std::vector<double> kept_m2 = withoutPlaces(system.noise_m2, out);
+  const Eigen::VectorXd noise_m2 =
+      Eigen::Map<const Eigen::VectorXd>(kept_m2.data(), static_cast<Eigen::Index>(kept_m2.size()));
+  return std::make_unique<GaussianProcessPosition>(
+      RadialField(system.kernel, 0.0, system.frame, withoutPlaces(system.places.p_tracked_m, out), solution),
+      system.scales, noise_m2, system.note);
+}
+
+Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, const Settings& settings,
+                                                          const RunControl& control) {
+  const auto system = buildSystem(data, settings, control);
+  if (!system) return tl::unexpected(system.error());
+  const auto projection = TailProjection::of(system->frame.tail(system->places.p_tracked_m));
+  if (!projection) return notSolvable(*system);
+  const auto solution = solveRadial(*projection, matrixOf(*system), displacementMatrix(system->places));
+  if (!solution) return notSolvable(*system);
+  return modelOf(*system, {}, *solution);
+}
+
+class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
+ public:
+  GaussianProcessHoldOut(GaussianProcessSystem system, RadialHoldOut solutions)
+      : system_(std::move(system)), solutions_(std::move(solutions)) {}
+
+  Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
+                                                 const Pose& fold_from_data) const override {
+    const auto out = placesOfRows(system_.places, rows);
+    if (!out) return tl::unexpected(out.error());
+    auto solution = solutions_.without(*out, fold_from_data);
+    if (!solution) return tl::unexpected(degenerateTail(kName, system_.places.size() - out->size()));
+    return modelOf(system_, *out, *std::move(solution));
+  }
+
+ private:
+  GaussianProcessSystem system_;
+  RadialHoldOut solutions_;
+};
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const FitData& data,
+                                                                           const Settings& settings,
+                                                                           const RunControl& control) {
+  auto system = buildSystem(data, settings, control);
+  if (!system) return tl::unexpected(system.error());
+  const auto projection = TailProjection::of(system->frame.tail(system->places.p_tracked_m));
+  if (!projection) return notSolvable(*system);
+  auto solutions = RadialHoldOut::of(*projection, matrixOf(*system), displacementMatrix(system->places),
+                                     positionMatrix(system->places));
+  if (!solutions) return notSolvable(*system);
+  return std::make_unique<GaussianProcessHoldOut>(*std::move(system), *std::move(solutions));
+}
+
+Result<std::unique_ptr<PositionModel>> loadGaussianProcess(const nlohmann::json& parameters) {
+  return guarded<std::unique_ptr<PositionModel>>(
+      "parameters of gaussian_process", [&]() -> Result<std::unique_ptr<PositionModel>> {
+        RadialField field = RadialField::fromJson(parameters);
+        const GaussianProcessScales scales{vectorFrom(parameters.at("length_m")),
+                                           parameters.at("signal_sd_m").get<double>(),
+                                           parameters.at("nugget_sd_m").get<double>()};
+        const auto stored_m2 = parameters.at("noise_m2").get<std::vector<double>>();
+        if (stored_m2.size() != field.centers_m().size()) throwMalformed("one noise_m2 for each centre is needed");
+        const Eigen::VectorXd noise_m2 =
+            Eigen::Map<const Eigen::VectorXd>(stored_m2.data(), static_cast<Eigen::Index>(stored_m2.size()));
+        return std::make_unique<GaussianProcessPosition>(std::move(field), scales, noise_m2,
+                                                         parameters.at("note").get<std::string>());
+      });
+}
+
+std::vector<Setting> gaussianProcessSettings() {
+  return {
+      {.key = "nu",
+       .label = "Smoothness",
+       .type = SettingType::kChoice,
+       .unit = "",
+       .min = 0.0,
+       .max = 0.0,
+       .default_value = std::string("2.5"),
+       .choices = {"1.5", "2.5"},
+       .help = "Of the Matern kernel: fields with nu = 2.5 have two derivatives, with 1.5 one."},
+      {.key = "restarts",
+       .label = "Starts",
+       .type = SettingType::kInteger,
+       .unit = "",
+       .min = 1,
+       .max = 20,
+       .default_value = std::int64_t{3},
+       .choices = {},
+       .help = "Starting points from which the scales are sought; the most likely end is kept."},
+      {.key = "tuning_places",
+       .label = "Places for the scales",
+       .type = SettingType::kInteger,
+       .unit = "",
+       .min = 50,
+       .max = 3000,
+       .default_value = std::int64_t{700},
+       .choices = {},
+       .help = "With more places than these, the scales are found on a well-spread part of them; the fit takes all."}};
+}
+
+}  // namespace
+
+/// A Gaussian process with an anisotropic Matern kernel about a linear trend, each place with its own noise, scales by
+/// restricted likelihood.
+PositionMethod gaussianProcessPosition() {
+  return {
+      .id = "gaussian_process",
+      .label = "Gaussian process",
+      .source =
+          "Universal kriging: Matheron 1969; Matern kernel and likelihood: Rasmussen and Williams 2006, eq. 4.14, 5.9; "
+          "restricted likelihood: Patterson and Thompson 1971",
+      .settings = gaussianProcessSettings(),
+      .fit = fitGaussianProcess,
+      .load = loadGaussianProcess,
+      .hold_out = holdOutGaussianProcess,
+      .origin = MethodOrigin::kLater,
+      .tries = {{"", simplicity::kSmoothing}}};
+}
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,209 @@
+#include <algorithm>
+
+#include "calib/core/memory_limit.h"
+#include "calib/correctors/base/fit_checks.h"
+#include "calib/correctors/base/json_values.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/harmonic/harmonic_field_fit.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+constexpr const char* kName = "The harmonic field";
+
+/// The box of tracked positions in which the model is evaluated: beyond it the sources are near and nothing is known.
+struct TrackedBox {
+  Eigen::Vector3d low_m;
+  Eigen::Vector3d high_m;
+
+  /// The nearest point of the box, and not the transmitter itself, where the field has no value.
+  Eigen::Vector3d nearest_m(const Eigen::Vector3d& p_m) const {
+    const Eigen::Vector3d inside_m = p_m.cwiseMax(low_m).cwiseMin(high_m);
+    const double least_m = 1e-3 * (high_m - low_m).norm();
+    if (inside_m.norm() >= least_m) return inside_m;
+    return inside_m.isZero() ? Eigen::Vector3d(least_m, 0.0, 0.0) : Eigen::Vector3d(least_m * inside_m.normalized());
+  }
+};
+
+class HarmonicField : public PositionModel {
+ public:
+  HarmonicField(DisturbedField field, const Pose& field_from_truth, const TrackedBox& box, FieldPosterior posterior,
+                std::string note)
+      : field_(std::move(field)),
+        field_from_truth_(field_from_truth),
+        truth_from_field_(inverse(field_from_truth)),
+        box_(box),
+        posterior_(std::move(posterior)),
+        note_(std::move(note)) {}
+
+  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
+    const Eigen::Vector3d inside_m = box_.nearest_m(p_tracked_m);
+    const Eigen::Vector3d in_field_m = p_tracked_m + (field_.truePosition_m(inside_m) - inside_m);
+    return truth_from_field_ * in_field_m - p_tracked_m;
+  }
+
+  /// Outside the box that of its nearest point.
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
+    return posterior_.sd_m(PlaceDerivative::of(field_, box_.nearest_m(p_tracked_m)));
+  }
+
+  std::string note() const override { return note_; }
+
+  nlohmann::json parameters() const override {
+    Eigen::MatrixXd sources(static_cast<Eigen::Index>(field_.sources().size()), 12);
+    for (Eigen::Index k = 0; k < sources.rows(); ++k) {
+      const FieldSource& source = field_.sources()[static_cast<std::size_t>(k)];
+      sources.row(k).head<3>() = source.at_m.transpose();
+      sources.row(k).tail<9>() = Eigen::Map<const Eigen::RowVector<double, 9>>(source.response.data());
+    }
+    nlohmann::json root = nlohmann::json::array();
+    for (Eigen::Index row = 0; row < posterior_.root.rows(); ++row)
+      for (Eigen::Index column = row; column < posterior_.root.cols(); ++column)
+        root.push_back(posterior_.root(row, column));
+    return {{"sources", jsonOf(sources)},
+            {"field_from_truth", jsonOf(field_from_truth_)},
+            {"turned_about_m", jsonOf(posterior_.about_m)},
+            {"covariance_root", std::move(root)},
+            {"low_m", jsonOf(box_.low_m)},
+            {"high_m", jsonOf(box_.high_m)},
+            {"note", note_}};
+  }
+
+ private:
+  DisturbedField field_;
+  Pose field_from_truth_;
+  Pose truth_from_field_;
+  TrackedBox box_;
+  FieldPosterior posterior_;
+  std::string note_;
+};
+
+Result<void> checkSpread(const FitData& data) {
+  const int dimension = std::min(data.dimension, pointSpread(data.p_tracked_m).dimension);
+  if (dimension >= 2) return {};
+  return fail(ErrorCode::kDegenerate, std::string(kName) + " needs places that span a plane or a volume, and these " +
+                                          std::to_string(data.size()) + " lie " +
+                                          (dimension == 1 ? "on one line" : "at one point"));
+}
+
+/// The design, three rows a place by the unknowns of every candidate source, and the normal equations with their copy.
+double memory_bytes(std::size_t n_rows) {
+  constexpr double kUnknowns = 2000.0;  // The lattices of candidates hold at most about 300 sources of six.
+  return 8.0 * kUnknowns * (3.0 * static_cast<double>(n_rows) + 2.0 * kUnknowns);
+}
+
+std::string noteOf(const FitData& data, const HarmonicFit& fit) {
+  const std::string plane = planeNote(data, "nothing is claimed off it");
+  if (!plane.empty() || !fit.field.sources().empty()) return plane;
+  return "No disturbance stands out from the noise: only the alignment is corrected";
+}
+
+Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Settings& settings,
+                                                   const RunControl& control) {
+  if (auto checked = checkPositions(data, kName); !checked) return tl::unexpected(checked.error());
+  if (auto checked = checkSpread(data); !checked) return tl::unexpected(checked.error());
+  const auto memory = MemoryBooking::book(std::string(kName) + " on " + std::to_string(data.size()) + " rows",
+                                          memory_bytes(data.size()), control.stop);
+  if (!memory) return tl::unexpected(memory.error());
+  TrackedBox box{data.p_tracked_m.front(), data.p_tracked_m.front()};
+  for (const Eigen::Vector3d& p_m : data.p_tracked_m) {
+    box.low_m = box.low_m.cwiseMin(p_m);
+    box.high_m = box.high_m.cwiseMax(p_m);
+  }
+  const double margin_m = 0.05 * (box.high_m - box.low_m).maxCoeff();
+  box.low_m.array() -= margin_m;
+  box.high_m.array() += margin_m;
+  const HarmonicOptions options{numberSetting(settings, "least_gain"),
+                                static_cast<std::size_t>(integerSetting(settings, "most_sources"))};
+  auto fit = fitHarmonicField(data, options, control);
+  if (!fit) return tl::unexpected(fit.error());
+  return std::make_unique<HarmonicField>(fit->field, fit->field_from_truth, box, fit->posterior, noteOf(data, *fit));
+}
+
+FieldPosterior posteriorFrom(const nlohmann::json& parameters, const std::vector<FieldSource>& sources) {
+  FieldPosterior posterior;
+  for (const FieldSource& source : sources) posterior.sources.emplace_back(source.at_m);
+  posterior.about_m = vectorFrom(parameters.at("turned_about_m"));
+  const auto packed = parameters.at("covariance_root").get<std::vector<double>>();
+  const auto n = kPerSource * static_cast<Eigen::Index>(sources.size()) + 6;
+  if (packed.size() != static_cast<std::size_t>(n * (n + 1) / 2))
+    throwMalformed("covariance_root needs " + std::to_string(n * (n + 1) / 2) + " numbers, got " +
+                   std::to_string(packed.size()));
+  posterior.root = Eigen::MatrixXd::Zero(n, n);
+  auto next = packed.begin();
+  for (Eigen::Index row = 0; row < n; ++row)
+    for (Eigen::Index column = row; column < n; ++column) posterior.root(row, column) = *next++;
+  return posterior;
+}
+
+Result<std::unique_ptr<PositionModel>> loadHarmonic(const nlohmann::json& parameters) {
+  using Loaded = Result<std::unique_ptr<PositionModel>>;
+  return guarded<std::unique_ptr<PositionModel>>("parameters of harmonic_field", [&]() -> Loaded {
+    const Eigen::MatrixXd rows = matrixFrom(parameters.at("sources"), 12);
+    std::vector<FieldSource> sources(static_cast<std::size_t>(rows.rows()));
+    for (Eigen::Index k = 0; k < rows.rows(); ++k) {
+      const Eigen::Matrix<double, 9, 1> response = rows.row(k).tail<9>().transpose();
+      sources[static_cast<std::size_t>(k)] = {rows.row(k).head<3>().transpose(),
+                                              Eigen::Map<const Eigen::Matrix3d>(response.data())};
+    }
+    const TrackedBox box{vectorFrom(parameters.at("low_m")), vectorFrom(parameters.at("high_m"))};
+    FieldPosterior posterior = posteriorFrom(parameters, sources);
+    return std::make_unique<HarmonicField>(DisturbedField(std::move(sources)),
+                                           poseFrom(parameters.at("field_from_truth")), box, std::move(posterior),
+                                           parameters.at("note").get<std::string>());
+  });
+}
+
+}  // namespace
+
+/// A correction that knows what the error is made of. Metal near a tracker adds to each transmitter coil's field one
+/// that has neither divergence nor curl where the sensor goes, so its potential obeys Laplace's equation there and can
+/// be made by sources outside. The tracker solves the sum for a pose as if the transmitter were alone. So the model is
+/// the field itself, a few dipoles outside the measured box, each answering the transmitter's field there through a
+/// symmetric tensor (reciprocity), and not the displacement: it is put through the tracker's own solution, and a
+/// tracked position is corrected by finding the place that would be tracked there.
+///
+/// Where the sources stand, how many there are and how strong they may be is decided by the marginal likelihood, given
+/// the tolerance of the jig and the noise of each place. A rigid motion of the truth is fitted with them, since the
+/// alignment was found from disturbed positions. Trackers that are not dipole trackers get a poor model and, by the
+/// same likelihood, few sources; choose by held-out error.
+/// @source Jackson 1999, Classical Electrodynamics, sections 5.4 and 1.8 (harmonic potentials from exterior sources);
+/// Raab, Blood, Steiner, Jones 1979 (dipole tracker, induced dipoles); Tipping and Faul 2003 (choice of the sources)
+PositionMethod harmonicFieldPosition() {
+  const Setting least_gain{.key = "least_gain",
+                           .label = "Evidence a source must add",
+                           .type = SettingType::kNumber,
+                           .unit = "nats",
+                           .min = 0.5,
+                           .max = 50.0,
+                           .default_value = 6.0,
+                           .choices = {},
+                           .help =
+                               "A further source of disturbance is believed in when it raises the logarithm of the "
+                               "marginal likelihood by this; larger is smoother."};
+  const Setting most_sources{.key = "most_sources",
+                             .label = "Most sources",
+                             .type = SettingType::kInteger,
+                             .unit = "",
+                             .min = 0,
+                             .max = 80,
+                             .default_value = std::int64_t{40},
+                             .choices = {},
+                             .help = "No more sources of disturbance than this are placed outside the region."};
+  PositionMethod method;
+  method.id = "harmonic_field";
+  method.label = "Harmonic field";
+  method.source =
+      "Jackson 1999, sections 1.8 and 5.4; Raab, Blood, Steiner, Jones 1979; sources chosen as in Tipping and Faul "
+      "2003";
+  method.settings = {least_gain, most_sources};
+  method.fit = fitHarmonic;
+  method.load = loadHarmonic;
+  method.most_folds = 10;
+  method.origin = MethodOrigin::kLater;
+  method.tries = {{"", simplicity::kPhysical}};
+  return method;
+}
+
+}  // namespace fieldtrue::correctors

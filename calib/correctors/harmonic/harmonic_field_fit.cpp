@@ -1,0 +1,368 @@
+#include "calib/correctors/harmonic/harmonic_field_fit.h"
+
+#include <cblas.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "calib/correctors/harmonic/harmonic_field_evidence.h"
+#include "calib/correctors/harmonic/harmonic_field_sites.h"
+#include "calib/field/dipole_field.h"
+#include "calib/field/tracker_model.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+constexpr int kMostSteps = 10;
+constexpr std::size_t kCandidatesKept = 90;  ///< Of the first step's, by what each would still add.
+
+/// The linear model of one step, rows whitened, unknowns scaled so that each source moves the places by about its
+/// amplitude.
+struct Linearisation {
+  Eigen::MatrixXd design;                          ///< d corrected / d amplitude, 3 rows a place.
+  Eigen::Matrix<double, Eigen::Dynamic, 6> rigid;  ///< d corrected / d (shift, turn) that does the same to the truth.
+  Eigen::VectorXd y;                               ///< True minus corrected, plus what the present amplitudes do.
+  Eigen::VectorXd present;                         ///< Present amplitudes, scaled.
+  Eigen::VectorXd present_effect;                  ///< design * present.
+  std::vector<double> scale;                       ///< Of each source: amplitude over tensor.
+};
+
+/// Sources of the field found so far.
+struct Chosen {
+  std::vector<Eigen::Index> sites;  ///< Into the candidates.
+  std::vector<TensorAmplitudes> tensors;
+  std::vector<double> variances;  ///< Prior variance of each tensor.
+};
+
+/// `calib` starts no thread; where OpenBLAS is built with threads it must be told, once.
+void useOneThread() {
+  static const bool kTold = [] {
+    openblas_set_num_threads(1);
+    return true;
+  }();
+  static_cast<void>(kTold);
+}
+
+class Fitter {
+ public:
+  Fitter(const FitData& data, const HarmonicOptions& options, const RunControl& control, const Pose& field_from_truth)
+      : data_(data), options_(options), control_(control), field_from_truth_(field_from_truth) {
+    double left_m2 = 0.0;
+    for (std::size_t i = 0; i < data.size(); ++i)
+      left_m2 += (field_from_truth * data.p_true_m[i] - data.p_tracked_m[i]).squaredNorm() /
+                 (3.0 * static_cast<double>(data.size()));
+    // Where no tolerance is stated the noise starts as all that the rigid motion leaves, and not below 10 nm.
+    jig_sd_m_ = data.jig_sd_m > 0.0 ? data.jig_sd_m : std::max(1e-8, std::sqrt(left_m2));
+    findBox();
+    sites_ = candidateSites(box_);
+  }
+
+  Result<HarmonicFit> run() {
+    misfit_m2_ = rigidMisfit(DisturbedField()).mean_square_m2;
+    const double without_sources_m2 = misfit_m2_;
+    for (int step = 0; step < kMostSteps; ++step) {
+      if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The harmonic field's fit was stopped");
+      const double moved_m = improve(linearise(step == 0 ? firstRows() : rowsAtField()), step);
+      control_.progress(static_cast<double>(step + 1) / kMostSteps);
+      if (step > 0 && moved_m < 0.04 * jig_sd_m_) break;
+    }
+    if (misfit_m2_ > without_sources_m2) forgetSources();
+    return HarmonicFit{DisturbedField(sources()), field_from_truth_, posterior()};
+  }
+
+ private:
+  /// The places as they are believed to stand in the transmitter's frame.
+  void findBox() {
+    box_.low_m.setConstant(std::numeric_limits<double>::infinity());
+    box_.high_m = -box_.low_m;
+    center_m_.setZero();
+    for (const Eigen::Vector3d& p_true_m : data_.p_true_m) {
+      const Eigen::Vector3d p_m = field_from_truth_ * p_true_m;
+      box_.low_m = box_.low_m.cwiseMin(p_m);
+      box_.high_m = box_.high_m.cwiseMax(p_m);
+      center_m_ += p_m / static_cast<double>(data_.size());
+    }
+  }
+
+  /// Before anything is known the truth, not the tracked position, is near the place whose field counts.
+  std::vector<PlaceRow> firstRows() const {
+    std::vector<PlaceRow> rows(data_.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const Eigen::Vector3d p_true_m = field_from_truth_ * data_.p_true_m[i];
+      rows[i].derivative = {p_true_m, -field::solvedPositionDerivative(field::dipoleField(p_true_m, 1.0), p_true_m)};
+      rows[i].true_minus_corrected_m = p_true_m - data_.p_tracked_m[i];
+      rows[i].whitening = whiteningOf(i, Eigen::Matrix3d::Identity());
+    }
+    return rows;
+  }
+
+  std::vector<PlaceRow> rowsAtField() const {
+    const DisturbedField field(sources());
+    std::vector<PlaceRow> rows(data_.size());
+    control_.parallel_for(rows.size(), [&](std::size_t i) {
+      rows[i].derivative = PlaceDerivative::of(field, data_.p_tracked_m[i]);
+      const Eigen::Vector3d& corrected_m = rows[i].derivative.at_m;
+      rows[i].true_minus_corrected_m = field_from_truth_ * data_.p_true_m[i] - corrected_m;
+      rows[i].whitening = whiteningOf(i, field.trackedJacobian(corrected_m).inverse());
+    });
+    return rows;
+  }
+
+  Eigen::Matrix3d whiteningOf(std::size_t i, const Eigen::Matrix3d& true_by_tracked) const {
+    Eigen::Matrix3d noise_m2 = jig_sd_m_ * jig_sd_m_ * Eigen::Matrix3d::Identity();
+    if (!data_.noise_m2.empty()) noise_m2 += true_by_tracked * data_.noise_m2[i] * true_by_tracked.transpose();
+    const Eigen::Matrix3d factor = noise_m2.llt().matrixL();
+    return factor.inverse();
+  }
+
+  Linearisation linearise(const std::vector<PlaceRow>& rows) const {
+    const auto n = static_cast<Eigen::Index>(rows.size());
+    const auto n_sites = static_cast<Eigen::Index>(sites_.size());
+    Linearisation linear;
+    linear.design.resize(3 * n, kPerSource * n_sites);
+    linear.rigid.resize(3 * n, 6);
+    linear.y.resize(3 * n);
+    linear.present = Eigen::VectorXd::Zero(kPerSource * n_sites);
+    linear.scale.resize(sites_.size());
+    control_.parallel_for(sites_.size(), [&](std::size_t s) {
+      auto columns = linear.design.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(s));
+      const SourceBasis source(sites_[s].at_m);
+      double sum = 0.0;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const PlaceRow& row = rows[static_cast<std::size_t>(i)];
+        const Eigen::Matrix<double, 3, kPerSource> effect = effectOfSource(row.derivative, source);
+        sum += effect.squaredNorm();
+        columns.middleRows<3>(3 * i).noalias() = row.whitening * effect;
+      }
+      linear.scale[s] = std::sqrt(sum / static_cast<double>(n));
+      columns /= linear.scale[s];
+    });
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k)
+      linear.present.segment<kPerSource>(kPerSource * chosen_.sites[k]) =
+          linear.scale[static_cast<std::size_t>(chosen_.sites[k])] * chosen_.tensors[k];
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const PlaceRow& row = rows[static_cast<std::size_t>(i)];
+      const Eigen::Vector3d p_true_m = row.derivative.at_m + row.true_minus_corrected_m;
+      linear.rigid.middleRows<3>(3 * i) = row.whitening * effectOfMotion(p_true_m, center_m_);
+      linear.y.segment<3>(3 * i) = row.whitening * row.true_minus_corrected_m;
+    }
+    linear.present_effect = linear.design * linear.present;
+    linear.y += linear.present_effect;
+    // What has come to stand among the places is not offered again.
+    for (std::size_t s = 0; s < sites_.size(); ++s)
+      if (!isAllowedSite(sites_[s], box_))
+        linear.design.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(s)).setZero();
+    return linear;
+  }
+
+  static GroupedSystem normalEquations(const Linearisation& linear, const Eigen::MatrixXd& rigid_basis, double unit_m) {
+    useOneThread();
+    GroupedSystem system;
+    const Eigen::VectorXd y = linear.y - rigid_basis * (rigid_basis.transpose() * linear.y);
+    const Eigen::MatrixXd by_rigid = linear.design.transpose() * rigid_basis;
+    const auto n_rows = static_cast<int>(linear.design.rows());
+    const auto n_columns = static_cast<int>(linear.design.cols());
+    system.gram.resize(n_columns, n_columns);
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, n_columns, n_rows, 1.0, linear.design.data(), n_rows, 0.0,
+                system.gram.data(), n_columns);
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, n_columns, 6, -1.0, by_rigid.data(), n_columns, 1.0,
+                system.gram.data(), n_columns);
+    system.gram.triangularView<Eigen::StrictlyUpper>() = system.gram.transpose();
+    system.right = linear.design.transpose() * y;
+    system.y_squared = y.squaredNorm();
+    system.n_rows = static_cast<double>(n_rows - 6);
+    system.unit_m = unit_m;
+    return system;
+  }
+
+  /// How far the truth is from the positions that a field corrects, after the best rigid motion.
+  struct Misfit {
+    Pose field_from_truth;
+    double mean_square_m2 = 0.0;  ///< Per axis.
+  };
+
+  Misfit rigidMisfit(const DisturbedField& field) const {
+    std::vector<Eigen::Vector3d> corrected_m(data_.size());
+    control_.parallel_for(data_.size(),
+                          [&](std::size_t i) { corrected_m[i] = field.truePosition_m(data_.p_tracked_m[i]); });
+    Misfit misfit{fitRigid(data_.p_true_m, corrected_m).value_or(field_from_truth_)};
+    for (std::size_t i = 0; i < data_.size(); ++i)
+      misfit.mean_square_m2 += (misfit.field_from_truth * data_.p_true_m[i] - corrected_m[i]).squaredNorm() /
+                               (3.0 * static_cast<double>(data_.size()));
+    return misfit;
+  }
+
+  /// Variance of the noise, in units of the one stated, for one step's choice of sources: while the field is far off,
+  /// what the linearisation misses counts as noise too, or sources would be placed to imitate it.
+  double noiseForStep() const {
+    constexpr double kMissed = 0.15;  // Of the misfit.
+    return std::max(noise_factor_, kMissed * kMissed * misfit_m2_ / (jig_sd_m_ * jig_sd_m_));
+  }
+
+  /// One step: chooses sources, moves the truth, refines the candidates. @return RMS change of the corrected positions
+  double improve(const Linearisation& linear, int step) {
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(linear.rigid);
+    const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(linear.rigid.rows(), 6);
+    const GroupedSystem system = normalEquations(linear, basis, box_.extent_m());
+    const bool unknown = data_.jig_sd_m <= 0.0;
+    const GroupSelection selection =
+        selectGroups(system, {options_.least_gain, options_.most_sources, noiseForStep(), unknown}, control_);
+    noise_factor_ = std::clamp(selection.noise_factor, 1e-16, 1e16);
+
+    Eigen::VectorXd amplitudes = Eigen::VectorXd::Zero(linear.present.size());
+    for (std::size_t k = 0; k < selection.groups.size(); ++k)
+      amplitudes.segment(kPerSource * selection.groups[k], kPerSource) =
+          selection.amplitudes.segment(kPerSource * static_cast<Eigen::Index>(k), kPerSource);
+    const Eigen::VectorXd change = linear.design * amplitudes - linear.present_effect;
+    const Eigen::Matrix<double, 6, 1> motion = qr.solve(linear.y - linear.design * amplitudes);
+    moveTruth(motion);
+    const bool whole = keep(selection, linear);
+    refine(selection.gain, step);
+    if (!whole) return std::numeric_limits<double>::infinity();
+    // Whitened by about the jig's SD.
+    const double moved = std::sqrt((change + linear.rigid * motion).squaredNorm() / static_cast<double>(change.size()));
+    return moved * jig_sd_m_;
+  }
+
+  void moveTruth(const Eigen::Matrix<double, 6, 1>& motion) {
+    const Eigen::Quaterniond turn = rotationFromVector(motion.tail<3>());
+    const Pose about_center{center_m_ + motion.head<3>() - turn * center_m_, turn};
+    field_from_truth_ = about_center * field_from_truth_;
+    field_from_truth_.orientation.normalize();
+  }
+
+  /// Takes the sources chosen; or, where the corrected positions would come out farther from the truth than they are, a
+  /// part of the way there. @return whether it went all the way
+  bool keep(const GroupSelection& selection, const Linearisation& linear) {
+    const Chosen before = std::move(chosen_);
+    const Chosen after = chosenBy(selection, linear);
+    chosen_ = after;
+    Misfit misfit = rigidMisfit(DisturbedField(sources()));
+    // Near the end the likelihood may well give up a little of the fit for fewer sources.
+    const double enough_m2 = std::max(1.1 * misfit_m2_, 1.5 * noise_factor_ * jig_sd_m_ * jig_sd_m_);
+    bool whole = true;
+    for (double share = 0.5; !(misfit.mean_square_m2 <= enough_m2) && share > 0.05; share *= 0.5) {
+      chosen_ = blended(before, after, share);
+      misfit = rigidMisfit(DisturbedField(sources()));
+      whole = false;
+    }
+    if (!whole) field_from_truth_ = misfit.field_from_truth;
+    misfit_m2_ = misfit.mean_square_m2;
+    return whole;
+  }
+
+  static Chosen chosenBy(const GroupSelection& selection, const Linearisation& linear) {
+    Chosen chosen;
+    chosen.sites = selection.groups;
+    for (std::size_t k = 0; k < chosen.sites.size(); ++k) {
+      const double scale = linear.scale[static_cast<std::size_t>(chosen.sites[k])];
+      chosen.tensors.push_back(selection.amplitudes.segment(kPerSource * static_cast<Eigen::Index>(k), kPerSource) /
+                               scale);
+      chosen.variances.push_back(selection.prior_variance[static_cast<Eigen::Index>(k)] / (scale * scale));
+    }
+    return chosen;
+  }
+
+  static Chosen blended(const Chosen& before, const Chosen& after, double share) {
+    Chosen blend;
+    const auto add = [&blend](const Chosen& part, double weight) {
+      for (std::size_t k = 0; k < part.sites.size(); ++k) {
+        const auto found = std::find(blend.sites.begin(), blend.sites.end(), part.sites[k]);
+        const auto at = static_cast<std::size_t>(found - blend.sites.begin());
+        if (found == blend.sites.end()) {
+          blend.sites.push_back(part.sites[k]);
+          blend.tensors.push_back(weight * part.tensors[k]);
+          blend.variances.push_back(part.variances[k]);
+        } else {
+          blend.tensors[at] += weight * part.tensors[k];
+        }
+      }
+    };
+    add(after, share);
+    add(before, 1.0 - share);
+    return blend;
+  }
+
+  void forgetSources() {
+    chosen_ = Chosen();
+    const Misfit misfit = rigidMisfit(DisturbedField());
+    field_from_truth_ = misfit.field_from_truth;
+    noise_factor_ = std::max(noise_factor_, misfit.mean_square_m2 / (jig_sd_m_ * jig_sd_m_));
+  }
+
+  /// Candidates of the next step: those chosen, their closer neighbours, and of the rest those that offered most; all
+  /// of a new lattice when the places turn out to stand elsewhere.
+  void refine(const Eigen::VectorXd& gain, int step) {
+    const Box before = box_;
+    findBox();
+    constexpr double kMoved = 0.02;  // Of the extent: by so much a lattice may be amiss.
+    const bool has_moved =
+        (box_.low_m - before.low_m).norm() + (box_.high_m - before.high_m).norm() > kMoved * box_.extent_m();
+    std::vector<Site> next;
+    for (const Eigen::Index site : chosen_.sites) next.push_back(sites_[static_cast<std::size_t>(site)]);
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) {
+      for (const Site& site : refinedSites(next[k], box_)) next.push_back(site);
+      next[k].reach_m *= 0.5;
+    }
+    const bool is_new_lattice = step == 0 && has_moved;
+    for (const Site& site : is_new_lattice ? candidateSites(box_) : bestOthers(gain)) next.push_back(site);
+    sites_ = std::move(next);
+    std::iota(chosen_.sites.begin(), chosen_.sites.end(), Eigen::Index{0});
+  }
+
+  std::vector<Site> bestOthers(const Eigen::VectorXd& gain) const {
+    std::vector<Eigen::Index> order(sites_.size());
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::stable_sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) { return gain[a] > gain[b]; });
+    order.resize(std::min(order.size(), kCandidatesKept));
+    std::vector<Site> others;
+    for (const Eigen::Index site : order)
+      if (std::find(chosen_.sites.begin(), chosen_.sites.end(), site) == chosen_.sites.end())
+        others.push_back(sites_[static_cast<std::size_t>(site)]);
+    return others;
+  }
+
+  const Eigen::Vector3d& placeOf_m(std::size_t source) const {
+    return sites_[static_cast<std::size_t>(chosen_.sites[source])].at_m;
+  }
+
+  std::vector<FieldSource> sources() const {
+    std::vector<FieldSource> sources;
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k)
+      sources.push_back(sourceOf(placeOf_m(k), chosen_.tensors[k]));
+    return sources;
+  }
+
+  FieldPosterior posterior() const {
+    std::vector<SourceBasis> bases;
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) bases.emplace_back(placeOf_m(k));
+    return posteriorOf(rowsAtField(), bases, chosen_.variances, center_m_, noise_factor_);
+  }
+
+  const FitData& data_;
+  const HarmonicOptions& options_;
+  const RunControl& control_;
+  Pose field_from_truth_;
+  Box box_;
+  Eigen::Vector3d center_m_ = Eigen::Vector3d::Zero();
+  double jig_sd_m_ = 0.0;
+  double noise_factor_ = 1.0;
+  std::vector<Site> sites_;
+  Chosen chosen_;
+  double misfit_m2_ = 0.0;  ///< Of the field found so far.
+};
+
+}  // namespace
+
+Result<HarmonicFit> fitHarmonicField(const FitData& data, const HarmonicOptions& options, const RunControl& control) {
+  const auto field_from_truth = fitRigid(data.p_true_m, data.p_tracked_m);
+  if (!field_from_truth) return tl::unexpected(field_from_truth.error());
+  return Fitter(data, options, control, *field_from_truth).run();
+}
+
+}  // namespace fieldtrue::correctors

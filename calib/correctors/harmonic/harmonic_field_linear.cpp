@@ -1,0 +1,116 @@
+#include "calib/correctors/harmonic/harmonic_field_linear.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+
+#include "calib/core/error.h"
+#include "calib/field/dipole_field.h"
+#include "calib/field/tracker_model.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+const std::array<Eigen::Matrix3d, kPerSource>& symmetricTensors() {
+  static const std::array<Eigen::Matrix3d, kPerSource> kTensors = [] {
+    std::array<Eigen::Matrix3d, kPerSource> tensors;
+    std::size_t next = 0;
+    for (int a = 0; a < 3; ++a) {
+      for (int b = a; b < 3; ++b) {
+        Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();
+        tensor(a, b) = tensor(b, a) = a == b ? 1.0 : std::sqrt(0.5);
+        tensors[next++] = tensor;
+      }
+    }
+    return tensors;
+  }();
+  return kTensors;
+}
+
+/// What excites a source: the transmitter's field there; at the transmitter, its coils themselves.
+Eigen::Matrix3d excitationAt(const Eigen::Vector3d& at_m) {
+  return at_m.isZero() ? Eigen::Matrix3d::Identity() : field::dipoleField(at_m, 1.0);
+}
+
+Eigen::MatrixXd allEffects(const PlaceDerivative& place, std::span<const SourceBasis> sources,
+                           const Eigen::Vector3d& about_m) {
+  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(sources.size());
+  Eigen::MatrixXd effects(3, n_amplitudes + 6);
+  for (std::size_t k = 0; k < sources.size(); ++k)
+    effects.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)) = effectOfSource(place, sources[k]);
+  effects.rightCols<6>() = effectOfMotion(place.at_m, about_m);
+  return effects;
+}
+
+}  // namespace
+
+SourceBasis::SourceBasis(const Eigen::Vector3d& source_at_m) : at_m(source_at_m) {
+  const Eigen::Matrix3d excitation = excitationAt(at_m);
+  for (Eigen::Index e = 0; e < kPerSource; ++e) {
+    const Eigen::Matrix3d response = symmetricTensors()[static_cast<std::size_t>(e)] * excitation;
+    responses.col(e) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(response.data());
+  }
+}
+
+FieldSource sourceOf(const Eigen::Vector3d& at_m, const TensorAmplitudes& amplitudes) {
+  const Eigen::Matrix<double, 9, 1> response = SourceBasis(at_m).responses * amplitudes;
+  return {at_m, Eigen::Map<const Eigen::Matrix3d>(response.data())};
+}
+
+PlaceDerivative PlaceDerivative::of(const DisturbedField& field, const Eigen::Vector3d& p_tracked_m) {
+  PlaceDerivative place;
+  place.at_m = field.truePosition_m(p_tracked_m);
+  place.by_field =
+      -field.trackedJacobian(place.at_m).inverse() * field::solvedPositionDerivative(field.at(place.at_m), place.at_m);
+  return place;
+}
+
+Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place, const SourceBasis& source) {
+  // The field is G(p - at) response: G first, for it is the same for all six responses.
+  const Eigen::Matrix3d from_source = field::dipoleField(place.at_m - source.at_m, 1.0);
+  Eigen::Matrix<double, 3, 9> by_response;
+  for (Eigen::Index column = 0; column < 3; ++column)
+    by_response.middleCols<3>(3 * column).noalias() = place.by_field.middleCols<3>(3 * column) * from_source;
+  return by_response * source.responses;
+}
+
+Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eigen::Vector3d& about_m) {
+  const Eigen::Vector3d d = p_m - about_m;
+  Eigen::Matrix3d cross;
+  cross << 0.0, -d.z(), d.y(), d.z(), 0.0, -d.x(), -d.y(), d.x(), 0.0;
+  Eigen::Matrix<double, 3, 6> effect;
+  effect << -Eigen::Matrix3d::Identity(), cross;
+  return effect;
+}
+
+double FieldPosterior::sd_m(const PlaceDerivative& place) const {
+  const Eigen::MatrixXd effects = allEffects(place, sources, about_m);
+  return (effects * root.triangularView<Eigen::Upper>()).norm();
+}
+
+FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<SourceBasis>& sources,
+                           const std::vector<double>& prior_variance, const Eigen::Vector3d& about_m,
+                           double noise_factor) {
+  FT_CHECK(sources.size() == prior_variance.size());
+  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(sources.size());
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(n_amplitudes + 6, n_amplitudes + 6);
+  for (const PlaceRow& row : rows) {
+    const Eigen::MatrixXd effects = row.whitening * allEffects(row.derivative, sources, about_m);
+    precision.noalias() += effects.transpose() * effects / noise_factor;
+  }
+  for (std::size_t k = 0; k < prior_variance.size(); ++k)
+    precision.diagonal().segment<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)).array() +=
+        1.0 / prior_variance[k];
+  // The unknowns differ by many orders of magnitude: a unit diagonal first, and no direction without any precision.
+  const Eigen::VectorXd scale = precision.diagonal().cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd scaled = scale.asDiagonal() * precision * scale.asDiagonal();
+  scaled.diagonal().array() += 1e-12;
+  const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
+  FieldPosterior posterior{sources, about_m, Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())};
+  llt.matrixU().solveInPlace(posterior.root);
+  posterior.root = scale.asDiagonal() * posterior.root;
+  return posterior;
+}
+
+}  // namespace fieldtrue::correctors

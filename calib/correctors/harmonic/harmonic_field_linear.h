@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "calib/correctors/harmonic/harmonic_field_evidence.h"
+#include "calib/correctors/harmonic/harmonic_field_physics.h"
+#include "calib/field/tracker_model.h"
+
+namespace fieldtrue::correctors {
+
+/// What a source answers the transmitter's field with: six amplitudes of a symmetric tensor, in the order xx xy xz yy
+/// yz zz, those off the diagonal over sqrt(2) so that all tensors are of unit norm.
+using TensorAmplitudes = Eigen::Matrix<double, kPerSource, 1>;
+
+/// The source of a tensor at a place: its response is the tensor times the transmitter's field there, or times the
+/// coils themselves where it is the transmitter.
+FieldSource sourceOf(const Eigen::Vector3d& at_m, const TensorAmplitudes& amplitudes);
+
+/// How a corrected position changes with the field, at one place.
+struct PlaceDerivative {
+  Eigen::Vector3d at_m = Eigen::Vector3d::Zero();  ///< Where the field counts, transmitter frame.
+  field::PositionDerivative by_field = field::PositionDerivative::Zero();  ///< d corrected / d field matrix.
+
+  /// At the place that a field corrects a tracked position to.
+  static PlaceDerivative of(const DisturbedField& field, const Eigen::Vector3d& p_tracked_m);
+};
+
+/// A place where a source may stand, with the responses of its six amplitudes (columns, each a 3x3 matrix
+/// column-major).
+struct SourceBasis {
+  Eigen::Vector3d at_m;
+  Eigen::Matrix<double, 9, kPerSource> responses;
+
+  explicit SourceBasis(const Eigen::Vector3d& source_at_m);
+};
+
+/// d corrected / d amplitudes of a source at one place.
+Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place, const SourceBasis& source);
+
+/// d corrected / d (shift, turn about a point) of a motion done to the truth instead.
+Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eigen::Vector3d& about_m);
+
+/// Joint posterior of the amplitudes of some sources and of the rigid motion, for the SD of corrected positions.
+struct FieldPosterior {
+  std::vector<SourceBasis> sources;
+  Eigen::Vector3d about_m = Eigen::Vector3d::Zero();  ///< Of the motion's turn.
+  Eigen::MatrixXd root;                               ///< Upper triangular W, covariance = W W^T.
+
+  /// Root of the trace of the covariance of the corrected position [m].
+  double sd_m(const PlaceDerivative& place) const;
+};
+
+/// Positions to be explained at one linearisation.
+struct PlaceRow {
+  PlaceDerivative derivative;
+  Eigen::Vector3d true_minus_corrected_m = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d whitening = Eigen::Matrix3d::Identity();  ///< Inverse Cholesky factor of its noise.
+};
+
+/// @param prior_variance of each source's amplitudes
+/// @param noise_factor variance of the noise over what the rows' whitening says
+FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<SourceBasis>& sources,
+                           const std::vector<double>& prior_variance, const Eigen::Vector3d& about_m,
+                           double noise_factor);
+
+}  // namespace fieldtrue::correctors

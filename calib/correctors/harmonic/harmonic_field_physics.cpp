@@ -1,0 +1,66 @@
+#include "calib/correctors/harmonic/harmonic_field_physics.h"
+
+#include <cmath>
+
+#include "calib/field/dipole_field.h"
+#include "calib/field/tracker_model.h"
+
+namespace fieldtrue::correctors {
+Eigen::Matrix3d DisturbedField::at(const Eigen::Vector3d& p_true_m) const {
+  Eigen::Matrix3d field = field::dipoleField(p_true_m, 1.0);
+  for (const FieldSource& source : sources_) {
+    const Eigen::Vector3d from_source_m = p_true_m - source.at_m;
+    const double r2 = from_source_m.squaredNorm();
+    const double inverse_r3 = 1.0 / (r2 * std::sqrt(r2));
+    const Eigen::RowVector3d along = from_source_m.transpose() * source.response;
+    field += inverse_r3 * (3.0 / r2 * from_source_m * along - source.response);
+  }
+  return field;
+}
+
+Eigen::Vector3d DisturbedField::trackedPosition_m(const Eigen::Vector3d& p_true_m) const {
+  return field::solvedPosition_m(at(p_true_m), p_true_m);
+}
+
+Eigen::Matrix3d DisturbedField::trackedJacobian(const Eigen::Vector3d& p_true_m) const {
+  constexpr double kStep_m = 1e-4;
+  Eigen::Matrix3d jacobian;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d step_m = kStep_m * Eigen::Vector3d::Unit(axis);
+    jacobian.col(axis) = (trackedPosition_m(p_true_m + step_m) - trackedPosition_m(p_true_m - step_m)) / (2 * kStep_m);
+  }
+  return jacobian;
+}
+
+Eigen::Vector3d DisturbedField::truePosition_m(const Eigen::Vector3d& p_tracked_m) const {
+  if (sources_.empty()) return p_tracked_m;
+  constexpr int kMostSteps = 60;
+  constexpr double kNear = 1e-11;        // Of the range: 30 pm at 3 m.
+  constexpr double kLongestStep = 0.25;  // Of the range: a longer one may end beyond a source.
+  const double range_m = p_tracked_m.norm();
+  Eigen::Matrix3d true_by_tracked = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_m = p_tracked_m;
+  Eigen::Vector3d miss_m = p_tracked_m - trackedPosition_m(p_m);
+  Eigen::Vector3d best_m = p_m;
+  double least_m = miss_m.norm();
+  for (int i = 0; i < kMostSteps && least_m > kNear * range_m; ++i) {
+    Eigen::Vector3d step_m = true_by_tracked * miss_m;
+    const double length_m = step_m.norm();
+    if (!(length_m > 0.0) || !std::isfinite(length_m)) break;
+    if (length_m > kLongestStep * range_m) step_m *= kLongestStep * range_m / length_m;
+    p_m += step_m;
+    const Eigen::Vector3d new_miss_m = p_tracked_m - trackedPosition_m(p_m);
+    const Eigen::Vector3d moved_m = true_by_tracked * (miss_m - new_miss_m);
+    const double scale = step_m.dot(moved_m);
+    if (std::abs(scale) > 1e-3 * step_m.squaredNorm())
+      true_by_tracked += (step_m - moved_m) * (step_m.transpose() * true_by_tracked) / scale;
+    miss_m = new_miss_m;
+    if (miss_m.norm() < least_m) {
+      least_m = miss_m.norm();
+      best_m = p_m;
+    }
+  }
+  return best_m;
+}
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+namespace fieldtrue::correctors {
+
+/// A dipole that metal outside the measured region stands for: with the transmitter's coils at unit strength it adds
+/// G(p - at) response to the 3x3 field matrix, G(r) = (3uu^T - 1)/|r|^3. At the transmitter itself it is a change of
+/// the coils.
+struct FieldSource {
+  Eigen::Vector3d at_m = Eigen::Vector3d::Zero();      ///< Transmitter frame.
+  Eigen::Matrix3d response = Eigen::Matrix3d::Zero();  ///< Moment (rows) by transmitter coil (columns), coil moment 1.
+};
+
+/// The transmitter's field with what the sources add, and what a tracker that knows nothing of them makes of it.
+class DisturbedField {
+ public:
+  DisturbedField() = default;
+  explicit DisturbedField(std::vector<FieldSource> sources) : sources_(std::move(sources)) {}
+
+  std::span<const FieldSource> sources() const { return sources_; }
+  /// @param p_true_m transmitter frame [m], not at the transmitter or at a source
+  Eigen::Matrix3d at(const Eigen::Vector3d& p_true_m) const;
+  Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m) const;
+  /// d tracked / d true, by central differences of 0.1 mm.
+  Eigen::Matrix3d trackedJacobian(const Eigen::Vector3d& p_true_m) const;
+  /// The place whose tracked position is the one given, by Broyden's method from there; where the field folds back and
+  /// there is none, the place that comes nearest on the way.
+  /// @source Broyden 1965, Mathematics of Computation 19 577 (the "good" update)
+  Eigen::Vector3d truePosition_m(const Eigen::Vector3d& p_tracked_m) const;
+
+ private:
+  std::vector<FieldSource> sources_;
+};
+
+}  // namespace fieldtrue::correctors

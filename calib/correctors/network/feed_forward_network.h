@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+
+namespace fieldtrue::correctors {
+
+/// A network of 3 linear inputs, two hidden layers of logistic nodes f(s) = 1/(1 + e^-s) and 3 linear outputs, with a
+/// bias to every hidden and output node.
+/// @source Saleh, Kindratenko, Sherman, On Using Neural Networks to Calibrate Electromagnetic Tracking Systems; survey
+/// by Kindratenko, section 3.6
+class FeedForwardNetwork {
+ public:
+  using Weights = Eigen::VectorXd;
+  using WeightJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
+
+  FeedForwardNetwork() = default;
+  /// All weights zero.
+  FeedForwardNetwork(int n_first, int n_second);
+
+  static int weightCount(int n_first, int n_second);
+
+  /// Uniform weights of the width at which logistic nodes neither saturate nor stay linear; the same for a seed on
+  /// every platform.
+  /// @source Glorot, Bengio 2010, eq. 16, four times wider for the logistic function
+  void setRandomWeights(std::uint64_t seed);
+
+  Eigen::Vector3d output(const Eigen::Vector3d& x) const;
+  /// d output / d x.
+  Eigen::Matrix3d gradient(const Eigen::Vector3d& x) const;
+  /// The output, and d output / d weights in the order of weights(): of each layer its matrix by rows, then its biases.
+  /// @param jacobian 3 x weightCount
+  Eigen::Vector3d outputWithWeightJacobian(const Eigen::Vector3d& x, WeightJacobian& jacobian) const;
+
+  const Weights& weights() const { return weights_; }
+  void setWeights(const Weights& weights);
+  int firstHidden() const { return n_first_; }
+  int secondHidden() const { return n_second_; }
+
+  nlohmann::json toJson() const;
+  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
+  static FeedForwardNetwork fromJson(const nlohmann::json& json);
+
+ private:
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  using Layer = Eigen::Map<const RowMajor>;
+  using Biases = Eigen::Map<const Eigen::VectorXd>;
+  /// What the hidden nodes put out.
+  struct Activity {
+    Eigen::VectorXd first;
+    Eigen::VectorXd second;
+  };
+
+  Layer layer(Eigen::Index start, int rows, int columns) const { return {weights_.data() + start, rows, columns}; }
+  Biases biases(Eigen::Index start, int count) const { return {weights_.data() + start, count}; }
+  Eigen::Index secondStart() const { return 4 * n_first_; }
+  Eigen::Index thirdStart() const { return secondStart() + (n_first_ + 1) * n_second_; }
+  Activity activity(const Eigen::Vector3d& x) const;
+  Eigen::Vector3d outputOf(const Activity& activity) const;
+
+  int n_first_ = 0;
+  int n_second_ = 0;
+  Weights weights_;
+};
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,160 @@
+#include "calib/correctors/network/neural_network_training.h"
+
+#include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+namespace fieldtrue::correctors {
+namespace {
+
+/// Error of the outputs for one pair.
+class PairCost : public ceres::CostFunction {
+ public:
+  PairCost(const FeedForwardNetwork& layers, const Eigen::Vector3d& input, const Eigen::Vector3d& target)
+      : layers_(layers), input_(input), target_(target) {
+    set_num_residuals(3);
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(layers.weights().size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    FeedForwardNetwork network = layers_;
+    network.setWeights(Eigen::Map<const Eigen::VectorXd>(parameters[0], network.weights().size()));
+    Eigen::Map<Eigen::Vector3d> error(residuals);
+    if (jacobians == nullptr || jacobians[0] == nullptr) {
+      error = network.output(input_) - target_;
+    } else {
+      FeedForwardNetwork::WeightJacobian jacobian;
+      error = network.outputWithWeightJacobian(input_, jacobian) - target_;
+      Eigen::Map<FeedForwardNetwork::WeightJacobian>(jacobians[0], 3, jacobian.cols()) = jacobian;
+    }
+    return error.allFinite();
+  }
+
+ private:
+  const FeedForwardNetwork& layers_;
+  Eigen::Vector3d input_;
+  Eigen::Vector3d target_;
+};
+
+/// Counts iterations over all starts, and ends a start on request.
+class Watch : public ceres::IterationCallback {
+ public:
+  Watch(const RunControl& control, std::atomic<int>& n_done, int n_planned)
+      : control_(control), n_done_(n_done), n_planned_(n_planned) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    const int n_done = ++n_done_;
+    control_.progress(std::min(1.0, static_cast<double>(n_done) / n_planned_));
+    return control_.stop.stop_requested() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const RunControl& control_;
+  std::atomic<int>& n_done_;
+  int n_planned_;
+};
+
+/// Where one start ends.
+struct Ending {
+  FeedForwardNetwork::Weights weights;
+  double cost = HUGE_VAL;
+};
+
+Ending trainFrom(const FeedForwardNetwork& start, const TrainingSet& set, const LevenbergMarquardtOptions& options,
+                 Watch& watch) {
+  Ending ending{start.weights(), HUGE_VAL};
+  ceres::Problem problem;
+  for (std::size_t i = 0; i < set.input.size(); ++i)
+    problem.AddResidualBlock(new PairCost(start, set.input[i], set.target[i]), nullptr, ending.weights.data());
+  if (options.weight_penalty > 0.0) {
+    const auto n_weights = ending.weights.size();
+    const double factor = std::sqrt(options.weight_penalty * static_cast<double>(set.input.size()));
+    problem.AddResidualBlock(
+        new ceres::NormalPrior(factor * ceres::Matrix::Identity(n_weights, n_weights), ceres::Vector::Zero(n_weights)),
+        nullptr, ending.weights.data());
+  }
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  solver.max_num_iterations = options.max_iterations;
+  solver.num_threads = 1;
+  solver.logging_type = ceres::SILENT;
+  solver.callbacks.push_back(&watch);
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  if (summary.IsSolutionUsable()) ending.cost = summary.final_cost;
+  return ending;
+}
+
+tl::unexpected<Error> stopped() {
+  return fail(ErrorCode::kCancelled, "The training of the network was stopped on request");
+}
+
+/// Fisher and Yates, the same order on every platform.
+void shuffle(std::vector<std::size_t>& order, std::mt19937_64& generator) {
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[generator() % i]);
+}
+
+}  // namespace
+
+Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& network, const TrainingSet& set,
+                                                     const LevenbergMarquardtOptions& options,
+                                                     const RunControl& control) {
+  FT_CHECK(set.input.size() == set.target.size() && !set.input.empty() && options.n_starts > 0);
+  std::vector<Ending> endings(static_cast<std::size_t>(options.n_starts));
+  std::atomic<int> n_done = 0;
+  control.parallel_for(endings.size(), [&](std::size_t k) {
+    if (control.stop.stop_requested()) return;
+    FeedForwardNetwork start = network;
+    start.setRandomWeights(1000003 * options.seed + k);
+    Watch watch(control, n_done, options.n_starts * options.max_iterations);
+    endings[k] = trainFrom(start, set, options, watch);
+  });
+  if (control.stop.stop_requested()) return stopped();
+  const auto best = std::min_element(endings.begin(), endings.end(),
+                                     [](const Ending& a, const Ending& b) { return a.cost < b.cost; });
+  if (!std::isfinite(best->cost))
+    return fail(ErrorCode::kDegenerate, "The training of the network failed from each of its " +
+                                            std::to_string(options.n_starts) + " starts; try another seed");
+  FeedForwardNetwork trained = network;
+  trained.setWeights(best->weights);
+  return trained;
+}
+
+Result<BackPropagationResult> trainByBackPropagation(const FeedForwardNetwork& network, const TrainingSet& set,
+                                                     const BackPropagationOptions& options, const RunControl& control) {
+  FT_CHECK(set.input.size() == set.target.size() && !set.input.empty());
+  BackPropagationResult result{network, HUGE_VAL, 0};
+  result.network.setRandomWeights(1000003 * options.seed);
+  std::mt19937_64 generator(options.seed);
+  std::vector<std::size_t> order(set.input.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  FeedForwardNetwork::Weights weights = result.network.weights();
+  FeedForwardNetwork::Weights change = FeedForwardNetwork::Weights::Zero(weights.size());
+  FeedForwardNetwork::WeightJacobian jacobian;
+  while (result.n_epochs < options.max_epochs && result.mean_error >= options.stop_error) {
+    if (control.stop.stop_requested()) return stopped();
+    shuffle(order, generator);
+    double sum = 0.0;
+    for (const std::size_t i : order) {
+      const Eigen::Vector3d error = result.network.outputWithWeightJacobian(set.input[i], jacobian) - set.target[i];
+      change = options.momentum * change - options.learning_rate * jacobian.transpose() * error;
+      weights += change;
+      result.network.setWeights(weights);
+      sum += error.norm();
+    }
+    ++result.n_epochs;
+    result.mean_error = sum / static_cast<double>(order.size());
+    if (!std::isfinite(result.mean_error) || !weights.allFinite())
+      return fail(ErrorCode::kDegenerate, "Back-propagation diverged in epoch " + std::to_string(result.n_epochs) +
+                                              "; a lower learning_rate or momentum is needed");
+    control.progress(static_cast<double>(result.n_epochs) / options.max_epochs);
+  }
+  return result;
+}
+
+}  // namespace fieldtrue::correctors

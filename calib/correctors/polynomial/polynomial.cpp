@@ -1,0 +1,51 @@
+#include "calib/correctors/base/fit_checks.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/base/rows.h"
+#include "calib/correctors/polynomial/polynomial_choice.h"
+#include "calib/correctors/polynomial/polynomial_position.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+const std::string kLabel = "Polynomial";
+
+Result<PolynomialDegree> degreeOf(const FitData& data, const Settings& settings, const RunControl& control) {
+  if (auto checked = checkPositions(data, kLabel); !checked) return tl::unexpected(checked.error());
+  return degreeFor({kLabel, data, displacements_m(data)}, settings, control);
+}
+
+Result<std::unique_ptr<PositionModel>> fitPolynomial(const FitData& data, const Settings& settings,
+                                                     const RunControl& control) {
+  const auto degree = degreeOf(data, settings, control);
+  if (!degree) return tl::unexpected(degree.error());
+  return fitPolynomialPosition(data, *degree, degreeName(kLabel, degree->degree));
+}
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomial(const FitData& data, const Settings& settings,
+                                                                      const RunControl& control) {
+  const auto degree = degreeOf(data, settings, control);
+  if (!degree) return tl::unexpected(degree.error());
+  return holdOutPolynomialPosition(data, *degree, degreeName(kLabel, degree->degree));
+}
+
+Result<std::unique_ptr<PositionModel>> loadPolynomial(const nlohmann::json& parameters) {
+  return loadPolynomialPosition(parameters, "polynomial");
+}
+
+}  // namespace
+
+PositionMethod polynomialPosition() {
+  return {
+      .id = "polynomial",
+      .label = "Polynomial",
+      .source =
+          "Kindratenko 1999; Ikits, Brederson, Hansen, Hollerbach 2001; survey by Kindratenko, section 3.4, eq. 14-15",
+      .settings = {degreeSetting()},
+      .fit = fitPolynomial,
+      .load = loadPolynomial,
+      .hold_out = holdOutPolynomial,
+      .origin = MethodOrigin::kSurvey,
+      .tries = {{"degree=2", 3}, {"degree=3", 4}, {"degree=4", 5}, {"degree=5", 6}, {"degree=6", 7}}};
+}
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,252 @@
+#include "calib/correctors/radial/rbf_field.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "calib/core/geometry.h"
+#include "calib/correctors/base/json_values.h"
+#include "calib/correctors/multiquadric/hmq_kernel.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+constexpr std::size_t kBlock = 256;
+
+constexpr std::array<std::pair<RadialKernel, const char*>, 6> kKernelNames = {
+    {{RadialKernel::kMultiquadric, "multiquadric"},
+     {RadialKernel::kInverseMultiquadric, "inverse_multiquadric"},
+     {RadialKernel::kCubic, "cubic"},
+     {RadialKernel::kThinPlate, "thin_plate"},
+     {RadialKernel::kMatern32, "matern_3_2"},
+     {RadialKernel::kMatern52, "matern_5_2"}}};
+
+/// Coordinates of places in a frame, one array each.
+struct LocalArrays {
+  std::vector<double> x, y, z;
+
+  LocalArrays(const FieldFrame& frame, std::span<const Eigen::Vector3d> p_m) {
+    for (const Eigen::Vector3d& place_m : p_m) {
+      const Eigen::Vector3d u = frame.local(place_m);
+      x.push_back(u.x());
+      y.push_back(u.y());
+      z.push_back(u.z());
+    }
+  }
+};
+
+}  // namespace
+
+std::string toText(RadialKernel kernel) {
+  for (const auto& [known, name] : kKernelNames)
+    if (known == kernel) return name;
+  return {};
+}
+
+std::optional<RadialKernel> radialKernelFrom(const std::string& text) {
+  for (const auto& [known, name] : kKernelNames)
+    if (name == text) return known;
+  return std::nullopt;
+}
+
+FieldFrame FieldFrame::around(std::span<const Eigen::Vector3d> p_m, int dimension, double unit_m) {
+  FT_CHECK(!p_m.empty() && dimension >= 2 && unit_m > 0.0);
+  FieldFrame frame;
+  frame.dimension = dimension;
+  for (const Eigen::Vector3d& place_m : p_m) frame.center_m += place_m / static_cast<double>(p_m.size());
+  frame.per_m.setConstant(1.0 / unit_m);
+  if (dimension == 2) {
+    frame.axes = pointSpread(p_m).axes;
+    frame.per_m.z() = 0.0;
+  }
+  return frame;
+}
+
+Eigen::MatrixXd FieldFrame::tail(std::span<const Eigen::Vector3d> p_m) const {
+  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(p_m.size()), 1 + dimension);
+  for (std::size_t i = 0; i < p_m.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    matrix(row, 0) = 1.0;
+    matrix.row(row).tail(dimension) = local(p_m[i]).head(dimension).transpose();
+  }
+  return matrix;
+}
+
+nlohmann::json FieldFrame::toJson() const {
+  return {{"center_m", jsonOf(center_m)},
+          {"axes", jsonOf(Eigen::MatrixXd(axes))},
+          {"per_m", jsonOf(per_m)},
+          {"dimension", dimension}};
+}
+
+FieldFrame FieldFrame::fromJson(const nlohmann::json& json) {
+  FieldFrame frame;
+  frame.center_m = vectorFrom(json.at("center_m"));
+  const Eigen::MatrixXd axes = matrixFrom(json.at("axes"), 3);
+  if (axes.rows() != 3) throwMalformed("axes must be a 3 by 3 matrix");
+  frame.axes = axes;
+  frame.per_m = vectorFrom(json.at("per_m"));
+  frame.dimension = json.at("dimension").get<int>();
+  if (frame.dimension < 2 || frame.dimension > 3) throwMalformed("dimension 2 or 3 is needed");
+  return frame;
+}
+
+double rmsSpread_m(std::span<const Eigen::Vector3d> p_m) {
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& place_m : p_m) center_m += place_m / static_cast<double>(p_m.size());
+  double squares_m2 = 0.0;
+  for (const Eigen::Vector3d& place_m : p_m) squares_m2 += (place_m - center_m).squaredNorm();
+  const double spread_m = std::sqrt(squares_m2 / static_cast<double>(p_m.size()));
+  return spread_m > 0.0 ? spread_m : 1.0;
+}
+
+RadialField::RadialField(RadialKernel kernel, double c2, const FieldFrame& frame,
+                         std::span<const Eigen::Vector3d> centers_m, const RadialSolution& solution)
+    : kernel_(kernel), c2_(c2), frame_(frame), centers_m_(centers_m.begin(), centers_m.end()) {
+  FT_CHECK(solution.coefficients.rows() == static_cast<Eigen::Index>(centers_m.size()));
+  FT_CHECK(solution.coefficients.cols() == 3 && solution.tail.cols() == 3);
+  FT_CHECK(solution.tail.rows() == 1 + frame.dimension);
+  LocalArrays local(frame, centers_m);
+  x_ = std::move(local.x);
+  y_ = std::move(local.y);
+  z_ = std::move(local.z);
+  coefficients_ = solution.coefficients;
+  tail_.setZero();
+  tail_.topRows(solution.tail.rows()) = solution.tail;
+}
+
+RadialArrays RadialField::arrays(std::size_t start, std::size_t count) const {
+  return {x_.data() + start, y_.data() + start, z_.data() + start, count};
+}
+
+Eigen::Vector3d RadialField::value(const Eigen::Vector3d& p_m) const {
+  const Eigen::Vector3d u = frame_.local(p_m);
+  Eigen::Vector3d sum = tail_.row(0).transpose() + tail_.bottomRows<3>().transpose() * u;
+  std::array<double, kBlock> weights;
+  for (std::size_t start = 0; start < x_.size(); start += kBlock) {
+    const std::size_t count = std::min(kBlock, x_.size() - start);
+    squaredDistances(arrays(start, count), u.data(), weights.data());
+    radialValues(kernel_, c2_, weights.data(), count, weights.data());
+    for (Eigen::Index k = 0; k < 3; ++k)
+      sum[k] += dotProduct(coefficients_.col(k).data() + start, weights.data(), count);
+  }
+  return sum;
+}
+
+Eigen::Matrix3d RadialField::gradient(const Eigen::Vector3d& p_m) const {
+  const Eigen::Vector3d u = frame_.local(p_m);
+  Eigen::Matrix3d local_gradient = tail_.bottomRows<3>().transpose();
+  std::array<double, kBlock> slopes;
+  for (std::size_t start = 0; start < x_.size(); start += kBlock) {
+    const std::size_t count = std::min(kBlock, x_.size() - start);
+    squaredDistances(arrays(start, count), u.data(), slopes.data());
+    radialSlopes(kernel_, c2_, slopes.data(), count, slopes.data());
+    for (std::size_t j = 0; j < count; ++j) {
+      const Eigen::Vector3d from_center = u - Eigen::Vector3d(x_[start + j], y_[start + j], z_[start + j]);
+      local_gradient +=
+          coefficients_.row(static_cast<Eigen::Index>(start + j)).transpose() * (slopes[j] * from_center).transpose();
+    }
+  }
+  return local_gradient * frame_.per_m.asDiagonal() * frame_.axes.transpose();
+}
+
+Eigen::VectorXd RadialField::kernelValues(const Eigen::Vector3d& p_m) const {
+  const Eigen::Vector3d u = frame_.local(p_m);
+  Eigen::VectorXd values(static_cast<Eigen::Index>(x_.size()));
+  squaredDistances(arrays(0, x_.size()), u.data(), values.data());
+  radialValues(kernel_, c2_, values.data(), x_.size(), values.data());
+  return values;
+}
+
+Eigen::MatrixXd kernelMatrix(RadialKernel kernel, double c2, const FieldFrame& frame,
+                             std::span<const Eigen::Vector3d> p_m) {
+  const LocalArrays local(frame, p_m);
+  const auto n = static_cast<Eigen::Index>(p_m.size());
+  Eigen::MatrixXd matrix(n, n);
+  for (std::size_t j = 0; j < p_m.size(); ++j) {
+    const std::array<double, 3> u = {local.x[j], local.y[j], local.z[j]};
+    const std::size_t count = p_m.size() - j;
+    double* below = matrix.col(static_cast<Eigen::Index>(j)).data() + j;
+    squaredDistances({local.x.data() + j, local.y.data() + j, local.z.data() + j, count}, u.data(), below);
+    radialValues(kernel, c2, below, count, below);
+  }
+  return matrix;
+}
+
+nlohmann::json RadialField::toJson() const {
+  nlohmann::json centers = nlohmann::json::array();
+  for (const Eigen::Vector3d& center_m : centers_m_) centers.push_back(jsonOf(center_m));
+  return {{"kernel", toText(kernel_)},
+          {"shape_squared", c2_},
+          {"frame", frame_.toJson()},
+          {"centers_m", std::move(centers)},
+          {"coefficients", jsonOf(Eigen::MatrixXd(coefficients_))},
+          {"tail", jsonOf(Eigen::MatrixXd(tail_.topRows(1 + frame_.dimension)))}};
+}
+
+RadialField RadialField::fromJson(const nlohmann::json& json) {
+  const auto kernel = radialKernelFrom(json.at("kernel").get<std::string>());
+  if (!kernel) throwMalformed("the kernel '" + json.at("kernel").get<std::string>() + "' is not known");
+  const FieldFrame frame = FieldFrame::fromJson(json.at("frame"));
+  const Eigen::MatrixXd centers = matrixFrom(json.at("centers_m"), 3);
+  const RadialSolution solution{matrixFrom(json.at("coefficients"), 3), matrixFrom(json.at("tail"), 3)};
+  if (solution.coefficients.rows() != centers.rows() || solution.tail.rows() != 1 + frame.dimension)
+    throwMalformed("as many coefficients as centres and a tail of the frame's dimension are needed");
+  std::vector<Eigen::Vector3d> centers_m;
+  for (Eigen::Index i = 0; i < centers.rows(); ++i) centers_m.emplace_back(centers.row(i).transpose());
+  return RadialField(*kernel, json.at("shape_squared").get<double>(), frame, centers_m, solution);
+}
+
+Eigen::VectorXd placeNoise_m2(const FitData& data, const Places& places) {
+  Eigen::VectorXd own_m2 = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(places.size()));
+  std::vector<double> stated_m2;
+  for (std::size_t i = 0; i < places.size() && !data.noise_m2.empty(); ++i) {
+    const auto n_rows = static_cast<double>(places.rows[i].size());
+    double sum_m2 = 0.0;
+    for (const std::size_t row : places.rows[i]) sum_m2 += data.noise_m2[row].trace() / 3.0;
+    const double mean_m2 = sum_m2 / (n_rows * n_rows);
+    if (!std::isfinite(mean_m2) || !(mean_m2 > 0.0)) continue;
+    own_m2[static_cast<Eigen::Index>(i)] = mean_m2;
+    stated_m2.push_back(mean_m2);
+  }
+  if (!stated_m2.empty()) {
+    const auto middle = stated_m2.begin() + static_cast<std::ptrdiff_t>(stated_m2.size() / 2);
+    std::nth_element(stated_m2.begin(), middle, stated_m2.end());
+    for (double& variance_m2 : own_m2)
+      if (variance_m2 == 0.0) variance_m2 = *middle;
+  }
+  return own_m2.array() + data.jig_sd_m * data.jig_sd_m;
+}
+
+std::vector<std::size_t> spreadPlaces(std::span<const Eigen::Vector3d> p_m, std::size_t count) {
+  std::vector<std::size_t> chosen;
+  if (p_m.size() <= count) {
+    for (std::size_t i = 0; i < p_m.size(); ++i) chosen.push_back(i);
+    return chosen;
+  }
+  std::vector<bool> taken(p_m.size(), false);
+  std::vector<double> nearest_m2(p_m.size(), HUGE_VAL);
+  const auto take = [&](std::size_t i) {
+    taken[i] = true;
+    chosen.push_back(i);
+    for (std::size_t j = 0; j < p_m.size(); ++j)
+      nearest_m2[j] = std::min(nearest_m2[j], (p_m[j] - p_m[i]).squaredNorm());
+  };
+  take(0);
+  while (chosen.size() < (count + 1) / 2)
+    take(static_cast<std::size_t>(std::max_element(nearest_m2.begin(), nearest_m2.end()) - nearest_m2.begin()));
+  const std::size_t n_anchors = chosen.size();
+  for (std::size_t k = 0; k < n_anchors && chosen.size() < count; ++k) {
+    std::size_t nearest = p_m.size();
+    for (std::size_t j = 0; j < p_m.size(); ++j)
+      if (!taken[j] && (nearest == p_m.size() ||
+                        (p_m[j] - p_m[chosen[k]]).squaredNorm() < (p_m[nearest] - p_m[chosen[k]]).squaredNorm()))
+        nearest = j;
+    taken[nearest] = true;
+    chosen.push_back(nearest);
+  }
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "calib/core/error.h"
+#include "calib/effects/effect_body.h"
+#include "calib/effects/effect_fit.h"
+#include "calib/effects/sample_evidence.h"
+#include "calib/field/dipole_field.h"
+#include "calib/field/effect.h"
+
+namespace fieldtrue::effects {
+
+/// One parameter of an effect, as data.
+struct EffectParameter {
+  std::string name;  ///< With its unit: `center_m`.
+  std::string unit = {};
+  std::string shape;                       ///< "scalar", "vector3", "matrix3" (row-major, symmetric), "text", "list".
+  nlohmann::json default_value = nullptr;  ///< Null = not given; null is then also accepted in a file.
+  double min = 0.0;                        ///< Of each component; 0 and 0 = not bounded.
+  double max = 0.0;
+  std::string help;
+  std::vector<std::string> choices = {};  ///< Of a text; empty = any.
+  double plausible_min = 0.0;             ///< Of each component: what is met in practice; 0 and 0 = not told.
+  double plausible_max = 0.0;
+};
+
+/// One row of the effect registry.
+struct Effect {
+  std::string id;
+  std::string label;
+  std::string source;
+  std::vector<EffectParameter> parameters;
+  /// Builds the effect from resolved parameters. @error kBadInput for parameters that make no sense together
+  Result<std::unique_ptr<field::PhysicalEffect>> (*make)(const nlohmann::json& parameters,
+                                                         const field::Excitation& excitation) = nullptr;
+  /// The ways to fit it to a table of this design, simplest first; null for what only samples show. A way whose
+  /// parameters the design cannot show at all (time without times, a lever arm with one orientation) is left out.
+  std::vector<std::unique_ptr<EffectFit>> (*fits)(const FitDesign& design) = nullptr;
+  bool acts_in_time = false;  ///< What it does changes during the session: nothing to be found without times.
+  /// Of what it explains, it has to win by this share: above 0 for an effect that is freer than others to fit what they
+  /// leave over.
+  double share_to_win = 0.0;
+  /// Its shape; null for what does not stand in the room.
+  EffectBody (*body)(const nlohmann::json& parameters) = nullptr;
+  /// Adds what single readings show of it and the scene does not say yet; null where they show nothing.
+  void (*detect)(const SampleEvidence& evidence, const SignalBelief& belief,
+                 std::vector<recording::GapFinding>& findings) = nullptr;
+};
+
+}  // namespace fieldtrue::effects

@@ -1,0 +1,68 @@
+#include "calib/evaluation/coincident_places.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "calib/core/place_name.h"
+#include "calib/tables/true_box.h"
+
+namespace fieldtrue::evaluation {
+namespace {
+
+constexpr double kTolerance = 1e-3;  ///< Of the diagonal of the box around the true positions.
+
+/// The lowest number of each set of places that coincide, by the number of a place.
+class Joined {
+ public:
+  int lowest(int place) const {
+    const auto found = lower_.find(place);
+    return found == lower_.end() ? place : lowest(found->second);
+  }
+  void join(int a, int b) {
+    const auto [low, high] = std::minmax({lowest(a), lowest(b)});
+    if (low != high) lower_[high] = low;
+  }
+  const std::map<int, int>& lower() const { return lower_; }
+
+ private:
+  std::map<int, int> lower_;
+};
+
+Joined coincident(const std::vector<Node>& nodes) {
+  const double tolerance_m = kTolerance * trueBox_m(nodes).diagonal().norm();
+  const auto p_m = [&](std::size_t row) -> const Eigen::Vector3d& {
+    return nodes[row].reference_from_sensor.position_m;
+  };
+  std::vector<std::size_t> along_x(nodes.size());
+  std::iota(along_x.begin(), along_x.end(), std::size_t{0});
+  std::sort(along_x.begin(), along_x.end(), [&](std::size_t a, std::size_t b) { return p_m(a).x() < p_m(b).x(); });
+  Joined joined;
+  for (std::size_t i = 0; i < along_x.size(); ++i) {
+    const std::size_t a = along_x[i];
+    for (std::size_t j = i + 1; j < along_x.size() && p_m(along_x[j]).x() - p_m(a).x() <= tolerance_m; ++j) {
+      const std::size_t b = along_x[j];
+      if (nodes[a].node != nodes[b].node && nodes[a].sensor == nodes[b].sensor &&
+          (p_m(a) - p_m(b)).norm() <= tolerance_m)
+        joined.join(nodes[a].node, nodes[b].node);
+    }
+  }
+  return joined;
+}
+
+}  // namespace
+
+std::string joinCoincidentPlaces(std::vector<Node>& nodes) {
+  if (nodes.empty()) return {};
+  const PlaceNames names(nodes);
+  const Joined joined = coincident(nodes);
+  if (joined.lower().empty()) return {};
+  for (Node& node : nodes) node.node = joined.lowest(node.node);
+  const auto& [place, other] = *joined.lower().begin();
+  const std::size_t n = joined.lower().size();
+  return std::to_string(n) + (n == 1 ? " place has" : " places have") + " the true position of another, as " +
+         names.of(place) + " that of " + names.of(joined.lowest(other)) +
+         ": each such set was held out together, as one place.";
+}
+
+}  // namespace fieldtrue::evaluation

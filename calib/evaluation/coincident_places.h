@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/core/calibration_table.h"
+
+namespace fieldtrue::evaluation {
+
+/// Rows with one true position are one place, whatever their numbers: held out apart, a repeated reading would be
+/// foretold by its own repetition. Gives such rows the lowest of their numbers.
+/// @param nodes true positions within a thousandth of their extent count as one
+/// @return a sentence naming the places that were joined; empty when none were
+std::string joinCoincidentPlaces(std::vector<Node>& nodes);
+
+}  // namespace fieldtrue::evaluation

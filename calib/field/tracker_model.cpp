@@ -1,0 +1,109 @@
+#include "calib/field/tracker_model.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "calib/field/dipole_field.h"
+#include "calib/field/pose_solver.h"
+
+namespace fieldtrue::field {
+namespace {
+
+/// Unit eigenvector of the largest eigenvalue of a positive symmetric matrix, by repeated squaring: undistorted, the
+/// others are a quarter of it, and five squarings leave 4^-32 of them.
+Eigen::Vector3d dominantDirection(Eigen::Matrix3d m) {
+  constexpr int kMostSquarings = 16;
+  m /= m.trace();
+  for (int i = 0; i < kMostSquarings; ++i) {
+    const Eigen::Matrix3d squared = m * m;
+    const double trace = squared.trace();
+    m = squared / trace;
+    if (trace > 1.0 - 1e-15) break;
+  }
+  Eigen::Index column = 0;
+  m.diagonal().maxCoeff(&column);
+  return m.col(column).normalized();
+}
+
+}  // namespace
+
+void add(const EffectResponse& part, double factor, EffectResponse& sum) {
+  sum.shift_m += factor * part.shift_m;
+  sum.turn_rad += factor * part.turn_rad;
+  sum.field_per_m3 += factor * part.field_per_m3;
+}
+
+Pose displaced(const Pose& stated, const EffectResponse& response) {
+  Pose actual = stated;
+  actual.position_m += response.shift_m;
+  if (response.turn_rad.squaredNorm() > 0.0) {
+    actual.orientation = (rotationFromVector(response.turn_rad) * stated.orientation).normalized();
+  }
+  return actual;
+}
+
+std::optional<Pose> reportedPose(const SensorSetting& setting, const EffectResponse& response,
+                                 const Eigen::Vector3d& near_m) {
+  const Pose actual = displaced(setting.tracker_from_sensor, response);
+  const Eigen::Matrix3d field = dipoleField(actual.position_m, 1.0) + response.field_per_m3;
+  const auto solution = solvePose(couplings(field, actual.orientation), 1.0, near_m);
+  if (!solution) return std::nullopt;
+  return solution->tracker_from_sensor;
+}
+
+Eigen::Matrix<double, 6, 9> poseByField(const Eigen::Vector3d& p_m) {
+  const Eigen::Matrix3d G = dipoleField(p_m, 1.0);
+  Eigen::Matrix<double, 9, 6> B;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
+    const Eigen::Matrix3d slope = dipoleFieldSlope(p_m, 1.0, axis);
+    Eigen::Matrix3d turned;
+    for (int column = 0; column < 3; ++column) turned.col(column) = -e.cross(Eigen::Vector3d(G.col(column)));
+    B.col(axis) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(slope.data());
+    B.col(3 + axis) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(turned.data());
+  }
+  const Eigen::Matrix<double, 6, 6> normal = B.transpose() * B;
+  return normal.ldlt().solve(B.transpose());
+}
+
+Eigen::Vector3d solvedPosition_m(const Eigen::Matrix3d& field, const Eigen::Vector3d& near_m) {
+  const Eigen::Matrix3d squared = field.transpose() * field;
+  if (!(squared.trace() > 0.0) || !squared.allFinite()) return near_m;
+  const Eigen::Vector3d u = dominantDirection(squared);
+  const double d1 = std::sqrt(u.dot(squared * u));
+  // (d2 + s d3)^2 = d2^2 + d3^2 + 2 s d2 d3, and s d1 d2 d3 is the determinant.
+  const double rest = squared.trace() - d1 * d1 + 2.0 * field.determinant() / d1;
+  const double k = (2.0 * d1 + std::sqrt(std::max(0.0, rest))) / 6.0;
+  const Eigen::Vector3d p_m = u / std::cbrt(k);
+  return p_m.dot(near_m) < 0.0 ? Eigen::Vector3d(-p_m) : p_m;
+}
+
+PositionDerivative solvedPositionDerivative(const Eigen::Matrix3d& field, const Eigen::Vector3d& near_m) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(field, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d d = svd.singularValues();
+  const Eigen::Matrix3d& P = svd.matrixU();
+  const Eigen::Matrix3d& Q = svd.matrixV();
+  const double s = field.determinant() < 0.0 ? -1.0 : 1.0;
+  const double k = (2.0 * d[0] + d[1] + s * d[2]) / 6.0;
+  const double r_m = 1.0 / std::cbrt(k);
+  const Eigen::Vector3d weight(2.0 / 6.0, 1.0 / 6.0, s / 6.0);
+  PositionDerivative derivative;
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      double dk = 0.0;
+      for (int j = 0; j < 3; ++j) dk += weight[j] * P(a, j) * Q(b, j);
+      Eigen::Vector3d du = Eigen::Vector3d::Zero();
+      for (int j = 1; j < 3; ++j) {
+        const double along = d[0] * P(a, 0) * Q(b, j) + d[j] * P(a, j) * Q(b, 0);
+        du += along / (d[0] * d[0] - d[j] * d[j]) * Q.col(j);
+      }
+      derivative.col(3 * b + a) = r_m * (du - dk / (3.0 * k) * Q.col(0));
+    }
+  }
+  return Q.col(0).dot(near_m) < 0.0 ? PositionDerivative(-derivative) : derivative;
+}
+
+}  // namespace fieldtrue::field

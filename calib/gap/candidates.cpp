@@ -1,0 +1,334 @@
+#include "calib/gap/candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "calib/identify/profile.h"
+
+namespace fieldtrue::gap {
+namespace {
+
+/// BIC differences are over-confident where the catalogue is not the world; found on sessions made by other physics.
+constexpr double kTemperature = 2.5;
+/// Effects whose fitted signals correlate beyond this and whose evidence is closer than that are not told apart.
+constexpr double kSameSignal = 0.9;
+constexpr double kSameEvidence = 10.0;
+constexpr double kNinety = 1.645;
+/// Real things are no point dipoles, round loops or endless planes: a place is not known better than to a share of the
+/// size of what stands there, or of a plane's distance, however many nodes say so. Shares and factor found on bodies
+/// made by other physics.
+constexpr double kShareOfSize = 0.12;
+constexpr double kShareOfDistance = 0.03;
+constexpr double kWiderOfPlaced = 1.4;
+
+/// SD of a place that stands for the physics the catalogue leaves out [m].
+double unmodelledPlaceSd_m(const effects::FittedEffect& fitted) {
+  double sd_m = 0.0;
+  for (const effects::FittedParameter& p : fitted.values) {
+    if (p.name == "size_m") sd_m = std::max(sd_m, kShareOfSize * p.value);
+    if (p.name == "radius_m") sd_m = std::max(sd_m, 2.0 * kShareOfSize * p.value / std::numbers::sqrt2);
+    if (p.name == "distance_m") sd_m = std::max(sd_m, kShareOfDistance * p.value);
+  }
+  return std::min(sd_m, 0.3);
+}
+
+/// No interval of a searched parameter reaches beyond where it may be searched.
+void keepWithinSearch(const effects::EffectFit& fit, GapCandidate& candidate) {
+  for (const effects::FitParameter& bound : fit.searched()) {
+    for (Estimate& estimate : candidate.parameters) {
+      if (estimate.name != bound.name || !estimate.low90 || !estimate.high90) continue;
+      estimate.low90 = std::max(*estimate.low90, bound.low);
+      estimate.high90 = std::min(*estimate.high90, bound.high);
+    }
+  }
+}
+
+/// Widens the intervals of a thing in the room for the physics that its model leaves out.
+void widenPlaced(const effects::FittedEffect& fitted, GapCandidate& candidate) {
+  if (!fitted.location_m) return;
+  const double place_sd_m = unmodelledPlaceSd_m(fitted);
+  for (Estimate& estimate : candidate.parameters) {
+    if (!estimate.low90 || !estimate.high90) continue;
+    const bool is_center = estimate.name.rfind("center_", 0) == 0;
+    const double more = is_center ? kNinety * place_sd_m : 0.0;
+    estimate.low90 = estimate.value - std::hypot(kWiderOfPlaced * (estimate.value - *estimate.low90), more);
+    estimate.high90 = estimate.value + std::hypot(kWiderOfPlaced * (*estimate.high90 - estimate.value), more);
+  }
+  if (!candidate.location_covariance_m2) return;
+  *candidate.location_covariance_m2 = kWiderOfPlaced * kWiderOfPlaced * *candidate.location_covariance_m2 +
+                                      place_sd_m * place_sd_m * Eigen::Matrix3d::Identity();
+}
+
+/// Parameters of one term within the covariance of a refined model.
+struct TermPlace {
+  Eigen::Index begin = 0;
+  Eigen::Index linear = 0;
+  Eigen::Index searched = 0;
+};
+
+TermPlace placeOf(const identify::RefinedModel& refined, std::size_t term) {
+  TermPlace place;
+  place.begin = refined.n_alignment;
+  for (std::size_t t = 0; t <= term; ++t) {
+    place.linear = refined.model.terms[t].linear.size();
+    place.searched = refined.model.terms[t].searched.size();
+    if (t < term) place.begin += place.linear + place.searched;
+  }
+  return place;
+}
+
+/// Reported values and location as functions of the fitted parameters, linearised.
+struct Sensitivity {
+  Eigen::MatrixXd values;    ///< Reported value by parameter.
+  Eigen::MatrixXd location;  ///< 3 by parameter.
+};
+
+Sensitivity sensitivityOf(const identify::GapTerm& term, const effects::FittedEffect& fitted) {
+  const Eigen::Index linear = term.linear.size();
+  const Eigen::Index count = linear + term.searched.size();
+  Sensitivity sensitivity;
+  sensitivity.values = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(fitted.values.size()), count);
+  sensitivity.location = Eigen::MatrixXd::Zero(3, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    Eigen::VectorXd x = term.linear;
+    Eigen::VectorXd searched = term.searched;
+    double& moved = j < linear ? x[j] : searched[j - linear];
+    const double h = 1e-4 * std::max(1e-3, std::abs(moved));
+    moved += h;
+    const effects::FittedEffect shifted = term.fit->describe(searched, x);
+    if (shifted.values.size() != fitted.values.size()) continue;
+    for (std::size_t v = 0; v < fitted.values.size(); ++v)
+      sensitivity.values(static_cast<Eigen::Index>(v), j) = (shifted.values[v].value - fitted.values[v].value) / h;
+    if (fitted.location_m && shifted.location_m)
+      sensitivity.location.col(j) = (*shifted.location_m - *fitted.location_m) / h;
+  }
+  return sensitivity;
+}
+
+effects::FittedEffect fittedOf(const identify::GapTerm& term) { return term.fit->describe(term.searched, term.linear); }
+
+/// What a fitted term says, with intervals where its model was refined.
+void describeTerm(const identify::RefinedModel& refined, std::size_t term, GapCandidate& candidate) {
+  const identify::GapTerm& fitted_term = refined.model.terms[term];
+  const effects::FittedEffect fitted = fittedOf(fitted_term);
+  candidate.effect = fitted_term.effect->id;
+  candidate.location_m = fitted.location_m;
+  candidate.material = fitted.material;
+  candidate.is_plausible = fitted.is_plausible;
+  candidate.doubt = fitted.doubt;
+  candidate.scene_parameters = fitted.parameters;
+  for (const effects::FittedParameter& p : fitted.values)
+    candidate.parameters.push_back({p.name, p.unit, p.value, {}, {}});
+  if (refined.covariance.size() == 0) return;
+  const TermPlace place = placeOf(refined, term);
+  const Eigen::Index count = place.linear + place.searched;
+  const Eigen::MatrixXd covariance = refined.covariance.block(place.begin, place.begin, count, count);
+  const Sensitivity sensitivity = sensitivityOf(fitted_term, fitted);
+  for (std::size_t v = 0; v < candidate.parameters.size(); ++v) {
+    const Eigen::RowVectorXd row = sensitivity.values.row(static_cast<Eigen::Index>(v));
+    const double variance = (row * covariance * row.transpose()).value();
+    if (!(variance >= 0.0) || !std::isfinite(variance)) continue;
+    const double half = kNinety * std::sqrt(variance);
+    candidate.parameters[v].low90 = candidate.parameters[v].value - half;
+    candidate.parameters[v].high90 = candidate.parameters[v].value + half;
+  }
+  if (fitted.location_m)
+    candidate.location_covariance_m2 = sensitivity.location * covariance * sensitivity.location.transpose();
+}
+
+/// Replaces the interval of each searched parameter by where the profile likelihood falls by 2.706 / 2.
+void profileSearched(const identify::GapSearch& search, const identify::RefinedModel& refined, std::size_t term,
+                     GapCandidate& candidate) {
+  const TermPlace place = placeOf(refined, term);
+  const std::vector<effects::FitParameter> names = refined.model.terms[term].fit->searched();
+  for (Eigen::Index d = 0; d < place.searched; ++d) {
+    const std::string& name = names[static_cast<std::size_t>(d)].name;
+    const auto is_it = [&](const Estimate& e) { return e.name == name; };
+    const auto found = std::find_if(candidate.parameters.begin(), candidate.parameters.end(), is_it);
+    if (found == candidate.parameters.end()) continue;
+    const identify::ProfileInterval interval = identify::profileInterval(search, refined, term, d);
+    if (interval.low) found->low90 = *interval.low;
+    if (interval.high) found->high90 = *interval.high;
+  }
+}
+
+/// What an effect does to the whitened residuals of the model without it.
+Eigen::VectorXd signalOf(const identify::GapSearch& search, const std::vector<identify::Vector6d>& without,
+                         const identify::GapModel& with) {
+  const std::vector<identify::Vector6d> left = identify::whitenedResiduals(search.physics(), with, search.whitening());
+  Eigen::VectorXd signal(static_cast<Eigen::Index>(6 * left.size()));
+  for (std::size_t i = 0; i < left.size(); ++i)
+    signal.segment<6>(static_cast<Eigen::Index>(6 * i)) = without[i] - left[i];
+  return signal;
+}
+
+double correlation2(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const double norms = a.squaredNorm() * b.squaredNorm();
+  return norms > 0.0 ? a.dot(b) * a.dot(b) / norms : 0.0;
+}
+
+void findEquivalents(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                     std::vector<GapCandidate>& candidates) {
+  const std::vector<identify::TriedEffect>& tried = selection.alternatives;
+  identify::GapModel rest = selection.model.model;
+  if (!rest.terms.empty()) rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+  const std::vector<identify::Vector6d> without =
+      identify::whitenedResiduals(search.physics(), search.refined(rest).model, search.whitening());
+  std::vector<Eigen::VectorXd> signals;
+  for (const identify::TriedEffect& one : tried) {
+    const bool is_refined = !one.refined.model.terms.empty();
+    signals.push_back(is_refined ? signalOf(search, without, one.model) : Eigen::VectorXd());
+  }
+  for (std::size_t a = 0; a < tried.size(); ++a) {
+    candidates[a].equivalents = {candidates[a].effect};
+    for (std::size_t b = 0; b < tried.size(); ++b) {
+      if (a == b || signals[a].size() == 0 || signals[b].size() == 0) continue;
+      if (std::abs(tried[a].bic_gain - tried[b].bic_gain) > kSameEvidence) continue;
+      if (correlation2(signals[a], signals[b]) > kSameSignal) candidates[a].equivalents.push_back(candidates[b].effect);
+    }
+  }
+}
+
+/// What does not help on places it was not fitted to counts for less; where nothing was worth selecting, nothing is
+/// likelier than none.
+double evidenceOf(const GapCandidate& c, bool is_any_selected) {
+  constexpr double kCostOfFailing = 10.0;
+  constexpr double kCostOfUnselected = 12.0;
+  if (c.effect == "none") return 0.0;
+  const double evidence = c.bic_gain - (c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
+  return is_any_selected ? evidence : std::min(evidence, 0.0) - kCostOfUnselected;
+}
+
+/// Two names of one thing, as a wrong scale of the rig and of the tracker: the first carries the probability of both.
+void joinExactTwins(std::vector<GapCandidate>& candidates) {
+  constexpr double kSame = 0.5;  // BIC.
+  for (std::size_t a = 0; a < candidates.size(); ++a) {
+    for (std::size_t b = a + 1; b < candidates.size(); ++b) {
+      const auto& names = candidates[a].equivalents;
+      const bool is_twin = std::find(names.begin(), names.end(), candidates[b].effect) != names.end() &&
+                           std::abs(candidates[a].bic_gain - candidates[b].bic_gain) < kSame;
+      if (!is_twin) continue;
+      candidates[a].probability += candidates[b].probability;
+      candidates[b].probability = 0.0;
+    }
+  }
+}
+
+void setProbabilities(std::vector<GapCandidate>& candidates, bool is_any_selected) {
+  double most = 0.0;
+  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_selected));
+  double sum = 0.0;
+  for (GapCandidate& c : candidates) {
+    c.probability = std::exp(0.5 * (evidenceOf(c, is_any_selected) - most) / kTemperature);
+    sum += c.probability;
+  }
+  for (GapCandidate& c : candidates) c.probability /= sum;
+  joinExactTwins(candidates);
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const GapCandidate& a, const GapCandidate& b) { return a.probability > b.probability; });
+}
+
+/// From mean squares before and after, whitened.
+Shrinkage shrinkageOf(double before, double after, double low_after, double high_after, double mm_per_unit) {
+  Shrinkage shrinkage;
+  shrinkage.before_mm = mm_per_unit * std::sqrt(std::max(0.0, before));
+  shrinkage.after_mm = mm_per_unit * std::sqrt(std::max(0.0, after));
+  const auto fraction = [&](double left) { return before > 0.0 ? 1.0 - std::sqrt(std::max(0.0, left) / before) : 0.0; };
+  shrinkage.fraction = fraction(after);
+  shrinkage.low90 = fraction(high_after);
+  shrinkage.high90 = fraction(low_after);
+  return shrinkage;
+}
+
+double sumOfSquares(std::span<const identify::Vector6d> residuals) {
+  double sum = 0.0;
+  for (const identify::Vector6d& residual : residuals) sum += residual.squaredNorm();
+  return sum;
+}
+
+/// What an effect that was not selected would take away: by its exact fit, less what that many parameters take from
+/// noise; nothing where the places it did not see say so.
+Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::TriedEffect& tried,
+                           const HeldOutGap& held_out, double none, double count, double mm_per_unit) {
+  double fall = tried.held_out_gain;
+  if (tried.held_out_gain > 0.0 && !tried.refined.model.terms.empty()) {
+    double parameters = 0.0;
+    for (const identify::GapTerm& term : tried.model.terms)
+      parameters += static_cast<double>(term.linear.size() + term.searched.size());
+    const double left = sumOfSquares(identify::whitenedResiduals(search.physics(), tried.model, search.whitening()));
+    fall = std::max(fall, none - left - parameters);
+  }
+  const double after = held_out.before - fall / count;
+  Shrinkage shrinkage = shrinkageOf(held_out.before, after, after, after, mm_per_unit);
+  shrinkage.low90.reset();
+  shrinkage.high90.reset();
+  return shrinkage;
+}
+
+}  // namespace
+
+std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search,
+                                             const identify::EffectSelection& selection, const HeldOutGap& held_out,
+                                             double mm_per_unit) {
+  const identify::GapRows& rows = search.physics().rows();
+  const double count = static_cast<double>(rows.rows.size()) * rows.channels();
+  const double none =
+      sumOfSquares(identify::whitenedResiduals(search.physics(), search.none().model, search.whitening()));
+  std::vector<GapCandidate> candidates;
+  for (const identify::TriedEffect& tried : selection.alternatives) {
+    GapCandidate candidate;
+    const bool is_refined = !tried.refined.model.terms.empty();
+    identify::RefinedModel model = is_refined ? tried.refined : identify::RefinedModel{tried.model, {}, 0, 0.0};
+    describeTerm(model, model.model.terms.size() - 1, candidate);
+    widenPlaced(fittedOf(model.model.terms.back()), candidate);
+    keepWithinSearch(*model.model.terms.back().fit, candidate);
+    candidate.bic_gain = tried.bic_gain;
+    candidate.shrinkage = shrinkageOfTried(search, tried, held_out, none, count, mm_per_unit);
+    candidates.push_back(std::move(candidate));
+  }
+  findEquivalents(search, selection, candidates);
+  if (selection.ways.size() == 1 && held_out.after.size() == 1) {
+    for (GapCandidate& c : candidates)
+      if (c.effect == search.ways()[selection.ways.front()].effect->id)
+        c.shrinkage = shrinkageOf(held_out.before, held_out.after[0], held_out.after_low90[0], held_out.after_high90[0],
+                                  mm_per_unit);
+  }
+  GapCandidate nothing;
+  nothing.effect = "none";
+  nothing.equivalents = {"none"};
+  nothing.shrinkage = shrinkageOf(held_out.before, held_out.before, held_out.before, held_out.before, mm_per_unit);
+  candidates.push_back(std::move(nothing));
+  setProbabilities(candidates, !selection.ways.empty());
+  return candidates;
+}
+
+std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search,
+                                             const identify::EffectSelection& selection, const HeldOutGap& held_out,
+                                             const std::vector<GapCandidate>& candidates, double mm_per_unit) {
+  const std::vector<double> credit = creditShares(search, selection);
+  std::vector<SelectedEffect> selected;
+  for (std::size_t t = 0; t < selection.ways.size(); ++t) {
+    SelectedEffect effect;
+    describeTerm(selection.model, t, effect);
+    profileSearched(search, selection.model, t, effect);
+    widenPlaced(fittedOf(selection.model.model.terms[t]), effect);
+    keepWithinSearch(*selection.model.model.terms[t].fit, effect);
+    effect.credit_fraction = credit[t];
+    effect.equivalents = {effect.effect};
+    effect.probability = 1.0;
+    for (const GapCandidate& c : candidates) {
+      if (c.effect != effect.effect) continue;
+      effect.equivalents = c.equivalents;
+      effect.probability = c.probability;
+      effect.bic_gain = c.bic_gain;
+    }
+    const double before = t == 0 ? held_out.before : held_out.after[t - 1];
+    effect.shrinkage =
+        shrinkageOf(before, held_out.after[t], held_out.after_low90[t], held_out.after_high90[t], mm_per_unit);
+    selected.push_back(std::move(effect));
+  }
+  return selected;
+}
+
+}  // namespace fieldtrue::gap

@@ -1,0 +1,228 @@
+#include "calib/gap/json.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "calib/core/file_io.h"
+#include "calib/recording/finding.h"
+
+namespace fieldtrue::gap {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr double kMmPerM = 1000.0;
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+json numberToJson(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json numberToJson(const std::optional<double>& value) { return value ? numberToJson(*value) : json(nullptr); }
+
+json vectorToJson(const Eigen::Vector3d& v, double factor = 1.0) {
+  return {numberToJson(factor * v.x()), numberToJson(factor * v.y()), numberToJson(factor * v.z())};
+}
+
+json matrixToJson(const Eigen::Matrix3d& matrix) {
+  json rows = json::array();
+  for (int row = 0; row < 3; ++row) rows.push_back(vectorToJson(matrix.row(row).transpose()));
+  return rows;
+}
+
+json poseToJson(const Pose& pose) {
+  const Eigen::Quaterniond q = canonical(pose.orientation);
+  return {{"t_m", vectorToJson(pose.position_m)}, {"q_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
+}
+
+template <class Items, class ToJson>
+json listToJson(const Items& items, ToJson to_json) {
+  json list = json::array();
+  for (const auto& item : items) list.push_back(to_json(item));
+  return list;
+}
+
+json inputToJson(const GapReport::Input& input) {
+  return {{"places", input.places},
+          {"rows", input.rows},
+          {"samples", input.samples},
+          {"orientations", input.orientations},
+          {"position_only", input.position_only}};
+}
+
+json gapToJson(const GapReport& report) {
+  return {{"position_rms_mm", numberToJson(report.position_rms_mm)},
+          {"orientation_rms_deg", numberToJson(report.orientation_rms_deg)},
+          {"floor_position_mm", numberToJson(report.floor_position_mm)},
+          {"floor_orientation_deg", numberToJson(report.floor_orientation_deg)},
+          {"ratio_to_floor", numberToJson(report.ratio_to_floor)},
+          {"p_value", numberToJson(report.p_value)}};
+}
+
+json nodeToJson(const GapNode& node, bool position_only) {
+  json to = {{"node", node.node},
+             {"visit", node.visit},
+             {"gap_mm", numberToJson(kMmPerM * node.before_m.norm())},
+             {"gap_deg", nullptr},
+             {"excess", numberToJson(node.excess)},
+             {"flagged", node.is_flagged},
+             {"place_m", vectorToJson(node.place_m)},
+             {"before_mm", vectorToJson(node.before_m, kMmPerM)},
+             {"after_mm", vectorToJson(node.after_m, kMmPerM)},
+             {"before_deg", nullptr},
+             {"after_deg", nullptr}};
+  if (position_only) return to;
+  to["gap_deg"] = numberToJson(kDegPerRad * node.before_rad.norm());
+  to["before_deg"] = vectorToJson(node.before_rad, kDegPerRad);
+  to["after_deg"] = vectorToJson(node.after_rad, kDegPerRad);
+  return to;
+}
+
+json binToJson(const GapBin& bin, const char* low_key, const char* high_key) {
+  json to = {
+      {low_key, numberToJson(bin.low)}, {"rms_mm", numberToJson(bin.rms_mm)}, {"floor_mm", numberToJson(bin.floor_mm)}};
+  if (high_key != nullptr) to[high_key] = numberToJson(bin.high);
+  return to;
+}
+
+json binsToJson(const std::vector<GapBin>& bins, const char* low_key, const char* high_key) {
+  return listToJson(bins, [&](const GapBin& bin) { return binToJson(bin, low_key, high_key); });
+}
+
+json channelToJson(const GapChannel& channel) {
+  return {{"name", channel.name},
+          {"rms", numberToJson(channel.rms)},
+          {"unit", channel.unit},
+          {"floor", numberToJson(channel.floor)}};
+}
+
+json whereToJson(const GapReport& report) {
+  json to = {{"nodes", listToJson(report.nodes,
+                                  [&](const GapNode& node) { return nodeToJson(node, report.input.position_only); })},
+             {"hotspot", nullptr},
+             {"channels", listToJson(report.channels, channelToJson)},
+             {"by_range", binsToJson(report.by_range, "low_m", "high_m")},
+             {"by_layer", binsToJson(report.by_layer, "layer", nullptr)},
+             {"by_time", binsToJson(report.by_time, "t_start_s", "t_end_s")},
+             {"origin",
+              {{"room", numberToJson(report.origin.room)},
+               {"transmitter", numberToJson(report.origin.transmitter)},
+               {"sensor", numberToJson(report.origin.sensor)},
+               {"jig_or_time", numberToJson(report.origin.jig_or_time)}}}};
+  if (report.hotspot) {
+    to["hotspot"] = {{"center_m", vectorToJson(report.hotspot->center_m)},
+                     {"radius_m", numberToJson(report.hotspot->radius_m)}};
+  }
+  return to;
+}
+
+json shrinkageToJson(const Shrinkage& shrinkage) {
+  return {{"before_mm", numberToJson(shrinkage.before_mm)},
+          {"after_mm", numberToJson(shrinkage.after_mm)},
+          {"fraction", numberToJson(shrinkage.fraction)},
+          {"low90", numberToJson(shrinkage.low90)},
+          {"high90", numberToJson(shrinkage.high90)}};
+}
+
+/// @param order the names as they are to be shown: a JSON object keeps none
+json parametersToJson(const std::vector<Estimate>& parameters, json& order) {
+  json to = json::object();
+  order = json::array();
+  for (const Estimate& parameter : parameters) {
+    to[parameter.name] = {{"value", numberToJson(parameter.value)},
+                          {"unit", parameter.unit},
+                          {"low90", numberToJson(parameter.low90)},
+                          {"high90", numberToJson(parameter.high90)}};
+    order.push_back(parameter.name);
+  }
+  return to;
+}
+
+json candidateToJson(const GapCandidate& candidate) {
+  json to = {{"effect", candidate.effect},
+             {"class", candidate.equivalents},
+             {"probability", numberToJson(candidate.probability)},
+             {"bic_gain", numberToJson(candidate.bic_gain)},
+             {"location_m", candidate.location_m ? vectorToJson(*candidate.location_m) : json(nullptr)},
+             {"location_covariance_m2",
+              candidate.location_covariance_m2 ? matrixToJson(*candidate.location_covariance_m2) : json(nullptr)},
+             {"material", candidate.material ? json(*candidate.material) : json(nullptr)},
+             {"shrinkage", shrinkageToJson(candidate.shrinkage)},
+             {"plausible", candidate.is_plausible},
+             {"doubt", candidate.doubt},
+             {"scene_parameters", candidate.scene_parameters}};
+  to["parameters"] = parametersToJson(candidate.parameters, to["parameter_order"]);
+  return to;
+}
+
+json selectedToJson(const SelectedEffect& selected) {
+  json to = candidateToJson(selected);
+  to["credit_fraction"] = numberToJson(selected.credit_fraction);
+  return to;
+}
+
+json stepToJson(const GapStep& step) {
+  return {{"effect", step.effect},
+          {"excess_mm", numberToJson(step.excess_mm)},
+          {"low90_mm", numberToJson(step.low90_mm)},
+          {"high90_mm", numberToJson(step.high90_mm)}};
+}
+
+json predictionToJson(const Prediction& prediction) {
+  return {{"effect", prediction.effect},
+          {"node", prediction.node},
+          {"now_mm", numberToJson(prediction.now_mm)},
+          {"then_mm", numberToJson(prediction.then_mm)},
+          {"then_sd_mm", numberToJson(prediction.then_sd_mm)}};
+}
+
+json detectableToJson(const SmallestDetectable& smallest) {
+  return {{"effect", smallest.effect},
+          {"parameter", smallest.parameter},
+          {"value", numberToJson(smallest.value)},
+          {"unit", smallest.unit}};
+}
+
+json findingToJson(const recording::GapFinding& finding) {
+  return {{"effect", finding.effect}, {"text", finding.text}, {"nodes", finding.nodes}};
+}
+
+}  // namespace
+
+json toJson(const Isolability& isolability) {
+  return {{"pairs", listToJson(isolability.pairs,
+                               [](const IsolabilityPair& pair) -> json {
+                                 return {{"a", pair.a}, {"b", pair.b}, {"r2", numberToJson(pair.r2)}};
+                               })},
+          {"warnings", isolability.warnings}};
+}
+
+json toJson(const GapReport& report) {
+  return {{"schema", "fieldtrue.gap/1"},
+          {"software", std::string("Fieldtrue ") + FIELDTRUE_VERSION},
+          {"input", inputToJson(report.input)},
+          {"alignment",
+           {{"tracker_from_reference", poseToJson(report.tracker_from_reference)},
+            {"sensor_mount", poseToJson(report.sensor_from_mount)}}},
+          {"verdict", std::string(idOf(report.verdict))},
+          {"text", report.text},
+          {"smallest_detectable", listToJson(report.smallest_detectable, detectableToJson)},
+          {"gap", gapToJson(report)},
+          {"where", whereToJson(report)},
+          {"findings", listToJson(report.findings, findingToJson)},
+          {"candidates", listToJson(report.candidates, candidateToJson)},
+          {"selected", listToJson(report.selected, selectedToJson)},
+          {"sequence", listToJson(report.sequence, stepToJson)},
+          {"remaining",
+           {{"position_rms_mm", numberToJson(report.remaining_position_rms_mm)},
+            {"fraction_of_start", numberToJson(report.remaining_fraction)},
+            {"where", report.remaining_where}}},
+          {"isolability", toJson(report.isolability)},
+          {"next_measurement", {{"text", report.next_measurement}, {"separates", report.next_separates}}},
+          {"predictions", listToJson(report.predictions, predictionToJson)}};
+}
+
+Result<void> writeGapReport(const std::filesystem::path& path, const GapReport& report) {
+  return writeFileAtomically(path, [&](std::ostream& out) { out << toJson(report).dump(1) << '\n'; });
+}
+
+}  // namespace fieldtrue::gap

@@ -1,0 +1,238 @@
+#include "calib/gap/next_measurement.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "calib/core/file_io.h"
+#include "calib/effects/registry.h"
+
+namespace fieldtrue::gap {
+namespace {
+
+/// A set of additional measurements that an operator could make.
+struct Proposal {
+  std::string text;
+  std::vector<identify::GapRow> rows;
+};
+
+std::string rounded(double value, int digits) {
+  const double scale = std::pow(10.0, digits);
+  return formatNumber(std::round(value * scale) / scale);
+}
+
+/// Up to `count` rows spread evenly over the table.
+std::vector<identify::GapRow> spreadRows(const identify::GapRows& table, std::size_t count) {
+  std::vector<identify::GapRow> rows;
+  for (std::size_t i = 0; i < count; ++i) rows.push_back(table.rows[(2 * i + 1) * table.rows.size() / (2 * count)]);
+  return rows;
+}
+
+std::vector<int> nodesOf(const std::vector<identify::GapRow>& rows) {
+  std::vector<int> nodes;
+  for (const identify::GapRow& row : rows) nodes.push_back(row.node);
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
+std::vector<Proposal> turnedProposals(const identify::GapRows& table, const PlaceNames& names) {
+  std::vector<Proposal> proposals;
+  const char* const kAxes[] = {"x", "y", "z"};
+  for (int axis = 0; axis < 3 && table.has_orientation; ++axis) {
+    Proposal proposal;
+    proposal.rows = spreadRows(table, 6);
+    const auto turn =
+        Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d(Eigen::Vector3d::Unit(axis))));
+    for (identify::GapRow& row : proposal.rows)
+      row.reference_from_sensor.orientation = turn * row.reference_from_sensor.orientation;
+    proposal.text = std::string("turn the sensor by 90 degrees about the rig's ") + kAxes[axis] + " axis and measure " +
+                    names.list(nodesOf(proposal.rows)) + " again";
+    proposals.push_back(std::move(proposal));
+  }
+  return proposals;
+}
+
+std::vector<Proposal> outerProposals(const identify::GapRows& table, double pitch_m, const PlaceNames& names) {
+  std::vector<Proposal> proposals;
+  const char* const kSides[] = {"-x", "+x", "-y", "+y", "-z", "+z"};
+  for (int side = 0; side < 6; ++side) {
+    const int axis = side / 2;
+    const double sign = side % 2 == 0 ? -1.0 : 1.0;
+    std::vector<std::size_t> order(table.rows.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return sign * table.rows[a].reference_from_sensor.position_m[axis] >
+             sign * table.rows[b].reference_from_sensor.position_m[axis];
+    });
+    const double face_m = table.rows[order.front()].reference_from_sensor.position_m[axis];
+    std::vector<std::size_t> face;
+    for (const std::size_t i : order)
+      if (std::abs(table.rows[i].reference_from_sensor.position_m[axis] - face_m) < 0.3 * pitch_m) face.push_back(i);
+    Proposal proposal;
+    const std::size_t count = std::min<std::size_t>(6, face.size());
+    for (std::size_t k = 0; k < count; ++k) {
+      identify::GapRow row = table.rows[face[(2 * k + 1) * face.size() / (2 * count)]];
+      row.reference_from_sensor.position_m[axis] += sign * pitch_m;
+      proposal.rows.push_back(row);
+    }
+    proposal.text = "measure " + std::to_string(count) + " more places one step (" + rounded(pitch_m, 2) +
+                    " m) beyond " + names.list(nodesOf(proposal.rows)) + ", towards " + kSides[side];
+    proposals.push_back(std::move(proposal));
+  }
+  return proposals;
+}
+
+std::vector<Proposal> laterProposals(const identify::GapRows& table, const effects::FitDesign& design,
+                                     const PlaceNames& names) {
+  if (!table.has_times) return {};
+  Proposal proposal;
+  std::vector<identify::GapRow> first = table.rows;
+  std::stable_sort(first.begin(), first.end(),
+                   [](const identify::GapRow& a, const identify::GapRow& b) { return a.time_s < b.time_s; });
+  first.resize(std::min<std::size_t>(6, first.size()));
+  proposal.rows = first;
+  for (identify::GapRow& row : proposal.rows) row.time_s = design.end_s + 60.0;
+  proposal.text = "measure the first places again, now at the end: " + names.list(nodesOf(proposal.rows));
+  return {proposal};
+}
+
+/// Mean squared difference of two models' predictions at proposed rows, in noise variances.
+double separation(const identify::GapSearch& search, const Proposal& proposal, const identify::GapModel& a,
+                  const identify::GapModel& b) {
+  identify::GapRows rows = search.physics().rows();
+  rows.rows = proposal.rows;
+  const identify::GapPhysics physics(rows, {});
+  const std::vector<Pose> pa = physics.predictions(a);
+  const std::vector<Pose> pb = physics.predictions(b);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < pa.size(); ++i) {
+    const identify::Matrix6d noise = identify::noiseOf(rows.rows[i], search.placingSd_m(), search.placingSd_rad());
+    const Eigen::Vector3d d_m = pa[i].position_m - pb[i].position_m;
+    sum += std::min(1e4, d_m.dot(noise.topLeftCorner<3, 3>().inverse() * d_m));
+    if (rows.has_orientation)
+      sum += std::min(1e4, std::pow(angleBetween_rad(pa[i].orientation, pb[i].orientation), 2) / noise(3, 3));
+  }
+  return sum / static_cast<double>(pa.size());
+}
+
+const identify::TriedEffect* triedOf(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                                     const std::string& effect) {
+  for (const identify::TriedEffect& tried : selection.alternatives)
+    if (search.ways()[tried.way].effect->id == effect && !tried.refined.model.terms.empty()) return &tried;
+  return nullptr;
+}
+
+/// The two effects that the evidence separates least, when it is not enough.
+bool proposeSeparation(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                       GapReport& report) {
+  if (report.candidates.size() < 2) return false;
+  const GapCandidate& first = report.candidates[0];
+  const GapCandidate& second = report.candidates[1];
+  if (first.effect == "none" || second.effect == "none" || second.probability < 0.05) return false;
+  const identify::TriedEffect* a = triedOf(search, selection, first.effect);
+  const identify::TriedEffect* b = triedOf(search, selection, second.effect);
+  if (a == nullptr || b == nullptr) return false;
+  std::vector<Proposal> proposals = turnedProposals(search.physics().rows(), report.names);
+  for (auto* more : {&proposals}) {
+    for (Proposal& p : outerProposals(search.physics().rows(), search.design().pitch_m, report.names))
+      more->push_back(std::move(p));
+    for (Proposal& p : laterProposals(search.physics().rows(), search.design(), report.names))
+      more->push_back(std::move(p));
+  }
+  const Proposal* best = nullptr;
+  double most = 0.0;
+  for (const Proposal& proposal : proposals) {
+    const double value = separation(search, proposal, a->model, b->model);
+    if (value > most) {
+      most = value;
+      best = &proposal;
+    }
+  }
+  if (best == nullptr || most < 0.05) {
+    report.next_measurement = "No extra place or turn of the sensor would tell " + effects::labelOf(first.effect) +
+                              " from " + effects::labelOf(second.effect) +
+                              ": check one of them by hand, for instance a long distance with a tape measure.";
+  } else {
+    report.next_measurement = "To tell " + effects::labelOf(first.effect) + " from " + effects::labelOf(second.effect) +
+                              ", " + best->text + ".";
+  }
+  report.next_separates = {first.effect, second.effect};
+  return true;
+}
+
+/// What taking away each selected body, plane or loop would change at the worst places.
+void predictRemoval(const identify::GapSearch& search, const identify::EffectSelection& selection, GapReport& report) {
+  std::vector<std::size_t> order(report.nodes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return report.nodes[a].before_m.squaredNorm() > report.nodes[b].before_m.squaredNorm();
+  });
+  order.resize(std::min<std::size_t>(3, order.size()));
+  const std::vector<Pose> with = search.physics().predictions(selection.model.model);
+  for (std::size_t t = 0; t < selection.ways.size(); ++t) {
+    if (selection.model.model.terms[t].effect->body == nullptr) continue;
+    identify::GapModel rest = selection.model.model;
+    rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    const std::vector<Pose> without = search.physics().predictions(rest);
+    for (const std::size_t i : order) {
+      const Eigen::Vector3d effect_m = with[i].position_m - without[i].position_m;
+      const identify::Matrix6d noise =
+          identify::noiseOf(search.physics().rows().rows[i], search.placingSd_m(), search.placingSd_rad());
+      Prediction prediction;
+      prediction.effect = report.selected[t].effect;
+      prediction.node = report.nodes[i].node;
+      prediction.now_mm = 1e3 * report.nodes[i].before_m.norm();
+      prediction.then_mm = 1e3 * (report.nodes[i].before_m - effect_m).norm();
+      prediction.then_sd_mm = 1e3 * std::sqrt(noise.topLeftCorner<3, 3>().trace());
+      report.predictions.push_back(prediction);
+    }
+  }
+}
+
+std::string interventionText(const GapReport& report) {
+  const SelectedEffect& first = report.selected.front();
+  std::string text = "Move or remove what acts as " + effects::labelOf(first.effect);
+  if (first.location_m) {
+    const Eigen::Vector3d& p = *first.location_m;
+    text += " near (" + rounded(p.x(), 2) + ", " + rounded(p.y(), 2) + ", " + rounded(p.z(), 2) +
+            ") m from the transmitter";
+  }
+  for (const Prediction& p : report.predictions) {
+    if (p.effect != first.effect) continue;
+    text += " and measure " + report.names.of(p.node) + " again: its gap should go from " + rounded(p.now_mm, 0) +
+            " to " + rounded(p.then_mm, 0) + " +- " + rounded(p.then_sd_mm, 0) + " mm";
+    break;
+  }
+  return text + ".";
+}
+
+}  // namespace
+
+void suggestNext(const identify::GapSearch& search, const identify::EffectSelection& selection, GapReport& report) {
+  if (!selection.ways.empty()) predictRemoval(search, selection, report);
+  if (report.verdict == GapVerdict::kNoGap) {
+    report.next_measurement =
+        search.physics().rows().several_orientations
+            ? "Nothing needs to be measured; repeat ten places on another day to see that it stays so."
+            : "Nothing needs to be measured; to look deeper, repeat ten places with the sensor turned by 90 degrees.";
+    return;
+  }
+  if (proposeSeparation(search, selection, report)) return;
+  if (!report.predictions.empty()) {
+    report.next_measurement = interventionText(report);
+  } else if (!report.selected.empty()) {
+    report.next_measurement = "Check " + effects::labelOf(report.selected.front().effect) +
+                              " at its source, put it right or add it to the simulation, and measure ten places again.";
+  } else if (report.hotspot) {
+    const Eigen::Vector3d& p = report.hotspot->center_m;
+    report.next_measurement = "Measure more closely around (" + rounded(p.x(), 2) + ", " + rounded(p.y(), 2) + ", " +
+                              rounded(p.z(), 2) + ") m from the transmitter, at half the step, and every place twice.";
+  } else {
+    report.next_measurement = "Measure ten places twice, setting the jig anew each time.";
+  }
+}
+
+}  // namespace fieldtrue::gap

@@ -1,0 +1,19 @@
+#include "calib/gap/report.h"
+
+namespace fieldtrue::gap {
+
+std::string_view idOf(GapVerdict verdict) {
+  switch (verdict) {
+    case GapVerdict::kNoGap:
+      return "no_gap";
+    case GapVerdict::kExplained:
+      return "explained";
+    case GapVerdict::kPartlyExplained:
+      return "partly_explained";
+    case GapVerdict::kUnexplained:
+      return "unexplained";
+  }
+  return {};
+}
+
+}  // namespace fieldtrue::gap

@@ -1,0 +1,169 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "calib/core/place_name.h"
+#include "calib/core/pose.h"
+#include "calib/identify/origin.h"
+#include "calib/recording/finding.h"
+
+namespace fieldtrue::gap {
+
+enum class GapVerdict { kNoGap, kExplained, kPartlyExplained, kUnexplained };
+/// "no_gap", "explained", "partly_explained", "unexplained".
+std::string_view idOf(GapVerdict verdict);
+
+/// A number with its 90 % interval; an end that cannot be estimated is unset.
+struct Estimate {
+  std::string name;  ///< With its unit.
+  std::string unit;
+  double value = 0.0;
+  std::optional<double> low90;
+  std::optional<double> high90;
+};
+
+/// How far the gap shrinks, as excess over the noise floor on places the fit did not see.
+struct Shrinkage {
+  double before_mm = 0.0;
+  double after_mm = 0.0;
+  double fraction = 0.0;  ///< 1 - after/before.
+  std::optional<double> low90;
+  std::optional<double> high90;
+};
+
+/// One cause considered: every effect that can be fitted on this table, and `none`.
+struct GapCandidate {
+  std::string effect;
+  std::vector<std::string> equivalents;  ///< Effects it cannot be told from on this grid, itself included.
+  double probability = 0.0;              ///< Over all candidates they sum to 1.
+  double bic_gain = 0.0;                 ///< Above 0: better than without.
+  std::vector<Estimate> parameters;
+  std::optional<Eigen::Vector3d> location_m;  ///< Tracker frame.
+  std::optional<Eigen::Matrix3d> location_covariance_m2;
+  std::optional<std::string> material;
+  Shrinkage shrinkage;
+  bool is_plausible = true;
+  std::string doubt;                ///< Why it is not plausible.
+  nlohmann::json scene_parameters;  ///< As a scene's effect holds them; null for `none`.
+};
+
+struct SelectedEffect : GapCandidate {
+  double credit_fraction = 0.0;  ///< Share of the shrinkage, averaged over the orders of adding (Shapley 1953).
+};
+
+/// The gap at one row of the table, after the alignment.
+struct GapNode {
+  int node = 0;
+  int visit = 0;
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();     ///< Where the rig says the sensor was, tracker frame.
+  Eigen::Vector3d before_m = Eigen::Vector3d::Zero();    ///< Tracked minus simulated by the scene as given.
+  Eigen::Vector3d after_m = Eigen::Vector3d::Zero();     ///< Tracked minus simulated with the selected effects.
+  Eigen::Vector3d before_rad = Eigen::Vector3d::Zero();  ///< Rotation from simulated to tracked, tracker frame.
+  Eigen::Vector3d after_rad = Eigen::Vector3d::Zero();
+  double excess = 0.0;  ///< In floors: 0 where the gap is no larger than noise.
+  bool is_flagged = false;
+};
+
+struct GapChannel {
+  std::string name;  ///< `x`, `y`, `z`, `radial`, `transverse`, `rotation_x`...
+  std::string unit;
+  double rms = 0.0;
+  double floor = 0.0;
+};
+
+/// RMS of the gap in a bin: of range [m], time [s], or a layer's height [m] (then both ends are the same).
+struct GapBin {
+  double low = 0.0;
+  double high = 0.0;
+  double rms_mm = 0.0;
+  double floor_mm = 0.0;
+};
+
+struct Hotspot {
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  ///< Tracker frame.
+  double radius_m = 0.0;
+};
+
+struct IsolabilityPair {
+  std::string a;
+  std::string b;
+  double r2 = 0.0;  ///< Share of the smaller imitation: how much of a's signal b can imitate, and of b's a; the less.
+};
+
+struct Isolability {
+  std::vector<IsolabilityPair> pairs;
+  std::vector<std::string> warnings;
+};
+
+/// One bar of the way from the start to the floor.
+struct GapStep {
+  std::string effect;      ///< "" for the start.
+  double excess_mm = 0.0;  ///< Held out, with this and all effects before it.
+  std::optional<double> low90_mm;
+  std::optional<double> high90_mm;
+};
+
+struct SmallestDetectable {
+  std::string effect;
+  std::string parameter;
+  double value = 0.0;
+  std::string unit;
+};
+
+/// What would happen at the worst places were an effect taken away: to be checked by doing so.
+struct Prediction {
+  std::string effect;
+  int node = 0;
+  double now_mm = 0.0;
+  double then_mm = 0.0;
+  double then_sd_mm = 0.0;
+};
+
+/// All that a diagnosis found; `*.gap.json` is this struct (design contract `fieldtrue.gap/1`).
+struct GapReport {
+  struct Input {
+    int places = 0;
+    int rows = 0;
+    int samples = 0;
+    int orientations = 1;
+    bool position_only = false;
+  } input;
+  Pose tracker_from_reference;
+  Pose sensor_from_mount;
+  GapVerdict verdict = GapVerdict::kNoGap;
+  std::string text;  ///< One sentence: what was found, how sure, what to do.
+  std::vector<SmallestDetectable> smallest_detectable;
+  double position_rms_mm = 0.0;
+  std::optional<double> orientation_rms_deg;
+  double floor_position_mm = 0.0;
+  std::optional<double> floor_orientation_deg;
+  double ratio_to_floor = 0.0;
+  double p_value = 1.0;
+  std::vector<GapNode> nodes;
+  PlaceNames names;  ///< What the places are called; not in the document.
+  std::optional<Hotspot> hotspot;
+  std::vector<GapChannel> channels;
+  std::vector<GapBin> by_range;
+  std::vector<GapBin> by_layer;
+  std::vector<GapBin> by_time;
+  identify::GapOrigin origin;
+  std::vector<recording::GapFinding> findings;
+  std::vector<GapCandidate> candidates;  ///< Best first.
+  std::vector<SelectedEffect> selected;  ///< In the order they were added.
+  std::vector<GapStep> sequence;         ///< Start, then after each selected effect.
+  double remaining_position_rms_mm = 0.0;
+  double remaining_fraction = 0.0;
+  std::vector<int> remaining_where;
+  Isolability isolability;
+  std::string next_measurement;
+  std::vector<std::string> next_separates;
+  std::vector<Prediction> predictions;
+};
+
+}  // namespace fieldtrue::gap

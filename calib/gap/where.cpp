@@ -1,0 +1,223 @@
+#include "calib/gap/where.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <numeric>
+
+#include "calib/core/statistics.h"
+
+namespace fieldtrue::gap {
+namespace {
+
+constexpr double kDegree = 180.0 / std::numbers::pi;
+
+/// Upper tail of chi-square. @source Wilson and Hilferty 1931, Proc. Nat. Acad. Sci. 17 684
+double chiSquareTail(double value, double freedom) {
+  const double a = 2.0 / (9.0 * freedom);
+  return 0.5 * std::erfc((std::cbrt(value / freedom) - (1.0 - a)) / std::sqrt(2.0 * a));
+}
+
+/// Marks the hypotheses that may be rejected with a false-discovery rate of at most `rate`.
+std::vector<char> discoveries(const std::vector<double>& p, double rate) {
+  std::vector<std::size_t> order(p.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p[a] < p[b]; });
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < order.size(); ++k)
+    if (p[order[k]] <= rate * static_cast<double>(k + 1) / static_cast<double>(p.size())) count = k + 1;
+  std::vector<char> found(p.size(), 0);
+  for (std::size_t k = 0; k < count; ++k) found[order[k]] = 1;
+  return found;
+}
+
+struct RowGap {
+  double floor_mm = 0.0;
+  double floor_deg = 0.0;
+  double range_m = 0.0;
+  double time_s = 0.0;
+};
+
+double rms(double sum, std::size_t count) { return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0; }
+
+/// RMS and floor of the rows in one bin.
+GapBin binOf(const std::vector<std::size_t>& members, const GapReport& report, const std::vector<RowGap>& rows) {
+  GapBin bin;
+  double gap = 0.0;
+  double floor = 0.0;
+  for (const std::size_t i : members) {
+    gap += report.nodes[i].before_m.squaredNorm() * 1e6;
+    floor += rows[i].floor_mm * rows[i].floor_mm;
+  }
+  bin.rms_mm = rms(gap, members.size());
+  bin.floor_mm = rms(floor, members.size());
+  return bin;
+}
+
+/// Bins with equally many rows each, by a value.
+std::vector<GapBin> equalBins(const std::function<double(std::size_t)>& value, const GapReport& report,
+                              const std::vector<RowGap>& rows) {
+  std::vector<std::size_t> order(rows.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return value(a) < value(b); });
+  const std::size_t count = std::clamp<std::size_t>(rows.size() / 12, 1, 8);
+  std::vector<GapBin> bins;
+  for (std::size_t b = 0; b < count; ++b) {
+    const std::vector<std::size_t> members(order.begin() + static_cast<std::ptrdiff_t>(b * order.size() / count),
+                                           order.begin() + static_cast<std::ptrdiff_t>((b + 1) * order.size() / count));
+    GapBin bin = binOf(members, report, rows);
+    bin.low = value(members.front());
+    bin.high = value(members.back());
+    bins.push_back(bin);
+  }
+  return bins;
+}
+
+std::vector<GapBin> layerBins(const identify::GapRows& table, const GapReport& report,
+                              const std::vector<RowGap>& rows) {
+  std::map<long, std::vector<std::size_t>> layers;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    layers[std::lround(table.rows[i].reference_from_sensor.position_m.z() / 0.02)].push_back(i);
+  std::vector<GapBin> bins;
+  if (layers.size() > 40) return bins;
+  for (const auto& [layer, members] : layers) {
+    GapBin bin = binOf(members, report, rows);
+    bin.low = bin.high = table.rows[members.front()].reference_from_sensor.position_m.z();
+    bins.push_back(bin);
+  }
+  return bins;
+}
+
+void addChannel(const std::string& name, const std::string& unit, const std::vector<double>& values,
+                const std::vector<double>& floors, GapReport& report) {
+  double sum = 0.0;
+  double floor = 0.0;
+  for (const double v : values) sum += v * v;
+  for (const double f : floors) floor += f * f;
+  report.channels.push_back({name, unit, rms(sum, values.size()), rms(floor, floors.size())});
+}
+
+void describeChannels(const identify::GapRows& table, const GapReport& at, const std::vector<identify::Matrix6d>& noise,
+                      GapReport& report) {
+  const char* const kAxes[] = {"x", "y", "z"};
+  std::vector<double> radial;
+  std::vector<double> radial_floor;
+  std::vector<double> across;
+  std::vector<double> across_floor;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    std::vector<double> floors;
+    for (std::size_t i = 0; i < noise.size(); ++i) {
+      values.push_back(1e3 * at.nodes[i].before_m[axis]);
+      floors.push_back(1e3 * std::sqrt(noise[i](axis, axis)));
+    }
+    addChannel(kAxes[axis], "mm", values, floors, report);
+  }
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    const Eigen::Vector3d u = at.nodes[i].place_m.normalized();
+    const double along = at.nodes[i].before_m.dot(u);
+    const double var = u.dot(noise[i].topLeftCorner<3, 3>() * u);
+    radial.push_back(1e3 * along);
+    radial_floor.push_back(1e3 * std::sqrt(var));
+    across.push_back(1e3 * (at.nodes[i].before_m - along * u).norm() / std::numbers::sqrt2);
+    across_floor.push_back(1e3 * std::sqrt(0.5 * (noise[i].topLeftCorner<3, 3>().trace() - var)));
+  }
+  addChannel("radial", "mm", radial, radial_floor, report);
+  addChannel("transverse", "mm", across, across_floor, report);
+  for (int axis = 0; axis < 3 && table.has_orientation; ++axis) {
+    std::vector<double> values;
+    std::vector<double> floors;
+    for (std::size_t i = 0; i < noise.size(); ++i) {
+      values.push_back(kDegree * at.nodes[i].before_rad[axis]);
+      floors.push_back(kDegree * std::sqrt(noise[i](3 + axis, 3 + axis)));
+    }
+    addChannel(std::string("rotation_") + kAxes[axis], "deg", values, floors, report);
+  }
+}
+
+void describeHotspot(GapReport& report) {
+  Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
+  double weight = 0.0;
+  double most = 0.0;
+  for (const GapNode& node : report.nodes) most = std::max(most, node.is_flagged ? node.excess : 0.0);
+  if (!(most > 0.0)) return;
+  for (const GapNode& node : report.nodes) {
+    if (!node.is_flagged || node.excess < 0.5 * most) continue;
+    const double w = node.excess * node.excess;
+    sum_m += w * node.place_m;
+    weight += w;
+  }
+  Hotspot hotspot;
+  hotspot.center_m = sum_m / weight;
+  double spread = 0.0;
+  for (const GapNode& node : report.nodes) {
+    if (!node.is_flagged || node.excess < 0.5 * most) continue;
+    spread += node.excess * node.excess * (node.place_m - hotspot.center_m).squaredNorm();
+  }
+  hotspot.radius_m = std::sqrt(spread / weight);
+  report.hotspot = hotspot;
+}
+
+}  // namespace
+
+void describeWhere(const identify::GapSearch& search, const identify::GapModel& with_effects, GapReport& report) {
+  const identify::GapRows& table = search.physics().rows();
+  const identify::GapModel& none = search.none().model;
+  const std::vector<identify::Vector6d> before = search.physics().residuals(none);
+  const std::vector<identify::Vector6d> after = search.physics().residuals(with_effects);
+  const std::vector<identify::Vector6d> white = identify::whitenedResiduals(
+      search.physics(), none, identify::makeWhitening(table, search.floorPlacingSd_m(), search.floorPlacingSd_rad()));
+  const std::vector<field::SensorSetting> settings = search.physics().settings(with_effects.alignment);
+  std::vector<identify::Matrix6d> noise;
+  std::vector<RowGap> rows;
+  std::vector<double> p;
+  const double channels = table.channels();
+  double sum = 0.0;
+  double floor_m2 = 0.0;
+  double floor_rad2 = 0.0;
+  double gap_m2 = 0.0;
+  double gap_rad2 = 0.0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    noise.push_back(identify::noiseOf(table.rows[i], search.floorPlacingSd_m(), search.floorPlacingSd_rad()));
+    const double var_m2 = noise.back().topLeftCorner<3, 3>().trace();
+    const double var_rad2 = noise.back().bottomRightCorner<3, 3>().trace();
+    rows.push_back({1e3 * std::sqrt(var_m2), kDegree * std::sqrt(var_rad2),
+                    settings[i].tracker_from_sensor.position_m.norm(), table.rows[i].time_s});
+    const double d2 = white[i].squaredNorm();
+    p.push_back(chiSquareTail(d2, channels));
+    sum += d2;
+    floor_m2 += var_m2;
+    floor_rad2 += var_rad2;
+    gap_m2 += before[i].head<3>().squaredNorm();
+    gap_rad2 += before[i].tail<3>().squaredNorm();
+    GapNode node;
+    node.node = table.rows[i].node;
+    node.visit = table.rows[i].visit;
+    node.place_m = settings[i].tracker_from_sensor.position_m;
+    node.before_m = before[i].head<3>();
+    node.after_m = after[i].head<3>();
+    node.before_rad = before[i].tail<3>();
+    node.after_rad = after[i].tail<3>();
+    node.excess = std::sqrt(std::max(0.0, d2 / channels - 1.0));
+    report.nodes.push_back(node);
+  }
+  const std::vector<char> flagged = discoveries(p, 0.05);
+  for (std::size_t i = 0; i < flagged.size(); ++i) report.nodes[i].is_flagged = flagged[i] != 0;
+  const auto n = static_cast<double>(before.size());
+  report.position_rms_mm = 1e3 * std::sqrt(gap_m2 / n);
+  report.floor_position_mm = 1e3 * std::sqrt(floor_m2 / n);
+  if (table.has_orientation) {
+    report.orientation_rms_deg = kDegree * std::sqrt(gap_rad2 / n);
+    report.floor_orientation_deg = kDegree * std::sqrt(floor_rad2 / n);
+  }
+  report.ratio_to_floor = std::sqrt(sum / (n * channels));
+  describeHotspot(report);
+  describeChannels(table, report, noise, report);
+  report.by_range = equalBins([&](std::size_t i) { return rows[i].range_m; }, report, rows);
+  report.by_layer = layerBins(table, report, rows);
+  if (table.has_times) report.by_time = equalBins([&](std::size_t i) { return rows[i].time_s; }, report, rows);
+}
+
+}  // namespace fieldtrue::gap

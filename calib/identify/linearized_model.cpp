@@ -1,0 +1,245 @@
+#include "calib/identify/linearized_model.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "calib/field/tracker_model.h"
+
+namespace fieldtrue::identify {
+namespace {
+
+bool hasFreeAlignment(const GapRows& rows) {
+  return !rows.alignment_known || rows.alignment_tolerance_m > 0.0 || rows.alignment_tolerance_rad > 0.0;
+}
+
+field::EffectResponse moved(const Eigen::Vector3d& shift_m, const Eigen::Vector3d& turn_rad) {
+  field::EffectResponse response;
+  response.shift_m = shift_m;
+  response.turn_rad = turn_rad;
+  return response;
+}
+
+/// What the alignment's parameters do at a setting: shift 3, rotation about the centre 3, mounting 3, lever arm 3.
+std::vector<field::EffectResponse> alignmentResponses(const field::SensorSetting& setting,
+                                                      const Eigen::Vector3d& center_m, const GapRows& rows) {
+  std::vector<field::EffectResponse> responses;
+  if (!hasFreeAlignment(rows)) return responses;
+  const Eigen::Matrix3d R = setting.tracker_from_sensor.orientation.toRotationMatrix();
+  const Eigen::Vector3d arm_m = setting.tracker_from_sensor.position_m - center_m;
+  for (int k = 0; k < 3; ++k) responses.push_back(moved(Eigen::Vector3d::Unit(k), Eigen::Vector3d::Zero()));
+  for (int k = 0; k < 3; ++k)
+    responses.push_back(moved(Eigen::Vector3d::Unit(k).cross(arm_m), Eigen::Vector3d::Unit(k)));
+  if (rows.alignment_known) return responses;
+  if (rows.has_orientation)
+    for (int k = 0; k < 3; ++k) responses.push_back(moved(Eigen::Vector3d::Zero(), R.col(k)));
+  if (rows.several_orientations)
+    for (int k = 0; k < 3; ++k) responses.push_back(moved(R.col(k), Eigen::Vector3d::Zero()));
+  return responses;
+}
+
+}  // namespace
+
+Eigen::MatrixXd spanOf(Eigen::MatrixXd columns) {
+  if (columns.cols() == 0) return columns;
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+    const double norm = columns.col(j).norm();
+    if (norm > 0.0) columns.col(j) /= norm;
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
+  qr.setThreshold(1e-7);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
+}
+
+Whitening makeWhitening(const GapRows& rows, double placing_sd_m, double placing_sd_rad) {
+  Whitening whitening;
+  for (const GapRow& row : rows.rows) {
+    const Matrix6d noise = noiseOf(row, placing_sd_m, placing_sd_rad);
+    const Eigen::LLT<Eigen::Matrix3d> factor(noise.topLeftCorner<3, 3>());
+    whitening.position.push_back(factor.matrixL().solve(Eigen::Matrix3d::Identity()));
+    whitening.rotation.push_back(1.0 / std::sqrt(noise(3, 3)));
+  }
+  return whitening;
+}
+
+Eigen::Vector3d alignmentCenter_m(std::span<const field::SensorSetting> settings) {
+  Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
+  for (const field::SensorSetting& setting : settings) sum_m += setting.tracker_from_sensor.position_m;
+  return sum_m / static_cast<double>(std::max<std::size_t>(1, settings.size()));
+}
+
+void applyAlignmentStep(const Eigen::VectorXd& step, const Eigen::Vector3d& center_m, const GapRows& rows,
+                        GapAlignment& alignment) {
+  if (step.size() < 6) return;
+  const Eigen::Quaterniond turn = rotationFromVector(step.segment<3>(3));
+  Pose& rig = alignment.tracker_from_reference;
+  rig.position_m = turn * (rig.position_m - center_m) + center_m + step.head<3>();
+  rig.orientation = (turn * rig.orientation).normalized();
+  Eigen::Index at = 6;
+  if (rows.alignment_known) return;
+  if (rows.has_orientation) {
+    alignment.mount_from_sensor.orientation =
+        (alignment.mount_from_sensor.orientation * rotationFromVector(step.segment<3>(at))).normalized();
+    at += 3;
+  }
+  if (rows.several_orientations)
+    alignment.mount_from_sensor.position_m += alignment.mount_from_sensor.orientation * step.segment<3>(at);
+}
+
+Vector6d alignmentDeviation(const GapAlignment& alignment, const GapRows& rows, const Eigen::Vector3d& center_m) {
+  const Pose change = alignment.tracker_from_reference * inverse(rows.stated_tracker_from_reference);
+  Vector6d deviation;
+  deviation.head<3>() = change * center_m - center_m;
+  deviation.tail<3>() = rotationVector_rad(change.orientation);
+  return deviation;
+}
+
+namespace {
+
+constexpr double kLeastTolerance = 1e-6;
+constexpr double kFarthestInTolerances = 2.5;
+
+Eigen::Vector3d shortened(const Eigen::Vector3d& v, double longest) {
+  const double length = v.norm();
+  return length > longest ? Eigen::Vector3d(v * (longest / length)) : v;
+}
+
+}  // namespace
+
+bool keepNearStated(const GapRows& rows, const Eigen::Vector3d& center_m, GapAlignment& alignment) {
+  const Vector6d deviation = alignmentDeviation(alignment, rows, center_m);
+  const double farthest_m = kFarthestInTolerances * std::max(kLeastTolerance, rows.alignment_tolerance_m);
+  const double farthest_rad = kFarthestInTolerances * std::max(kLeastTolerance, rows.alignment_tolerance_rad);
+  if (deviation.head<3>().norm() <= farthest_m && deviation.tail<3>().norm() <= farthest_rad) return false;
+  const Eigen::Quaterniond turn = rotationFromVector(shortened(deviation.tail<3>(), farthest_rad));
+  const Pose& stated = rows.stated_tracker_from_reference;
+  Pose& rig = alignment.tracker_from_reference;
+  rig.position_m = turn * (stated.position_m - center_m) + center_m + shortened(deviation.head<3>(), farthest_m);
+  rig.orientation = (turn * stated.orientation).normalized();
+  return true;
+}
+
+double alignmentCost(const GapPhysics& physics, const GapAlignment& alignment) {
+  const GapRows& rows = physics.rows();
+  if (!rows.alignment_known || !hasFreeAlignment(rows)) return 0.0;
+  const Vector6d deviation = alignmentDeviation(alignment, rows, alignmentCenter_m(physics.settings(alignment)));
+  return deviation.head<3>().squaredNorm() / std::pow(std::max(kLeastTolerance, rows.alignment_tolerance_m), 2) +
+         deviation.tail<3>().squaredNorm() / std::pow(std::max(kLeastTolerance, rows.alignment_tolerance_rad), 2);
+}
+
+LinearPrior priorOf(const effects::EffectFit& fit) {
+  const std::vector<effects::FitParameter> linear = fit.linear();
+  LinearPrior prior;
+  prior.precision = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(linear.size()));
+  const bool is_searched = !fit.searched().empty();
+  if (linear.size() == 1 && (is_searched || linear.front().low >= 0.0)) {
+    prior.low = linear.front().low;
+    prior.high = linear.front().high;
+  } else if (!is_searched) {
+    for (std::size_t j = 0; j < linear.size(); ++j)
+      prior.precision[static_cast<Eigen::Index>(j)] = 1.0 / (linear[j].high * linear[j].high);
+  }
+  return prior;
+}
+
+Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening,
+                       std::span<const int> block)
+    : channels_(physics.rows().channels()), order_(physics.size()) {
+  std::iota(order_.begin(), order_.end(), std::size_t{0});
+  std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) { return block[a] < block[b]; });
+  const std::vector<field::SensorSetting> at = physics.settings(state.alignment);
+  const std::vector<field::EffectResponse> sum = physics.responses(state, at);
+  const std::vector<Vector6d> residuals = physics.residuals(state);
+  const auto n = static_cast<Eigen::Index>(order_.size());
+  const GapRows& rows = physics.rows();
+  n_prior_ = rows.alignment_known && hasFreeAlignment(rows) ? 6 : 0;
+  residual_ = Eigen::VectorXd::Zero(n * channels_ + n_prior_);
+  for (std::size_t k = 0; k < order_.size(); ++k) {
+    const std::size_t i = order_[k];
+    settings_.push_back(at[i]);
+    white_position_.push_back(whitening.position[i]);
+    white_rotation_.push_back(whitening.rotation[i]);
+    const Eigen::Vector3d solved_m = rows.rows[i].tracker_from_sensor.position_m - residuals[i].head<3>();
+    const Eigen::Matrix<double, 6, 9> by_field = field::poseByField(solved_m);
+    white_by_field_.emplace_back();
+    white_by_field_.back().topRows<3>() = white_position_.back() * by_field.topRows<3>();
+    white_by_field_.back().bottomRows<3>() = white_rotation_.back() * by_field.bottomRows<3>();
+    const Eigen::Index row = static_cast<Eigen::Index>(k) * channels_;
+    residual_.segment<3>(row) = white_position_.back() * residuals[i].head<3>();
+    if (channels_ == 6) residual_.segment<3>(row + 3) = white_rotation_.back() * residuals[i].tail<3>();
+    const int b = block[i];
+    if (static_cast<std::size_t>(b) >= segments_.size()) segments_.push_back({row, 0});
+    segments_.back().count += channels_;
+  }
+  addAlignment(rows, state.alignment);
+  addTerms(state);
+}
+
+void Linearized::addAlignment(const GapRows& rows, const GapAlignment& alignment) {
+  const Eigen::Vector3d center_m = alignmentCenter_m(settings_);
+  std::vector<field::EffectResponse> responses;
+  for (const field::SensorSetting& setting : settings_) {
+    const std::vector<field::EffectResponse> at = alignmentResponses(setting, center_m, rows);
+    responses.insert(responses.end(), at.begin(), at.end());
+  }
+  n_alignment_ = static_cast<int>(responses.size() / settings_.size());
+  nuisance_ = columnsOf(responses, n_alignment_);
+  if (n_prior_ == 0) return;
+  const Vector6d deviation = alignmentDeviation(alignment, rows, center_m);
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    const double tolerance =
+        std::max(kLeastTolerance, k < 3 ? rows.alignment_tolerance_m : rows.alignment_tolerance_rad);
+    nuisance_(residual_.size() - 6 + k, k) = 1.0 / tolerance;
+    residual_[residual_.size() - 6 + k] = -deviation[k] / tolerance;
+  }
+}
+
+void Linearized::addTerms(const GapModel& state) {
+  for (const GapTerm& term : state.terms) {
+    const Eigen::MatrixXd linear = columns(*term.fit, term.searched);
+    const Eigen::Index dim = term.searched.size();
+    Eigen::MatrixXd all(size(), linear.cols() + dim);
+    all.leftCols(linear.cols()) = linear;
+    const std::vector<effects::FitParameter> bounds = term.fit->searched();
+    for (Eigen::Index d = 0; d < dim; ++d) {
+      const effects::FitParameter& bound = bounds[static_cast<std::size_t>(d)];
+      const double h = 1e-4 * std::max(1e-3, std::min(1.0, bound.high - bound.low));
+      Eigen::VectorXd shifted = term.searched;
+      shifted[d] += h;
+      all.col(linear.cols() + d) = (columns(*term.fit, shifted) - linear) * term.linear / h;
+    }
+    nuisance_.conservativeResize(Eigen::NoChange, nuisance_.cols() + all.cols());
+    nuisance_.rightCols(all.cols()) = all;
+  }
+}
+
+Eigen::Matrix<double, 6, 1> Linearized::whitenedChange(std::size_t k, const field::EffectResponse& response) const {
+  Eigen::Matrix<double, 6, 1> change =
+      white_by_field_[k] * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(response.field_per_m3.data());
+  change.head<3>() += white_position_[k] * response.shift_m;
+  change.tail<3>() += white_rotation_[k] * response.turn_rad;
+  return change;
+}
+
+Eigen::MatrixXd Linearized::columnsOf(std::span<const field::EffectResponse> responses, Eigen::Index parameters) const {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(size(), parameters);
+  for (std::size_t k = 0; k < order_.size(); ++k) {
+    for (Eigen::Index j = 0; j < parameters; ++j) {
+      const auto at = k * static_cast<std::size_t>(parameters) + static_cast<std::size_t>(j);
+      columns.col(j).segment(static_cast<Eigen::Index>(k) * channels_, channels_) =
+          whitenedChange(k, responses[at]).head(channels_);
+    }
+  }
+  return columns;
+}
+
+Eigen::MatrixXd Linearized::columns(const effects::EffectFit& fit, const Eigen::VectorXd& searched) const {
+  const std::size_t m = fit.linear().size();
+  std::vector<field::EffectResponse> responses(settings_.size() * m);
+  fit.respond(settings_, searched, responses);
+  return columnsOf(responses, static_cast<Eigen::Index>(m));
+}
+
+}  // namespace fieldtrue::identify

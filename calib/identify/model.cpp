@@ -1,0 +1,82 @@
+#include "calib/identify/model.h"
+
+#include "calib/core/geometry.h"
+#include "calib/core/statistics.h"
+#include "calib/field/tracker_model.h"
+
+namespace fieldtrue::identify {
+std::vector<field::SensorSetting> GapPhysics::settings(const GapAlignment& alignment) const {
+  std::vector<field::SensorSetting> settings;
+  settings.reserve(size());
+  for (const GapRow& row : rows_.rows) {
+    settings.push_back({alignment.tracker_from_reference * row.reference_from_sensor * alignment.mount_from_sensor,
+                        alignment.tracker_from_reference, row.index, row.time_s});
+  }
+  return settings;
+}
+
+std::vector<field::EffectResponse> GapPhysics::responses(const GapModel& model,
+                                                         std::span<const field::SensorSetting> settings) const {
+  std::vector<field::EffectResponse> sum(settings.size());
+  for (const auto& effect : believed_)
+    for (std::size_t i = 0; i < settings.size(); ++i) field::add(effect->at(settings[i]), 1.0, sum[i]);
+  std::vector<field::EffectResponse> unit;
+  for (const GapTerm& term : model.terms) {
+    const auto m = static_cast<std::size_t>(term.linear.size());
+    unit.assign(settings.size() * m, {});
+    term.fit->respond(settings, term.searched, unit);
+    for (std::size_t i = 0; i < settings.size(); ++i)
+      for (std::size_t j = 0; j < m; ++j)
+        field::add(unit[i * m + j], term.linear[static_cast<Eigen::Index>(j)], sum[i]);
+  }
+  return sum;
+}
+
+std::vector<Pose> GapPhysics::predictions(const GapModel& model) const {
+  const std::vector<field::SensorSetting> at = settings(model.alignment);
+  const std::vector<field::EffectResponse> sum = responses(model, at);
+  std::vector<Pose> poses(size());
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Pose& tracked = rows_.rows[i].tracker_from_sensor;
+    const auto reported = field::reportedPose(at[i], sum[i], tracked.position_m);
+    poses[i] = reported.value_or(Pose{tracked.position_m + Eigen::Vector3d::Constant(1.0),
+                                      rotationFromVector(Eigen::Vector3d::Constant(0.6)) * tracked.orientation});
+  }
+  return poses;
+}
+
+std::vector<Vector6d> GapPhysics::residuals(const GapModel& model) const {
+  const std::vector<Pose> poses = predictions(model);
+  std::vector<Vector6d> residuals(size(), Vector6d::Zero());
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Pose& tracked = rows_.rows[i].tracker_from_sensor;
+    residuals[i].head<3>() = tracked.position_m - poses[i].position_m;
+    if (rows_.has_orientation)
+      residuals[i].tail<3>() = rotationVector_rad(tracked.orientation * poses[i].orientation.conjugate());
+  }
+  return residuals;
+}
+
+GapAlignment initialAlignment(const GapRows& table) {
+  GapAlignment alignment;
+  alignment.tracker_from_reference = table.stated_tracker_from_reference;
+  if (table.alignment_known) return alignment;
+  std::vector<Eigen::Vector3d> p_true_m;
+  std::vector<Eigen::Vector3d> p_tracked_m;
+  for (const GapRow& row : table.rows) {
+    p_true_m.push_back(row.reference_from_sensor.position_m);
+    p_tracked_m.push_back(row.tracker_from_sensor.position_m);
+  }
+  if (const auto rigid = fitRigid(p_true_m, p_tracked_m)) alignment.tracker_from_reference = *rigid;
+  if (!table.has_orientation) return alignment;
+  std::vector<Eigen::Quaterniond> mounting;
+  for (const GapRow& row : table.rows) {
+    const Eigen::Quaterniond tracker_from_mount =
+        alignment.tracker_from_reference.orientation * row.reference_from_sensor.orientation;
+    mounting.push_back(tracker_from_mount.conjugate() * row.tracker_from_sensor.orientation);
+  }
+  alignment.mount_from_sensor.orientation = meanRotation(mounting);
+  return alignment;
+}
+
+}  // namespace fieldtrue::identify

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "calib/effects/effect_row.h"
+#include "calib/effects/registry.h"
+#include "calib/identify/rows.h"
+
+namespace fieldtrue::identify {
+
+/// The rig in the tracker's frame, and the sensor in its holder: refitted inside every model, never an effect.
+struct GapAlignment {
+  Pose tracker_from_reference;
+  Pose mount_from_sensor;  ///< The rig's pose times this is the sensor's.
+};
+
+/// One fitted effect in a model.
+struct GapTerm {
+  const effects::Effect* effect = nullptr;
+  std::shared_ptr<const effects::EffectFit> fit;
+  Eigen::VectorXd searched;
+  Eigen::VectorXd linear;
+};
+
+/// A model of the recording: alignment and effects.
+struct GapModel {
+  GapAlignment alignment;
+  std::vector<GapTerm> terms;
+};
+
+/// What a tracker reports of rows, and how far the reports are from a model.
+class GapPhysics {
+ public:
+  /// @param believed effects that the scene already has
+  GapPhysics(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed)
+      : rows_(rows), believed_(std::move(believed)) {}
+
+  const GapRows& rows() const { return rows_; }
+  std::size_t size() const { return rows_.rows.size(); }
+  std::vector<field::SensorSetting> settings(const GapAlignment& alignment) const;
+  /// Sum of all effects' responses at the settings.
+  std::vector<field::EffectResponse> responses(const GapModel& model,
+                                               std::span<const field::SensorSetting> settings) const;
+  /// Tracked minus modelled position [m] and rotation vector from modelled to tracked [rad], tracker frame, per row.
+  /// Rows the model cannot solve get a residual of 1 m and 1 rad.
+  std::vector<Vector6d> residuals(const GapModel& model) const;
+  std::vector<Pose> predictions(const GapModel& model) const;
+
+ private:
+  const GapRows& rows_;
+  std::vector<std::unique_ptr<field::PhysicalEffect>> believed_;
+};
+
+/// The start of every search: rigid alignment of positions and the mean mounting.
+GapAlignment initialAlignment(const GapRows& rows);
+
+}  // namespace fieldtrue::identify

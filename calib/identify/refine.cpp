@@ -1,0 +1,376 @@
+#include "calib/identify/refine.h"
+
+#include <ceres/tiny_solver.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace fieldtrue::identify {
+namespace {
+
+constexpr double kHuge = 1e4;
+constexpr double kEnough = 5e-3;  // Fall of minus twice the log likelihood that ends a fit.
+
+/// Scale s of squared three-dimensional distances under a Student t law: the fixed point of
+/// s^2 = mean(w d^2) / 3, w = (nu + 3)/(nu + d^2/s^2).
+double scaleOf(std::span<const double> d2, double nu) {
+  double mean = 0.0;
+  for (const double d : d2) mean += d;
+  double s2 = std::max(1e-12, mean / (3.0 * static_cast<double>(d2.size())));
+  for (int step = 0; step < 30; ++step) {
+    double sum = 0.0;
+    for (const double d : d2) sum += (nu + 3.0) / (nu + d / s2) * d;
+    const double next = std::max(1e-12, sum / (3.0 * static_cast<double>(d2.size())));
+    if (std::abs(next - s2) < 1e-6 * s2) break;
+    s2 = next;
+  }
+  return std::sqrt(s2);
+}
+
+double devianceAt(std::span<const double> d2, double nu, double scale) {
+  const double s2 = scale * scale;
+  const double constant =
+      -2.0 * (std::lgamma(0.5 * (nu + 3.0)) - std::lgamma(0.5 * nu) - 1.5 * std::log(nu)) + 3.0 * std::log(s2);
+  double sum = 0.0;
+  for (const double d : d2) sum += (nu + 3.0) * std::log1p(d / (nu * s2)) + constant;
+  return sum;
+}
+
+/// Residuals of the rows that count for one local fit, the nuisance projected out.
+class ProjectedFit {
+ public:
+  using Scalar = double;
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = Eigen::Dynamic };
+
+  ProjectedFit(const Linearized& at, const effects::EffectFit& fit, std::optional<std::size_t> held_out)
+      : at_(at), fit_(fit), prior_(priorOf(fit)) {
+    for (std::size_t b = 0; b < at.segments().size(); ++b)
+      if (held_out != b) parts_.push_back(at.segments()[b]);
+    const Segment& last = at.segments().back();
+    const Eigen::Index end = last.begin + last.count;
+    if (end < at.size()) parts_.push_back({end, at.size() - end});
+    basis_ = spanOf(picked(at.nuisance()));
+    residual_ = projected(picked(at.residual()));
+    for (const effects::FitParameter& p : fit.searched()) width_.push_back(std::max(1e-6, p.high - p.low));
+  }
+
+  int NumResiduals() const { return static_cast<int>(residual_.size()); }
+  int NumParameters() const { return static_cast<int>(width_.size()); }
+  double sumOfSquares() const { return residual_.squaredNorm(); }
+
+  struct Solved {
+    Eigen::VectorXd linear;
+    Eigen::VectorXd left;
+  };
+  Solved solved(const Eigen::VectorXd& searched) const {
+    Eigen::MatrixXd columns = projected(picked(at_.columns(fit_, searched)));
+    Eigen::VectorXd scale(columns.cols());
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+      const double norm = columns.col(j).norm();
+      scale[j] = norm > 0.0 ? 1.0 / norm : 0.0;
+      columns.col(j) *= scale[j];
+    }
+    Eigen::MatrixXd normal = columns.transpose() * columns;
+    normal.diagonal().array() += 1e-9;
+    normal.diagonal() += scale.cwiseAbs2().cwiseProduct(prior_.precision);
+    Eigen::VectorXd y = normal.llt().solve(columns.transpose() * residual_);
+    if (y.size() == 1 && scale[0] > 0.0) y[0] = std::clamp(y[0], prior_.low / scale[0], prior_.high / scale[0]);
+    return {scale.asDiagonal() * y, residual_ - columns * y};
+  }
+
+  bool operator()(const double* searched, double* residuals, double* jacobian) const {
+    const Eigen::Map<const Eigen::VectorXd> theta(searched, NumParameters());
+    Eigen::Map<Eigen::VectorXd> left(residuals, NumResiduals());
+    if (!theta.allFinite() || !fit_.allows(theta)) {
+      left.setConstant(kHuge);
+      if (jacobian != nullptr) Eigen::Map<Eigen::VectorXd>(jacobian, NumResiduals() * NumParameters()).setZero();
+      return true;
+    }
+    left = solved(theta).left;
+    if (jacobian == nullptr) return true;
+    Eigen::Map<Eigen::MatrixXd> J(jacobian, NumResiduals(), NumParameters());
+    for (int d = 0; d < NumParameters(); ++d) {
+      Eigen::VectorXd shifted = theta;
+      const double h = 1e-5 * std::min(1.0, width_[static_cast<std::size_t>(d)]);
+      shifted[d] += h;
+      J.col(d) = (solved(shifted).left - left) / h;
+    }
+    return true;
+  }
+
+ private:
+  Eigen::MatrixXd picked(const Eigen::MatrixXd& all) const {
+    Eigen::Index rows = 0;
+    for (const Segment& part : parts_) rows += part.count;
+    Eigen::MatrixXd picked(rows, all.cols());
+    Eigen::Index at = 0;
+    for (const Segment& part : parts_) {
+      picked.middleRows(at, part.count) = all.middleRows(part.begin, part.count);
+      at += part.count;
+    }
+    return picked;
+  }
+  Eigen::MatrixXd projected(const Eigen::MatrixXd& m) const { return m - basis_ * (basis_.transpose() * m); }
+
+  const Linearized& at_;
+  const effects::EffectFit& fit_;
+  LinearPrior prior_;
+  std::vector<Segment> parts_;
+  Eigen::MatrixXd basis_;
+  Eigen::VectorXd residual_;
+  std::vector<double> width_;
+};
+
+}  // namespace
+
+Deviance devianceOf(std::span<const Vector6d> whitened, bool has_orientation, const ResidualLaw& law) {
+  std::vector<double> position;
+  std::vector<double> rotation;
+  for (const Vector6d& r : whitened) {
+    position.push_back(std::min(1e8, r.head<3>().squaredNorm()));
+    if (has_orientation) rotation.push_back(std::min(1e8, r.tail<3>().squaredNorm()));
+  }
+  const double nu = law.degrees_of_freedom;
+  Deviance deviance;
+  deviance.scale.position = scaleOf(position, nu);
+  deviance.value = devianceAt(position, nu, deviance.scale.position);
+  if (has_orientation) {
+    deviance.scale.rotation = scaleOf(rotation, nu);
+    deviance.value += devianceAt(rotation, nu, deviance.scale.rotation);
+  }
+  return deviance;
+}
+
+std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapModel& model, const Whitening& whitening) {
+  std::vector<Vector6d> residuals = physics.residuals(model);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    residuals[i].head<3>() = (whitening.position[i] * residuals[i].head<3>()).eval();
+    residuals[i].tail<3>() *= whitening.rotation[i];
+  }
+  return residuals;
+}
+
+double priorCost(const GapPhysics& physics, const GapModel& model) {
+  double cost = alignmentCost(physics, model.alignment);
+  for (const GapTerm& term : model.terms) cost += priorOf(*term.fit).costOf(term.linear);
+  return cost;
+}
+
+LocalFit refineLocally(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& start,
+                       std::optional<std::size_t> held_out) {
+  const ProjectedFit projected(at, fit, held_out);
+  LocalFit local;
+  local.searched = start;
+  if (start.size() > 0) {
+    using Solver = ceres::TinySolver<ProjectedFit>;
+    Solver solver;
+    solver.options.max_num_iterations = 15;
+    solver.options.gradient_tolerance = 1e-5;
+    solver.options.parameter_tolerance = 1e-4;
+    Solver::Parameters parameters = start;
+    solver.Solve(projected, &parameters);
+    if (parameters.allFinite() && fit.allows(parameters)) local.searched = parameters;
+  }
+  ProjectedFit::Solved solved = projected.solved(local.searched);
+  local.linear = std::move(solved.linear);
+  local.gain = projected.sumOfSquares() - solved.left.squaredNorm();
+  return local;
+}
+
+namespace {
+
+/// One attempt to fit a model jointly; the state of its iteration.
+class JointFit {
+ public:
+  JointFit(const GapPhysics& physics, const Whitening& whitening, const RefineOptions& options)
+      : physics_(physics), whitening_(whitening), options_(options), block_(physics.size(), 0) {}
+
+  RefinedModel run(GapModel model) {
+    double cost = adaptedCostOf(model);
+    double damping = kFirstDamping;
+    for (int step = 0; step < options_.most_steps; ++step) {
+      const System system = systemAt(model);
+      const double fall = descend(system, model, cost, damping);
+      if (fall <= 0.0) break;
+      cost = adaptedCostOf(model);
+      if (fall < kEnough) break;
+    }
+    return finished(std::move(model), cost);
+  }
+
+ private:
+  bool isUsed(std::size_t row) const { return options_.used.empty() || options_.used[row] != 0; }
+
+  static constexpr double kFirstDamping = 1e-3;
+
+  enum class Applied { kFully, kAtTolerance, kForbidden };
+
+  /// Normal equations about one state.
+  struct System {
+    Eigen::MatrixXd normal;
+    Eigen::VectorXd right;
+    Eigen::VectorXd scale;
+    Eigen::Vector3d center_m;
+    int n_alignment = 0;
+  };
+
+  System systemAt(const GapModel& model) const {
+    const Linearized at(physics_, model, whitening_, block_);
+    System system;
+    system.center_m = alignmentCenter_m(at.settings());
+    system.n_alignment = at.nAlignment();
+    const Eigen::VectorXd w = weights(at);
+    Eigen::MatrixXd J = at.nuisance();
+    if (options_.frozen) J.col(*options_.frozen).setZero();
+    system.normal = J.transpose() * w.asDiagonal() * J;
+    system.right = J.transpose() * (w.asDiagonal() * at.residual());
+    addPriors(model, at.nAlignment(), system.normal, system.right);
+    system.scale = system.normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
+    return system;
+  }
+
+  /// One damped step downhill. @return fall of the cost; 0 where none was found
+  double descend(const System& system, GapModel& model, double& cost, double& damping) const {
+    const Eigen::MatrixXd scaled = system.scale.asDiagonal() * system.normal * system.scale.asDiagonal();
+    for (int attempt = 0; attempt < 7; ++attempt) {
+      Eigen::MatrixXd damped = scaled;
+      damped.diagonal().array() += damping + 1e-10;
+      for (const bool moves_rig : {true, false}) {
+        const Eigen::VectorXd y = stepOf(damped, system.right, system.scale, moves_rig ? 0 : system.n_alignment);
+        GapModel next = model;
+        const Applied applied =
+            y.allFinite() ? apply(y, system.center_m, system.n_alignment, next) : Applied::kForbidden;
+        const double next_cost = applied == Applied::kForbidden ? cost : costOf(next);
+        if (next_cost < cost) {
+          const double fall = cost - next_cost;
+          model = std::move(next);
+          cost = next_cost;
+          damping = std::max(1e-9, 0.2 * damping);
+          return fall;
+        }
+        if (applied != Applied::kAtTolerance) break;
+      }
+      damping = 6.0 * std::max(damping, 1e-6);
+    }
+    return 0.0;
+  }
+
+  /// One damped step; the first `fixed` parameters stay.
+  static Eigen::VectorXd stepOf(const Eigen::MatrixXd& damped, const Eigen::VectorXd& right,
+                                const Eigen::VectorXd& scale, Eigen::Index fixed) {
+    const Eigen::Index free = right.size() - fixed;
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(right.size());
+    if (free == 0) return y;
+    const Eigen::VectorXd scaled = scale.tail(free).cwiseProduct(right.tail(free));
+    y.tail(free) = scale.tail(free).cwiseProduct(damped.bottomRightCorner(free, free).ldlt().solve(scaled));
+    return y;
+  }
+
+  void addPriors(const GapModel& model, Eigen::Index at, Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
+    for (const GapTerm& term : model.terms) {
+      const Eigen::Index m = term.linear.size();
+      const LinearPrior prior = priorOf(*term.fit);
+      normal.diagonal().segment(at, m) += prior.precision;
+      right.segment(at, m) -= prior.precision.cwiseProduct(term.linear);
+      at += m + term.searched.size();
+    }
+  }
+
+  Applied apply(const Eigen::VectorXd& step, const Eigen::Vector3d& center_m, int n_alignment, GapModel& model) const {
+    applyAlignmentStep(step.head(n_alignment), center_m, physics_.rows(), model.alignment);
+    const bool is_bounded = physics_.rows().alignment_known && n_alignment > 0;
+    const bool is_moved = is_bounded && keepNearStated(physics_.rows(), center_m, model.alignment);
+    Eigen::Index at = n_alignment;
+    for (GapTerm& term : model.terms) {
+      term.linear += step.segment(at, term.linear.size());
+      at += term.linear.size();
+      term.searched += step.segment(at, term.searched.size());
+      at += term.searched.size();
+      if (term.searched.size() > 0 && !term.fit->allows(term.searched)) return Applied::kForbidden;
+      const LinearPrior prior = priorOf(*term.fit);
+      if (term.linear.size() == 1) term.linear[0] = std::clamp(term.linear[0], prior.low, prior.high);
+    }
+    return is_moved ? Applied::kAtTolerance : Applied::kFully;
+  }
+
+  /// Sum over rows of the residual law's penalty at the present scales, and that of the priors.
+  double costOf(const GapModel& model) const { return costAt(usedResiduals(model), model); }
+  double adaptedCostOf(const GapModel& model) {
+    const std::vector<Vector6d> used = usedResiduals(model);
+    scale_ = devianceOf(used, physics_.rows().has_orientation, options_.law).scale;
+    return costAt(used, model);
+  }
+
+  std::vector<Vector6d> usedResiduals(const GapModel& model) const {
+    const std::vector<Vector6d> whitened = whitenedResiduals(physics_, model, whitening_);
+    std::vector<Vector6d> used;
+    for (std::size_t i = 0; i < whitened.size(); ++i)
+      if (isUsed(i)) used.push_back(whitened[i]);
+    return used;
+  }
+
+  double costAt(std::span<const Vector6d> used, const GapModel& model) const {
+    const bool both = physics_.rows().has_orientation;
+    const double nu = options_.law.degrees_of_freedom;
+    double sum = 0.0;
+    for (const Vector6d& r : used) {
+      sum += (nu + 3.0) * std::log1p(r.head<3>().squaredNorm() / (nu * scale_.position * scale_.position));
+      if (both) sum += (nu + 3.0) * std::log1p(r.tail<3>().squaredNorm() / (nu * scale_.rotation * scale_.rotation));
+    }
+    return sum + priorCost(physics_, model);
+  }
+
+  Eigen::VectorXd weights(const Linearized& at) const {
+    Eigen::VectorXd w = Eigen::VectorXd::Ones(at.size());
+    const double nu = options_.law.degrees_of_freedom;
+    const auto weigh = [&](Eigen::Index begin, double scale) {
+      const double d2 = at.residual().segment<3>(begin).squaredNorm() / (scale * scale);
+      w.segment<3>(begin).setConstant((nu + 3.0) / (nu + d2) / (scale * scale));
+    };
+    for (std::size_t k = 0; k < at.order().size(); ++k) {
+      const Eigen::Index begin = static_cast<Eigen::Index>(k) * at.channels();
+      if (!isUsed(at.order()[k])) {
+        w.segment(begin, at.channels()).setZero();
+        continue;
+      }
+      weigh(begin, scale_.position);
+      if (at.channels() == 6) weigh(begin + 3, scale_.rotation);
+    }
+    return w;
+  }
+
+  RefinedModel finished(GapModel model, double cost) const {
+    const Linearized at(physics_, model, whitening_, block_);
+    const Eigen::MatrixXd& J = at.nuisance();
+    Eigen::MatrixXd normal = J.transpose() * weights(at).asDiagonal() * J;
+    Eigen::VectorXd unused = Eigen::VectorXd::Zero(J.cols());
+    addPriors(model, at.nAlignment(), normal, unused);
+    const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
+    normal = scale.asDiagonal() * normal * scale.asDiagonal();
+    normal.diagonal().array() += 1e-9;
+    RefinedModel refined;
+    refined.covariance =
+        scale.asDiagonal() * normal.ldlt().solve(Eigen::MatrixXd::Identity(J.cols(), J.cols())) * scale.asDiagonal();
+    refined.n_alignment = at.nAlignment();
+    refined.model = std::move(model);
+    refined.cost = cost;
+    return refined;
+  }
+
+  const GapPhysics& physics_;
+  const Whitening& whitening_;
+  const RefineOptions& options_;
+  std::vector<int> block_;
+  ResidualScale scale_;
+};
+
+}  // namespace
+
+RefinedModel refineJointly(const GapPhysics& physics, const GapModel& start, const Whitening& whitening,
+                           const RefineOptions& options) {
+  return JointFit(physics, whitening, options).run(start);
+}
+
+}  // namespace fieldtrue::identify

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calib/core/run_control.h"
+#include "calib/identify/linearized_model.h"
+
+namespace fieldtrue::identify {
+
+/// How whitened residuals are distributed: per row and kind (position, rotation) a Student t of three dimensions with
+/// an unknown scale; many degrees of freedom are a normal distribution.
+struct ResidualLaw {
+  double degrees_of_freedom = 100.0;
+};
+
+/// Scales of the whitened residuals: 1 where the stated noise is right.
+struct ResidualScale {
+  double position = 1.0;
+  double rotation = 1.0;
+};
+
+/// Minus twice the log likelihood of whitened residuals with the scales that fit them best.
+/// @source Student t with unknown scale: Lange, Little, Taylor 1989, JASA 84 881
+struct Deviance {
+  double value = 0.0;
+  ResidualScale scale;
+};
+Deviance devianceOf(std::span<const Vector6d> whitened, bool has_orientation, const ResidualLaw& law);
+
+/// Whitened residuals of a model, one per row.
+std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapModel& model, const Whitening& whitening);
+
+/// Minus twice the log prior of a model: the rig's stated tolerances, and what is believable of linear effects.
+double priorCost(const GapPhysics& physics, const GapModel& model);
+
+/// Refines the searched parameters of one fit near a start by Levenberg and Marquardt, all linear parameters and the
+/// nuisance projected out.
+/// @param held_out block left out; none = all rows
+/// @source variable projection: Golub and Pereyra 1973, SIAM J. Numer. Anal. 10 413
+struct LocalFit {
+  Eigen::VectorXd searched;
+  Eigen::VectorXd linear;
+  double gain = 0.0;  ///< Fall of the sum of squares of the rows used.
+};
+LocalFit refineLocally(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& start,
+                       std::optional<std::size_t> held_out = std::nullopt);
+
+struct RefineOptions {
+  ResidualLaw law;
+  std::span<const char> used = {};  ///< Per row; empty = all.
+  int most_steps = 30;
+  std::optional<Eigen::Index> frozen = std::nullopt;  ///< A parameter that stays as it is, counted as in `covariance`.
+};
+
+struct RefinedModel {
+  GapModel model;
+  Eigen::MatrixXd covariance;  ///< Of [alignment step, then per term linear and searched parameters].
+  Eigen::Index n_alignment = 0;
+  double cost = 0.0;
+};
+
+/// Fits all parameters of a model together against the tracker's own nonlinear solution, by Levenberg and Marquardt
+/// with weights that follow the residual law.
+RefinedModel refineJointly(const GapPhysics& physics, const GapModel& start, const Whitening& whitening,
+                           const RefineOptions& options);
+
+}  // namespace fieldtrue::identify

@@ -1,0 +1,451 @@
+#include "calib/identify/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "calib/core/statistics.h"
+
+namespace fieldtrue::identify {
+namespace {
+
+constexpr double kGuessedPlacing_m = 1e-3;
+constexpr double kGuessedPlacing_rad = 3e-3;
+constexpr double kImplausibleCost = 12.0;  // In BIC units.
+double pitchOf_m(std::span<const field::SensorSetting> settings) {
+  std::vector<double> nearest_m;
+  for (const field::SensorSetting& a : settings) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const field::SensorSetting& b : settings) {
+      const double d = (a.tracker_from_sensor.position_m - b.tracker_from_sensor.position_m).norm();
+      if (d > 0.03) least = std::min(least, d);
+    }
+    if (std::isfinite(least)) nearest_m.push_back(least);
+    if (nearest_m.size() > 300) break;
+  }
+  return nearest_m.empty() ? 0.1 : median(std::move(nearest_m));
+}
+
+int parametersOf(const GapTerm& term) { return static_cast<int>(term.linear.size() + term.searched.size()); }
+
+}  // namespace
+
+GapSearch::GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed, NoiseFrom noise)
+    : rows_(rows), physics_(rows, std::move(believed)), space_blocks_(octantBlocks(rows)) {
+  time_blocks_ = rows.has_times ? timeBlocks(rows) : space_blocks_;
+  none_.model.alignment = initialAlignment(rows);
+  placing_sd_m_ = rows.placing_sd_m.value_or(kGuessedPlacing_m);
+  placing_sd_rad_ = rows.placing_sd_rad.value_or(kGuessedPlacing_rad);
+  if (noise == NoiseFrom::kResiduals) settleNoise();
+  whitening_ = makeWhitening(rows, placing_sd_m_, placing_sd_rad_);
+  none_ = refineJointly(physics_, none_.model, whitening_, {law_});
+  settleWays();
+}
+
+/// Where the rig's tolerance is not stated, it is what the flexible fit leaves beyond the samples' noise; the law of
+/// the residuals is the one under which that remainder is most likely.
+void GapSearch::settleNoise() {
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    whitening_ = makeWhitening(rows_, placing_sd_m_, placing_sd_rad_);
+    none_ = refineJointly(physics_, none_.model, whitening_, {});
+    structure_ =
+        findStructure(Linearized(physics_, none_.model, whitening_, space_blocks_), rows_, round == kRounds - 1);
+    // A stated tolerance may be wrong: position and rotation must weigh as they deserve, so both follow the remainder.
+    placing_sd_m_ = placingFrom(Channel::kPosition, placing_sd_m_);
+    if (rows_.has_orientation) placing_sd_rad_ = placingFrom(Channel::kRotation, placing_sd_rad_);
+  }
+  double best = std::numeric_limits<double>::infinity();
+  for (const double nu : {4.0, 8.0, 100.0}) {
+    const double deviance = devianceOf(structure_.left, rows_.has_orientation, {nu}).value;
+    if (deviance < best) {
+      best = deviance;
+      law_.degrees_of_freedom = nu;
+    }
+  }
+}
+
+/// The placing SD under which the whitened remainder of the flexible fit has unit scale, the samples' noise taken as
+/// stated; next to nothing where that alone is more than enough.
+double GapSearch::placingFrom(Channel channel, double present) const {
+  constexpr double kLeast = 1e-6;
+  constexpr double kTimes = 30.0;  // At most, in either direction and round.
+  const bool is_position = channel == Channel::kPosition;
+  const auto varianceAt = [&](const GapRow& row, double placing) {
+    const double own = is_position ? row.mean_covariance_m2.trace() / 3.0 : row.mean_rotation_variance_rad2;
+    return own + placing * placing + kLeast * kLeast;
+  };
+  const auto scaleAt = [&](double placing) {
+    std::vector<Vector6d> left(structure_.left.size(), Vector6d::Zero());
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      const double factor = std::sqrt(varianceAt(rows_.rows[i], present) / varianceAt(rows_.rows[i], placing));
+      left[i].head<3>() = factor * (is_position ? structure_.left[i].head<3>() : structure_.left[i].tail<3>());
+    }
+    return normalScaleOf(left);
+  };
+  double low = std::max(kLeast, present / kTimes);
+  double high = std::max(kLeast, present * kTimes);
+  for (int step = 0; step < 40; ++step) {
+    const double middle = std::sqrt(low * high);
+    (scaleAt(middle) > 1.0 ? low : high) = middle;
+  }
+  return std::sqrt(low * high);
+}
+
+double GapSearch::whitenedUnit_mm() const {
+  double sum_m2 = 0.0;
+  for (const GapRow& row : rows_.rows)
+    sum_m2 += noiseOf(row, placing_sd_m_, placing_sd_rad_).topLeftCorner<3, 3>().trace();
+  return 1e3 * std::sqrt(sum_m2 / static_cast<double>(rows_.rows.size()));
+}
+
+double GapSearch::floorPlacingSd_m() const {
+  return rows_.placing_sd_m ? placing_sd_m_ : std::min(placing_sd_m_, kWorstPlacing_m);
+}
+
+double GapSearch::floorPlacingSd_rad() const {
+  return rows_.placing_sd_rad ? placing_sd_rad_ : std::min(placing_sd_rad_, kWorstPlacing_rad);
+}
+
+void GapSearch::settleWays() {
+  settings_ = physics_.settings(none_.model.alignment);
+  design_.settings = settings_;
+  for (const field::SensorSetting& setting : settings_) design_.places_m.extend(setting.tracker_from_sensor.position_m);
+  design_.pitch_m = pitchOf_m(settings_);
+  design_.has_times = rows_.has_times;
+  const auto by_time = [](const GapRow& a, const GapRow& b) { return a.time_s < b.time_s; };
+  const auto [first, last] = std::minmax_element(rows_.rows.begin(), rows_.rows.end(), by_time);
+  design_.start_s = first->time_s;
+  design_.end_s = last->time_s;
+  design_.alignment_known = rows_.alignment_known;
+  design_.has_orientation = rows_.has_orientation;
+  design_.several_orientations = rows_.several_orientations;
+  design_.excitation = rows_.excitation;
+  for (const effects::Effect& effect : effects::effects()) {
+    if (effect.fits == nullptr) continue;
+    for (auto& fit : effect.fits(design_)) ways_.push_back({&effect, std::move(fit), effect.acts_in_time});
+  }
+}
+
+double GapSearch::bicOf(const GapModel& model) const {
+  const std::vector<Vector6d> left = whitenedResiduals(physics_, model, whitening_);
+  double parameters = 0.0;
+  for (const GapTerm& term : model.terms) parameters += parametersOf(term);
+  const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
+  return devianceOf(left, rows_.has_orientation, law_).value + parameters * std::log(count) +
+         priorCost(physics_, model);
+}
+
+RefinedModel GapSearch::refined(const GapModel& start, std::span<const char> used) const {
+  RefineOptions options;
+  options.used = used;
+  options.law = law_;
+  return refineJointly(physics_, start, whitening_, options);
+}
+
+RefinedModel GapSearch::refinedWithout(const GapModel& start, Eigen::Index frozen) const {
+  RefineOptions options;
+  options.law = law_;
+  options.frozen = frozen;
+  options.most_steps = 8;
+  return refineJointly(physics_, start, whitening_, options);
+}
+
+std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
+                                             const RefinedModel& base, const RunControl& control) const {
+  constexpr std::size_t kStarts = 5;
+  const EffectWay& chosen = ways_[way];
+  const Linearized& at = chosen.needs_time ? in_time : in_space;
+  TriedEffect tried;
+  tried.way = way;
+  tried.bic_gain = -std::numeric_limits<double>::infinity();
+  tried.scan = scan(at, *chosen.fit, chosen.fit->starts(), kStarts, control);
+  if (tried.scan.best.empty()) return std::nullopt;
+  refineFrom(tried.scan.best, at, base, tried);
+  tried.held_out_gain = std::accumulate(tried.scan.held_out_gain.begin(), tried.scan.held_out_gain.end(), 0.0);
+  return tried;
+}
+
+void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const RefinedModel& base,
+                           TriedEffect& tried) const {
+  const EffectWay& chosen = ways_[tried.way];
+  constexpr double kHopeful = 0.4;  // Of the best start's gain.
+  std::optional<LocalFit> best;
+  for (const ScanResult::Start& start : starts) {
+    if (best && start.gain < kHopeful * starts.front().gain) break;
+    LocalFit local = refineLocally(at, *chosen.fit, start.searched);
+    if (!best || local.gain > best->gain) best = std::move(local);
+  }
+  if (!best) return;
+  GapTerm term{chosen.effect, chosen.fit, best->searched, best->linear};
+  const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
+  const double sum = at.residual().squaredNorm();
+  const double left = std::max(1e-9 * sum, sum - best->gain);
+  const double gain = count * std::log(sum / left) - parametersOf(term) * std::log(count);
+  if (gain <= tried.bic_gain) return;
+  tried.bic_gain = gain;
+  tried.model = base.model;
+  tried.model.terms.push_back(std::move(term));
+}
+
+void GapSearch::shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                             const RefinedModel& base, const RunControl& control) const {
+  constexpr std::size_t kCenters = 4;
+  constexpr std::size_t kStarts = 2;
+  constexpr double kApart_m = 0.1;
+  std::vector<Eigen::Vector3d> centers_m;
+  for (const TriedEffect& one : tried) {
+    if (centers_m.size() >= kCenters) break;
+    const GapTerm& term = one.model.terms.back();
+    if (!term.fit->searchesPlace()) continue;
+    const Eigen::Vector3d center_m = term.searched.head<3>();
+    const auto is_near = [&](const Eigen::Vector3d& other_m) { return (other_m - center_m).norm() < kApart_m; };
+    if (std::none_of(centers_m.begin(), centers_m.end(), is_near)) centers_m.push_back(center_m);
+  }
+  for (TriedEffect& one : tried) {
+    const EffectWay& way = ways_[one.way];
+    if (!way.fit->searchesPlace() || control.stop.stop_requested()) continue;
+    const Linearized& at = way.needs_time ? in_time : in_space;
+    const ScanResult again = scan(at, *way.fit, startsAt(*way.fit, centers_m), kStarts, control);
+    refineFrom(again.best, at, base, one);
+    const double held_out = std::accumulate(again.held_out_gain.begin(), again.held_out_gain.end(), 0.0);
+    one.held_out_gain = std::max(one.held_out_gain, held_out);
+  }
+}
+
+void GapSearch::finish(TriedEffect& tried, double base_bic) const {
+  tried.refined = refined(tried.model);
+  tried.model = tried.refined.model;
+  const GapTerm& term = tried.model.terms.back();
+  tried.fitted = term.fit->describe(term.searched, term.linear);
+  tried.bic_gain = base_bic - bicOf(tried.model) - (tried.fitted.is_plausible ? 0.0 : kImplausibleCost);
+  if (term.effect->share_to_win > 0.0) tried.bic_gain -= term.effect->share_to_win * std::max(0.0, tried.bic_gain);
+}
+
+/// The linearised gain of a strong effect can be a fifth off, and flatters: whatever is near the best of those fitted
+/// exactly is fitted exactly too.
+void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const {
+  constexpr double kNear = 60.0;
+  constexpr double kNearNothing = 25.0;
+  constexpr double kNearShare = 0.2;
+  const double base_bic = bicOf(base.model);
+  double best = tried.empty() ? 0.0 : tried.front().bic_gain;
+  double margin = best < kNearNothing ? kNearNothing : std::max(kNear, kNearShare * best);
+  for (;;) {
+    std::vector<std::size_t> due;
+    for (std::size_t i = 0; i < tried.size(); ++i)
+      if (tried[i].refined.model.terms.empty() && tried[i].bic_gain >= best - margin) due.push_back(i);
+    if (due.empty() || control.stop.stop_requested()) return;
+    control.parallel_for(due.size(), [&](std::size_t k) { finish(tried[due[k]], base_bic); });
+    best = 0.0;
+    for (const TriedEffect& one : tried)
+      if (!one.refined.model.terms.empty()) best = std::max(best, one.bic_gain);
+    margin = std::clamp(best, kNearNothing, kNear);
+  }
+}
+
+std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunControl& control) const {
+  const Linearized in_space(physics_, base.model, whitening_, space_blocks_);
+  const Linearized in_time(physics_, base.model, whitening_, time_blocks_);
+  std::vector<TriedEffect> tried;
+  for (std::size_t way = 0; way < ways_.size(); ++way) {
+    if (control.stop.stop_requested()) return {};
+    if (auto one = tryWay(way, in_space, in_time, base, control)) tried.push_back(std::move(*one));
+  }
+  const auto better = [](const TriedEffect& a, const TriedEffect& b) { return a.bic_gain > b.bic_gain; };
+  std::stable_sort(tried.begin(), tried.end(), better);
+  shareCenters(tried, in_space, in_time, base, control);
+  std::stable_sort(tried.begin(), tried.end(), better);
+  finishBest(tried, base, control);
+  for (TriedEffect& one : tried) {
+    if (!one.refined.model.terms.empty()) continue;
+    const GapTerm& term = one.model.terms.back();
+    one.fitted = term.fit->describe(term.searched, term.linear);
+    if (!one.fitted.is_plausible) one.bic_gain -= kImplausibleCost;
+  }
+  std::stable_sort(tried.begin(), tried.end(), better);
+  std::vector<TriedEffect> of_each;
+  for (TriedEffect& one : tried) {
+    const bool is_new = std::none_of(of_each.begin(), of_each.end(), [&](const TriedEffect& other) {
+      return ways_[other.way].effect == ways_[one.way].effect;
+    });
+    if (is_new) of_each.push_back(std::move(one));
+  }
+  return of_each;
+}
+
+namespace {
+
+class Selector {
+ public:
+  Selector(const GapSearch& search, const EffectSelectionOptions& options, const RunControl& control)
+      : search_(search), options_(options), control_(control) {}
+
+  EffectSelection run() {
+    none_bic_ = search_.bicOf(search_.none().model);
+    if (options_.most_effects < 1) return finished({}, {});
+    const std::vector<TriedEffect> first = search_.rank(search_.none(), control_);
+    const TriedEffect* best = firstWorth(first, options_.least_gain_first);
+    if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);
+    EffectSelection selection = grown(*best);
+    const TriedEffect* other = firstOfOtherKind(first, *best);
+    if (other != nullptr && !control_.stop.stop_requested()) {
+      EffectSelection second = grown(*other);
+      if (second.bic_gain > selection.bic_gain) selection = std::move(second);
+    }
+    return finished(std::move(selection), first);
+  }
+
+ private:
+  /// The best effect worth adding: enough evidence, believable, and better on what it was not fitted to.
+  static const TriedEffect* firstWorth(const std::vector<TriedEffect>& tried, double least_gain) {
+    for (const TriedEffect& one : tried) {
+      if (one.bic_gain < least_gain) break;
+      if (one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
+    }
+    return nullptr;
+  }
+
+  /// Starts with one effect and adds others while they are worth it.
+  EffectSelection grown(const TriedEffect& first) {
+    EffectSelection selection;
+    const TriedEffect* next = &first;
+    std::vector<TriedEffect> following;
+    while (next != nullptr && !control_.stop.stop_requested()) {
+      add(*next, selection);
+      if (selection.ways.size() > 1) {
+        exchange(selection);
+        prune(selection);
+      }
+      if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
+      following = search_.rank(selection.model, control_);
+      next = firstWorth(following, options_.least_gain_more);
+    }
+    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
+    return selection;
+  }
+
+  /// One flexible thing in the room can pass for two errors of the instrument, and the other way round: the best of the
+  /// other kind is worth a start of its own where it explains a good part.
+  const TriedEffect* firstOfOtherKind(const std::vector<TriedEffect>& tried, const TriedEffect& best) const {
+    constexpr double kGoodPart = 0.4;
+    const auto is_in_room = [&](const TriedEffect& one) { return one.fitted.location_m.has_value(); };
+    for (const TriedEffect& one : tried) {
+      if (one.bic_gain < std::max(options_.least_gain_first, kGoodPart * best.bic_gain)) break;
+      if (is_in_room(one) != is_in_room(best) && one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
+    }
+    return nullptr;
+  }
+
+  EffectSelection finished(EffectSelection selection, const std::vector<TriedEffect>& first) {
+    if (selection.ways.empty()) selection.model = search_.none();
+    selection.first = first;
+    selection.alternatives = first;
+    if (selection.ways.size() > 1) findLeading(selection);
+    if (selection.ways.size() == 1) takeOver(selection);
+    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
+    return selection;
+  }
+
+  void add(const TriedEffect& tried, EffectSelection& selection) const {
+    selection.model = tried.refined.model.terms.empty() ? search_.refined(tried.model) : tried.refined;
+    selection.ways.push_back(tried.way);
+  }
+
+  RefinedModel without(const EffectSelection& selection, std::size_t term) const {
+    GapModel model = selection.model.model;
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(term));
+    return search_.refined(model);
+  }
+
+  /// Replaces earlier effects by others where these are better now that the last one is there.
+  void exchange(EffectSelection& selection) {
+    for (std::size_t term = 0; term + 1 < selection.ways.size(); ++term) {
+      const double bic = search_.bicOf(selection.model.model);
+      const RefinedModel rest = without(selection, term);
+      const std::vector<TriedEffect> tried = search_.rank(rest, control_);
+      if (tried.empty()) return;
+      const TriedEffect* best = firstWorth(tried, 0.0);
+      if (best == nullptr || search_.bicOf(best->model) > bic - 2.0) continue;
+      selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
+      selection.model = best->refined.model.terms.empty() ? search_.refined(best->model) : best->refined;
+      selection.ways.push_back(best->way);
+    }
+  }
+
+  /// Drops effects whose removal costs less than they are worth, the cheapest first.
+  void prune(EffectSelection& selection) {
+    while (selection.ways.size() > 1) {
+      const double bic = search_.bicOf(selection.model.model);
+      double least = options_.least_gain_more;
+      std::optional<std::size_t> cheapest;
+      RefinedModel best_rest;
+      for (std::size_t term = 0; term < selection.ways.size(); ++term) {
+        RefinedModel rest = without(selection, term);
+        const double cost = search_.bicOf(rest.model) - bic;
+        if (cost >= least) continue;
+        least = cost;
+        cheapest = term;
+        best_rest = std::move(rest);
+      }
+      if (!cheapest) return;
+      selection.model = std::move(best_rest);
+      selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(*cheapest));
+    }
+  }
+
+  /// A single effect that exchanging and dropping ended at may be fitted better than when it was first tried, or worse
+  /// than another alone.
+  void takeOver(EffectSelection& selection) const {
+    const double gain = none_bic_ - search_.bicOf(selection.model.model);
+    const effects::Effect* effect = search_.ways()[selection.ways.front()].effect;
+    for (TriedEffect& tried : selection.alternatives) {
+      if (search_.ways()[tried.way].effect != effect || tried.bic_gain >= gain) continue;
+      tried.way = selection.ways.front();
+      tried.refined = selection.model;
+      tried.model = selection.model.model;
+      tried.bic_gain = gain;
+    }
+    const TriedEffect* best = firstWorth(selection.alternatives, gain + 2.0);
+    if (best == nullptr || search_.ways()[best->way].effect == effect) return;
+    selection.ways.clear();
+    add(*best, selection);
+  }
+
+  /// The effect whose absence costs most leads; the candidates are its alternatives with the others present.
+  void findLeading(EffectSelection& selection) {
+    double most = -std::numeric_limits<double>::infinity();
+    RefinedModel rest;
+    for (std::size_t term = 0; term < selection.ways.size(); ++term) {
+      const RefinedModel reduced = without(selection, term);
+      const double cost = search_.bicOf(reduced.model);
+      if (cost > most) {
+        most = cost;
+        selection.leading = term;
+        rest = reduced;
+      }
+    }
+    selection.alternatives = search_.rank(rest, control_);
+    const double bic = search_.bicOf(selection.model.model);
+    const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
+    if (best == nullptr || search_.bicOf(best->model) > bic - 2.0) return;
+    selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+    add(*best, selection);
+    selection.leading = selection.ways.size() - 1;
+  }
+
+  const GapSearch& search_;
+  const EffectSelectionOptions& options_;
+  const RunControl& control_;
+  double none_bic_ = 0.0;
+};
+
+}  // namespace
+
+EffectSelection selectEffects(const GapSearch& search, const EffectSelectionOptions& options,
+                              const RunControl& control) {
+  return Selector(search, options, control).run();
+}
+
+}  // namespace fieldtrue::identify

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/core/run_control.h"
+#include "calib/identify/refine.h"
+#include "calib/identify/scan.h"
+#include "calib/identify/structure.h"
+
+namespace fieldtrue::identify {
+
+/// One way to fit one effect.
+struct EffectWay {
+  const effects::Effect* effect = nullptr;
+  std::shared_ptr<const effects::EffectFit> fit;
+  bool needs_time = false;  ///< Held out by blocks of time, not of space.
+};
+
+/// One effect tried on top of a model.
+struct TriedEffect {
+  std::size_t way = 0;  ///< Index into GapSearch::ways().
+  GapModel model;       ///< With it, all parameters refitted together.
+  RefinedModel refined;
+  double bic_gain = 0.0;       ///< Against the model without it.
+  double held_out_gain = 0.0;  ///< Fall of the held-out sum of squares over all blocks, whitened.
+  double held_out_before = 0.0;
+  effects::FittedEffect fitted;
+  ScanResult scan;
+};
+
+/// Whether the rig's tolerance is taken as stated or as the flexible fit of the residuals shows it.
+enum class NoiseFrom { kResiduals, kStated };
+
+/// What is common to all models of one recording, and the search among them.
+class GapSearch {
+ public:
+  /// @param rows outlives the search
+  GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed,
+            NoiseFrom noise = NoiseFrom::kResiduals);
+  GapSearch(const GapSearch&) = delete;
+  GapSearch& operator=(const GapSearch&) = delete;
+
+  const GapPhysics& physics() const { return physics_; }
+  const Whitening& whitening() const { return whitening_; }
+  const ResidualLaw& law() const { return law_; }
+  std::span<const EffectWay> ways() const { return ways_; }
+  std::span<const int> spaceBlocks() const { return space_blocks_; }
+  std::span<const int> timeBlocksOfRows() const { return time_blocks_; }
+  const RefinedModel& none() const { return none_; }
+  const Structure& structureOfNone() const { return structure_; }
+  const effects::FitDesign& design() const { return design_; }
+  double placingSd_m() const { return placing_sd_m_; }
+  double placingSd_rad() const { return placing_sd_rad_; }
+  /// RMS over the rows of the noise that the whitening takes positions to have: one whitened unit [mm].
+  double whitenedUnit_mm() const;
+  /// What of the placing counts as noise: where no tolerance is stated, no more than a person with a jig errs by.
+  double floorPlacingSd_m() const;
+  double floorPlacingSd_rad() const;
+
+  double bicOf(const GapModel& model) const;
+  RefinedModel refined(const GapModel& start, std::span<const char> used = {}) const;
+  /// All but one parameter refitted, counted as in RefinedModel::covariance.
+  RefinedModel refinedWithout(const GapModel& start, Eigen::Index frozen) const;
+  /// Every effect added to a model, best first; only the best way of each effect.
+  /// @param slow_only_near how far below the best a linearised gain may be for the full refinement
+  std::vector<TriedEffect> rank(const RefinedModel& base, const RunControl& control) const;
+
+ private:
+  enum class Channel { kPosition, kRotation };
+
+  void settleNoise();
+  double placingFrom(Channel channel, double present) const;
+  void settleWays();
+  std::optional<TriedEffect> tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
+                                    const RefinedModel& base, const RunControl& control) const;
+  /// Keeps the best of what local refinement makes of the starts, where it beats what `tried` has.
+  void refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const RefinedModel& base,
+                  TriedEffect& tried) const;
+  /// Where one thing in the room fits well, others may fit too: each is tried at the places of the best.
+  void shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                    const RefinedModel& base, const RunControl& control) const;
+  void finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const;
+  void finish(TriedEffect& tried, double base_bic) const;
+
+  const GapRows& rows_;
+  GapPhysics physics_;
+  std::vector<int> space_blocks_;
+  std::vector<int> time_blocks_;
+  double placing_sd_m_ = 0.0;
+  double placing_sd_rad_ = 0.0;
+  Whitening whitening_;
+  ResidualLaw law_;
+  RefinedModel none_;
+  Structure structure_;
+  std::vector<field::SensorSetting> settings_;
+  effects::FitDesign design_;
+  std::vector<EffectWay> ways_;
+};
+
+/// The effects that together explain a recording best, found by adding, exchanging and dropping.
+struct EffectSelection {
+  std::vector<TriedEffect> first;         ///< All effects on their own, best first.
+  std::vector<TriedEffect> alternatives;  ///< To the leading selected effect, with the others present; best first.
+  RefinedModel model;                     ///< With all selected effects; terms in the order they were added.
+  std::vector<std::size_t> ways;          ///< Of the terms.
+  std::size_t leading = 0;                ///< Term that explains most.
+  double bic_gain = 0.0;                  ///< Against no effect.
+};
+
+struct EffectSelectionOptions {
+  int most_effects = 4;
+  double least_gain_first = 8.0;  ///< BIC gain that the first effect needs.
+  double least_gain_more = 14.0;  ///< And every further one.
+};
+
+EffectSelection selectEffects(const GapSearch& search, const EffectSelectionOptions& options,
+                              const RunControl& control);
+
+}  // namespace fieldtrue::identify

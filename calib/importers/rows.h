@@ -1,0 +1,14 @@
+#pragma once
+
+#include "calib/importers/importer.h"
+
+/// The row of every importer, declared; each is defined in the file of its format, and registry.cpp orders them.
+namespace fieldtrue::importers {
+
+Importer anserImporter();
+Importer columnsImporter();
+Importer fcsvImporter();
+Importer plusImporter();
+Importer trajImporter();
+
+}  // namespace fieldtrue::importers

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/recording/sample_visits.h"
+
+namespace fieldtrue::recording {
+
+/// A line that stands out of the noise.
+struct SpectralLine {
+  double frequency_hz = 0.0;  ///< As seen, below half the rate.
+  double error_hz = 0.0;
+  double amplitude_sd = 0.0;  ///< In SDs of one reading's noise, RMS over the channels.
+  double p_value = 1.0;       ///< That the strongest of all frequencies searched stands out as much by chance.
+};
+
+/// The readings' power by frequency, every stop and channel scaled to its own noise and pooled.
+struct SampleSpectrum {
+  double rate_hz = 0.0;
+  std::size_t readings_per_stop = 0;  ///< Median.
+  std::size_t stops = 0;
+  double series = 0.0;  ///< Independent series pooled: stops (or parts of them) times channels.
+  std::vector<double> frequencies_hz;
+  std::vector<double> power;        ///< 1 = white noise; after prewhitening.
+  std::vector<double> background;   ///< Of the neighbourhood: what a line must stand out of.
+  std::vector<SpectralLine> lines;  ///< Strongest first.
+  double correlation = 0.0;         ///< Of successive readings, without the lines, corrected for the fitted means.
+  double correlation_sd = 0.0;
+};
+
+/// Pools the periodograms of all stops before looking for lines: what is invisible at one stop shows in a hundred.
+/// Noise coloured by the tracker's filter is prewhitened to first order, and a line must stand out of both sides of its
+/// neighbourhood.
+/// @return nothing where fewer than 4 stops of 16 readings are there, or their rate is unknown
+/// @source Lomb 1976; Scargle 1982; Welch 1967 for the pooling
+std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& visits, const TableMetadata& metadata);
+
+}  // namespace fieldtrue::recording

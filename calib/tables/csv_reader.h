@@ -1,0 +1,98 @@
+#pragma once
+
+#include <array>
+#include <deque>
+#include <istream>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "calib/core/error.h"
+#include "calib/core/pose.h"
+#include "calib/tables/line_reader.h"
+
+namespace fieldtrue {
+
+/// Streams a comma-separated table with a header row: columns by name, `#` lines of metadata above it, errors that
+/// name file, line and column. Accepts a byte-order mark, CRLF, blank lines and quoted fields within a line.
+///
+/// The field functions return a harmless value on failure and keep the first failure: look at error() once a row.
+class CsvReader {
+ public:
+  struct MetadataLine {
+    std::string key;
+    std::string value;
+    int line = 0;
+  };
+
+  /// Reads up to the header row.
+  /// @param name stands in messages
+  /// @param separator a blank also separates by runs of blanks
+  /// @param is_comment_header whether the header is the comment line `# columns = a,b,c`, as 3D Slicer writes it
+  /// @error kBadInput when there is no header, a column has no name or a name comes twice; kIo
+  static Result<CsvReader> open(std::istream& in, std::string name, char separator = ',',
+                                bool is_comment_header = false);
+
+  const std::string& name() const { return lines_.name(); }
+  const std::vector<std::string>& columns() const { return columns_; }
+  /// What stands above the header row.
+  const std::vector<MetadataLine>& metadata() const { return metadata_; }
+  /// Once the rows are read: that lines below the header row look like metadata but are comments; none when none do.
+  std::optional<std::string> noteOnLateMetadata() const;
+  std::optional<std::size_t> find(std::string_view column) const;
+  /// @error kBadInput naming the columns that are missing
+  Result<std::vector<std::size_t>> require(std::span<const std::string_view> columns) const;
+  /// Columns that only make sense together: all of them, or none.
+  /// @error kBadInput when some are missing
+  Result<std::optional<std::vector<std::size_t>>> group(std::span<const std::string_view> columns) const;
+  /// Header names that are not among the known ones.
+  std::vector<std::string> unknown(std::span<const std::string_view> known) const;
+
+  /// Steps to the next row. @return false at the end
+  /// @error kBadInput when a row has too few or too many fields or an open quote; kIo
+  Result<bool> next();
+  int line() const { return lines_.number(); }
+  bool lineHasNewline() const { return lines_.hasNewline(); }
+
+  std::string_view field(std::size_t column) const { return fields_[column]; }
+  bool isBlank(std::size_t column) const { return fields_[column].empty(); }
+  double number(std::size_t column);  ///< Finite.
+  int integer(std::size_t column);
+  std::optional<double> optionalNumber(std::optional<std::size_t> column);  ///< None where absent or blank.
+  std::optional<int> optionalInteger(std::optional<std::size_t> column);
+  /// A unit quaternion w x y z with w >= 0; none where the columns are absent or all blank.
+  std::optional<Eigen::Quaterniond> quaternion(const std::optional<std::vector<std::size_t>>& columns);
+
+  void failAt(std::size_t column, const std::string& what);
+  void failInLine(const std::string& what);
+  const std::optional<Error>& error() const { return error_; }
+
+ private:
+  CsvReader(std::istream& in, std::string name, char separator) : lines_(in, std::move(name)), separator_(separator) {}
+  Result<void> readHeader(bool is_comment_header);
+  std::optional<MetadataLine> metadataLine(char mark) const;
+  bool splitLine();
+  std::string_view takeQuoted(std::size_t& at);
+  Result<void> checkColumns() const;
+  std::string where() const;
+
+  LineReader lines_;
+  char separator_;
+  std::vector<std::string> columns_;
+  std::vector<MetadataLine> metadata_;
+  std::optional<MetadataLine> late_metadata_;  ///< The first below the header row.
+  int n_late_metadata_ = 0;
+  std::string line_;
+  std::vector<std::string_view> fields_;
+  std::deque<std::string> unquoted_;  ///< Fields of this line that held doubled quotes.
+  std::optional<Error> error_;
+};
+
+/// A finite number without anything around it but blanks; none otherwise.
+std::optional<double> parseFinite(std::string_view text);
+
+std::string_view trimBlanks(std::string_view text);
+
+}  // namespace fieldtrue

@@ -1,0 +1,348 @@
+#include "acquisition/sampling/node_sampler.h"
+
+#include <QTest>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "acquisition/sampling/shift_test.h"
+#include "acquisition/sampling/stillness.h"
+#include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::acquisition;
+
+namespace {
+
+constexpr double kRate_hz = 120.0;
+
+/// First-order autoregressive noise on all three axes about a place, with changes of the place over time.
+class NoisySensor {
+ public:
+  /// @param sd_m 3-D SD of one reading
+  NoisySensor(double sd_m, double correlation, std::uint64_t seed)
+      : axis_sd_m_(sd_m / std::sqrt(3.0)), correlation_(correlation), random_(seed) {
+    for (double& x : state_) x = normal_(random_);
+  }
+  std::function<Eigen::Vector3d(int)> path_m = [](int) { return Eigen::Vector3d::Zero(); };
+  Eigen::Vector3d place_m{0.8, -0.3, 0.2};
+
+  Sample next() {
+    Sample sample;
+    sample.time_s = n_ / kRate_hz;
+    sample.tracker_from_sensor.position_m = place_m + axis_sd_m_ * state_ + path_m(n_);
+    for (double& x : state_) x = correlation_ * x + std::sqrt(1 - correlation_ * correlation_) * normal_(random_);
+    ++n_;
+    return sample;
+  }
+
+ private:
+  double axis_sd_m_;
+  double correlation_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  Eigen::Vector3d state_ = Eigen::Vector3d::Zero();
+  int n_ = 0;
+};
+
+Eigen::Vector3d stepAt(int n, int when, double size_m) {
+  return n < when ? Eigen::Vector3d::Zero() : Eigen::Vector3d(size_m / std::sqrt(3.0) * Eigen::Vector3d::Ones());
+}
+
+}  // namespace
+
+class NodeSamplerTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void sixtyGoodSamplesAreAveraged() {
+    NodeSampler sampler;
+    QVERIFY(sampler.state() == TakeState::kIdle);
+    NoisySensor sensor(1e-4, 0.0, 1);
+    QVERIFY(sampler.add(sensor.next()) == TakeState::kIdle);
+    sampler.start();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int n = 0; n < 60; ++n) {
+      QVERIFY(sampler.state() == TakeState::kCollecting);
+      QCOMPARE(sampler.collected(), n);
+      const Sample sample = sensor.next();
+      sum += sample.tracker_from_sensor.position_m;
+      sampler.add(sample);
+    }
+    QVERIFY(sampler.state() == TakeState::kDone);
+    QCOMPARE(sampler.samples().size(), std::size_t{60});
+    QVERIFY(sampler.statistics());
+    if (sampler.statistics()->n_used == 60) {
+      QVERIFY(testing::near(sampler.statistics()->mean.position_m, sum / 60.0, 1e-12));
+    }
+    QVERIFY(testing::near(sampler.statistics()->mean.position_m, sensor.place_m, 1e-4));
+    QVERIFY(sampler.add(sensor.next()) == TakeState::kDone);
+    QCOMPARE(sampler.samples().size(), std::size_t{60});
+  }
+
+  void errorSamplesAreKeptButNeverAveraged() {
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 2);
+    int n_bad = 0;
+    for (int n = 0; sampler.state() == TakeState::kCollecting && n < 1000; ++n) {
+      Sample sample = sensor.next();
+      if (n % 3 == 0) {
+        sample.status = "k";
+        sample.tracker_from_sensor.position_m = {50.0, 50.0, 50.0};
+        ++n_bad;
+      } else if (n % 7 == 1) {
+        sample.tracker_from_sensor.position_m.x() = std::nan("");
+        ++n_bad;
+      }
+      sampler.add(sample);
+    }
+    QVERIFY(sampler.state() == TakeState::kDone);
+    QCOMPARE(sampler.collected(), 60);
+    QCOMPARE(sampler.samples().size(), std::size_t(60 + n_bad));
+    QVERIFY(sampler.statistics()->n_used <= 60 && sampler.statistics()->n_used > 50);
+    QVERIFY(testing::near(sampler.statistics()->mean.position_m, sensor.place_m, 1e-4));
+    QCOMPARE(sampler.restarts(), 0);
+  }
+
+  void motionStartsOver_data() {
+    QTest::addColumn<double>("sd_m");
+    QTest::addColumn<double>("correlation");
+    QTest::addColumn<int>("when");
+    QTest::newRow("no noise") << 0.0 << 0.0 << 30;
+    QTest::newRow("low noise") << 5e-5 << 0.0 << 30;
+    QTest::newRow("low noise, correlated") << 5e-5 << 0.9 << 30;
+    QTest::newRow("half a millimetre, correlated") << 5e-4 << 0.8 << 30;
+    QTest::newRow("a millimetre") << 1e-3 << 0.0 << 30;
+    QTest::newRow("0.7 mm, correlated") << 7e-4 << 0.5 << 30;
+    QTest::newRow("in mid-block") << 5e-5 << 0.0 << 25;
+    QTest::newRow("late") << 5e-5 << 0.5 << 48;
+  }
+  void motionStartsOver() {
+    QFETCH(double, sd_m);
+    QFETCH(double, correlation);
+    QFETCH(int, when);
+    int caught = 0;
+    for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+      NodeSampler sampler;
+      sampler.start();
+      NoisySensor sensor(sd_m, correlation, seed);
+      sensor.path_m = [when](int n) { return stepAt(n, when, 0.005); };
+      while (sampler.state() == TakeState::kCollecting) sampler.add(sensor.next());
+      QVERIFY(sampler.state() == TakeState::kDone);
+      const Eigen::Vector3d moved_to_m = sensor.place_m + stepAt(when, when, 0.005);
+      const bool clean = (sampler.statistics()->mean.position_m - moved_to_m).norm() < 1e-4 + 2.0 * sd_m;
+      caught += sampler.restarts() == 1 && clean && sampler.samples().size() == 60;
+    }
+    QVERIFY2(caught >= 49, qPrintable(QString("%1 of 50 takes that moved 5 mm started over").arg(caught)));
+  }
+
+  void reasonNamesTheMotion() {
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(0.0, 0.0, 1);
+    sensor.path_m = [](int n) { return stepAt(n, 30, 0.005); };
+    while (sampler.restarts() == 0) sampler.add(sensor.next());
+    QCOMPARE(sampler.message(), std::string("retaking: moved 5.0 mm"));
+    QCOMPARE(sampler.collected(), 0);
+  }
+
+  void turningStartsOver() {
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 3);
+    for (int n = 0; n < 200 && sampler.state() == TakeState::kCollecting; ++n) {
+      Sample sample = sensor.next();
+      if (n >= 30) sample.tracker_from_sensor.orientation = rotationFromVector({0, 0, 0.05});
+      sampler.add(sample);
+    }
+    QCOMPARE(sampler.restarts(), 1);
+    // 0.05 rad is 2.86 degrees.
+    QCOMPARE(sampler.statistics()->mean.orientation.z() > 0.02, true);
+  }
+
+  void slowDriftStartsOver() {
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 4);
+    sensor.path_m = [](int n) { return Eigen::Vector3d(0, 0, std::min(n, 90) / 60.0 * 0.004); };
+    while (sampler.state() == TakeState::kCollecting) sampler.add(sensor.next());
+    QVERIFY(sampler.restarts() >= 1);
+    QVERIFY(sampler.state() == TakeState::kDone);
+  }
+
+  /// A jig lifted by 3 cm and set down again within a second comes back to where it was: a curve, not a shift.
+  void liftingStartsOver() {
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 10);
+    sensor.path_m = [](int n) {
+      const double s = std::min(n / 120.0, 1.0);
+      return Eigen::Vector3d(0, 0, 0.03 * 4 * s * (1 - s));
+    };
+    while (sampler.state() == TakeState::kCollecting) sampler.add(sensor.next());
+    QVERIFY(sampler.restarts() >= 1);
+    FT_VERIFY_MATCH(testing::near(sampler.statistics()->mean.position_m, sensor.place_m, 5e-4));
+    StillnessDetector detector;
+    NoisySensor lifted(1e-4, 0.0, 11);
+    lifted.path_m = sensor.path_m;
+    for (int n = 0; n < 120; ++n) {
+      detector.add(lifted.next());
+      QVERIFY2(!detector.still(), qPrintable(QString("still at reading %1").arg(n)));
+    }
+  }
+
+  /// No false restart in 1,000 takes bounds the rate below 0.3 % with 95 % confidence (rule of three).
+  void restingSensorNeverStartsOver_data() {
+    QTest::addColumn<double>("sd_m");
+    QTest::addColumn<double>("correlation");
+    QTest::newRow("0.05 mm, 0.9") << 5e-5 << 0.9;
+    QTest::newRow("0.5 mm, 0.5") << 5e-4 << 0.5;
+    QTest::newRow("3 mm, white") << 3e-3 << 0.0;
+    QTest::newRow("3 mm, 0.5") << 3e-3 << 0.5;
+    QTest::newRow("3 mm, 0.8") << 3e-3 << 0.8;
+    QTest::newRow("8 mm, 0.8") << 8e-3 << 0.8;
+  }
+  void restingSensorNeverStartsOver() {
+    QFETCH(double, sd_m);
+    QFETCH(double, correlation);
+    int restarts = 0;
+    for (std::uint64_t take = 0; take < 1000; ++take) {
+      NodeSampler sampler;
+      sampler.start();
+      NoisySensor sensor(sd_m, correlation, 1000 + take);
+      while (sampler.state() == TakeState::kCollecting) sampler.add(sensor.next());
+      restarts += sampler.restarts();
+    }
+    QCOMPARE(restarts, 0);
+  }
+
+  void wildReadingsAreNoMotion() {
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 5);
+    sensor.path_m = [](int n) { return n % 20 == 7 ? Eigen::Vector3d(0.05, 0, 0) : Eigen::Vector3d::Zero(); };
+    while (sampler.state() == TakeState::kCollecting) sampler.add(sensor.next());
+    QCOMPARE(sampler.restarts(), 0);
+    QCOMPARE(sampler.statistics()->n_used, std::size_t{57});
+    QVERIFY(testing::near(sampler.statistics()->mean.position_m, sensor.place_m, 1e-4));
+  }
+
+  void timeLimitFailsWithItsReason_data() {
+    QTest::addColumn<QString>("what");
+    QTest::addColumn<QStringList>("words");
+    QTest::newRow("no signal") << "status" << QStringList{"within 30 s", "0 of 60 good samples", "reports error k"};
+    QTest::newRow("never still") << "motion" << QStringList{"started over", "moved", "let the sensor rest"};
+  }
+  void timeLimitFailsWithItsReason() {
+    QFETCH(QString, what);
+    QFETCH(QStringList, words);
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 6);
+    if (what == "motion") sensor.path_m = [](int n) { return stepAt(n % 40, 20, 0.02); };
+    double elapsed_s = 0.0;
+    while (sampler.state() == TakeState::kCollecting) {
+      Sample sample = sensor.next();
+      if (what == "status") sample.status = "k";
+      elapsed_s = sample.time_s;
+      sampler.add(sample);
+    }
+    QVERIFY(sampler.state() == TakeState::kFailed);
+    QVERIFY(std::abs(elapsed_s - 30.0) < 2.0 / kRate_hz);
+    for (const QString& word : words) {
+      QVERIFY2(QString::fromStdString(sampler.message()).contains(word), sampler.message().c_str());
+    }
+    QVERIFY(!sampler.statistics());
+  }
+
+  void startAndCancelDropEverything() {
+    NodeSampler sampler;
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 7);
+    for (int n = 0; n < 25; ++n) sampler.add(sensor.next());
+    sampler.cancel();
+    QVERIFY(sampler.state() == TakeState::kIdle);
+    QCOMPARE(sampler.collected(), 0);
+    QVERIFY(sampler.samples().empty());
+  }
+
+  void stillnessIsSaidInWords_data() {
+    QTest::addColumn<double>("sd_m");
+    QTest::addColumn<double>("speed_m_s");
+    QTest::addColumn<bool>("still");
+    QTest::newRow("resting") << 1e-4 << 0.0 << true;
+    QTest::newRow("resting, noisy") << 3e-3 << 0.0 << true;
+    QTest::newRow("20 mm/s") << 1e-4 << 0.02 << false;
+    QTest::newRow("4 mm/s") << 1e-5 << 0.004 << false;
+    QTest::newRow("carried") << 1e-3 << 0.5 << false;
+  }
+  void stillnessIsSaidInWords() {
+    QFETCH(double, sd_m);
+    QFETCH(double, speed_m_s);
+    QFETCH(bool, still);
+    StillnessDetector detector;
+    QVERIFY(!detector.still());
+    QCOMPARE(detector.reason(), std::string("waiting for the tracker"));
+    NoisySensor sensor(sd_m, 0.0, 8);
+    sensor.path_m = [speed_m_s](int n) { return Eigen::Vector3d(0, speed_m_s * n / kRate_hz, 0); };
+    for (int n = 0; n < 10; ++n) detector.add(sensor.next());
+    QVERIFY2(!detector.still(), "too short to tell");
+    for (int n = 0; n < 110; ++n) detector.add(sensor.next());
+    QVERIFY2(detector.still() == still, detector.reason().c_str());
+    if (still) {
+      QCOMPARE(detector.reason(), std::string("still"));
+      // 60 readings: the SD of an SD over 180 degrees of freedom is 5 %.
+      QVERIFY(std::abs(detector.spread_m() / sd_m - 1.0) < 0.25);
+    } else {
+      QVERIFY(std::abs(detector.speed_m_s() / speed_m_s - 1.0) < 0.1);
+      const QString words = QString("hold still: moving %1 mm/s").arg(std::lround(detector.speed_m_s() * 1e3));
+      QCOMPARE(QString::fromStdString(detector.reason()), words);
+    }
+  }
+
+  void lostSignalIsSaid() {
+    StillnessDetector detector;
+    NoisySensor sensor(1e-4, 0.0, 9);
+    for (int n = 0; n < 120; ++n) detector.add(sensor.next());
+    for (int n = 0; n < 60; ++n) {
+      Sample sample = sensor.next();
+      sample.status = "k";
+      detector.add(sample);
+    }
+    QVERIFY(!detector.still());
+    QCOMPARE(detector.reason(), std::string("no signal: the tracker reports error k"));
+  }
+
+  void suspicionIsSaidInWords_data() {
+    QTest::addColumn<int>("rejected");
+    QTest::addColumn<int>("restarts");
+    QTest::addColumn<double>("spread_m");
+    QTest::addColumn<QString>("expected");
+    QTest::newRow("fine") << 6 << 0 << 1e-3 << "";
+    QTest::newRow("rejected") << 7 << 0 << 1e-3 << "7 of 60 samples left out";
+    QTest::newRow("moved") << 0 << 2 << 1e-3 << "moved twice while sampling";
+    QTest::newRow("noisy") << 0 << 0 << 9e-3 << "SD 9 mm where its neighbours lead one to expect 1 mm";
+    QTest::newRow("both") << 30 << 1 << 1e-3 << "30 of 60 samples left out; moved once while sampling";
+  }
+  void suspicionIsSaidInWords() {
+    QFETCH(int, rejected);
+    QFETCH(int, restarts);
+    QFETCH(double, spread_m);
+    QFETCH(QString, expected);
+    NodeStatistics statistics;
+    statistics.mean.position_m = {1.0, 0.0, 0.0};
+    statistics.covariance_m2 = Eigen::Matrix3d::Identity() * spread_m * spread_m / 3.0;
+    statistics.n_used = std::size_t(60 - rejected);
+    statistics.rejections.resize(std::size_t(rejected));
+    // Two neighbours at the same range, one at half of it: 1 mm there means 16 mm here, the median stays 1 mm.
+    const std::vector<NeighbourTake> neighbours{{1e-3, 1.0}, {1e-3, 1.0}, {1e-3, 0.5}};
+    QCOMPARE(QString::fromStdString(suspicionOf(statistics, restarts, neighbours)), expected);
+    statistics.mean.position_m = {2.0, 0.0, 0.0};
+    QVERIFY2(suspicionOf(statistics, restarts, neighbours).find("SD") == std::string::npos,
+             "16 mm are to be expected at twice the range");
+  }
+};
+
+FIELDTRUE_TEST(NodeSamplerTest)
+#include "node_sampler_test.moc"

@@ -1,0 +1,120 @@
+#include <sys/resource.h>
+
+#include <QFileInfo>
+#include <QProcess>
+#include <QTemporaryDir>
+#include <QTest>
+#include <filesystem>
+
+#include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
+#include "tests/app/cli_program.h"
+#include "tests/support/matchers.h"
+#include "tests/support/synthetic.h"
+#include "tests/support/test_main.h"
+
+/// No command ends without a sentence: what does not fit into memory, and what is thrown.
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+
+namespace {
+
+QByteArray sizeOfProgram_kb(qint64 pid) {
+  for (const QByteArray& line : readWhole(QString("/proc/%1/status").arg(pid)).split('\n'))
+    if (line.startsWith("VmPeak:")) return line.mid(7).trimmed().split(' ').first();
+  return {};
+}
+
+}  // namespace
+
+class CliBarrierTest : public QObject {
+  Q_OBJECT
+
+  QTemporaryDir folder_;
+  QString at(const QString& name) const { return folder_.filePath(name); }
+
+  CliRun runWith(const QString& variable, const QString& value, const QStringList& arguments, rlim_t limit_bytes = 0) {
+    QProcess process;
+    QProcessEnvironment environment = QProcessEnvironment::systemEnvironment();
+    environment.insert(variable, value);
+    process.setProcessEnvironment(environment);
+    if (limit_bytes > 0)
+      process.setChildProcessModifier([limit_bytes] {
+        const rlimit limit{limit_bytes, limit_bytes};
+        ::setrlimit(RLIMIT_AS, &limit);
+      });
+    process.start(cliPath(), arguments);
+    process.closeWriteChannel();
+    return finished(process, 300000);
+  }
+
+ private slots:
+  void initTestCase() {
+    QVERIFY2(QFileInfo(cliPath()).isExecutable(), qPrintable(cliPath() + " is not built"));
+    SyntheticOptions options;
+    options.smooth_distortion_m = 0.02;
+    options.counts = {8, 8, 7};
+    FT_VERIFY_OK(writeNodeTable(std::filesystem::path(at("some.csv").toStdString()), syntheticTable(options)));
+    options.counts = {20, 20, 15};
+    FT_VERIFY_OK(writeNodeTable(std::filesystem::path(at("many.csv").toStdString()), syntheticTable(options)));
+  }
+
+  void aFitBeyondMemoryIsRefused() {
+    const CliRun run = runWith("FIELDTRUE_MEMORY_MIB", "1",
+                               {"fit", "--nodes", at("some.csv"), "--position", "hmq", "--out", at("no.ftcal.json")});
+    FT_VERIFY_STATUS(run, 1);
+    QCOMPARE(run.out, QByteArray());
+    QCOMPARE(run.err.count('\n'), qsizetype{1});
+    FT_VERIFY_MATCH(holdsAll(run.err.toStdString(),
+                             {"Hardy's multiquadric on 448 places needs about 14 MiB", "80 % of the 1 MiB"}));
+    QVERIFY(!QFileInfo::exists(at("no.ftcal.json")));
+  }
+
+  void theComparisonSkipsIt() {
+    const CliRun run = runWith("FIELDTRUE_MEMORY_MIB", "1",
+                               {"compare", "--nodes", at("some.csv"), "--methods", "none,affine,hmq", "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    const nlohmann::json position = run.json().at("position");
+    QVERIFY(position.at(1).at("skipped").is_null());
+    FT_VERIFY_MATCH(holdsAll(position.at(2).at("skipped").get<std::string>(), {"80 % of the 1 MiB"}));
+  }
+
+  /// The system itself refuses: the estimate was told that there is plenty.
+  void memoryThatIsNotThereIsOneSentence() {
+    QProcess idle;
+    idle.start(cliPath(), {"emulate", "fastrak", "--listen", "0"});
+    QVERIFY(idle.waitForReadyRead(30000));
+    const auto program_kb = sizeOfProgram_kb(idle.processId()).toULongLong();
+    idle.terminate();
+    QVERIFY(idle.waitForFinished(30000));
+    QVERIFY(program_kb > 0);
+    // Room for everything but a matrix of 6,000 x 6,000 numbers, which takes 144 MB even in single precision.
+    const CliRun run = runWith("FIELDTRUE_MEMORY_MIB", "1000000",
+                               {"fit", "--threads", "1", "--nodes", at("many.csv"), "--position", "hmq:r2_cm2=100",
+                                "--out", at("none.ftcal.json")},
+                               1024 * program_kb + 100 * 1024 * 1024);
+    FT_VERIFY_STATUS(run, 1);
+    QCOMPARE(run.err.count('\n'), qsizetype{1});
+    FT_VERIFY_MATCH(holdsAll(run.err.toStdString(), {"not enough memory", "no file was left half written"}));
+    QVERIFY(!QFileInfo::exists(at("none.ftcal.json")));
+  }
+
+  /// A name on this system need not be UTF-8; JSON must be.
+  void aNameInAnotherEncodingIsNoEnd() {
+    const CliRun run = runCli({"methods", "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    QProcess shell;
+    shell.start(
+        "/bin/sh",
+        {"-c", "exec \"$0\" fit --json --nodes \"$1\" --position affine --out \"$2/$(printf 'a\\351.ftcal.json')\"",
+         cliPath(), at("some.csv"), folder_.path()});
+    const CliRun named = finished(shell, 60000);
+    FT_VERIFY_STATUS(named, 0);
+    QVERIFY(named.json().is_object());
+    // Qt cannot name it either, and so would leave the folder behind.
+    QVERIFY(std::filesystem::remove(folder_.path().toStdString() + "/a\351.ftcal.json"));
+  }
+};
+
+FIELDTRUE_TEST(CliBarrierTest)
+#include "cli_barrier_test.moc"

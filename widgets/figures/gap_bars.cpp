@@ -1,0 +1,162 @@
+#include "widgets/figures/gap_bars.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/core/number_text.h"
+#include "calib/effects/registry.h"
+
+namespace fieldtrue::widgets {
+namespace {
+
+std::string percent(double share) { return std::to_string(std::lround(100.0 * share)) + " %"; }
+
+std::string millimetres(double value, const std::optional<double>& low, const std::optional<double>& high) {
+  std::string text = shortNumber(value) + " mm";
+  if (low && high) text += " (" + shortNumber(*low) + " to " + shortNumber(*high) + ")";
+  return text;
+}
+
+std::string noteOf(const gap::GapCandidate& candidate) {
+  std::string note;
+  for (const std::string& id : candidate.equivalents) {
+    if (id == candidate.effect) continue;
+    note += (note.empty() ? "cannot be told from " : " or ") + effectLabel(id);
+  }
+  if (!candidate.is_plausible && !candidate.doubt.empty())
+    note += (note.empty() ? "doubtful: " : "; doubtful: ") + candidate.doubt;
+  return note;
+}
+
+GapBarChart binChart(const char* id, const std::string& title, const std::vector<gap::GapBin>& bins, const char* unit) {
+  GapBarChart chart{id, title, {}};
+  for (const gap::GapBin& bin : bins) {
+    GapBar bar;
+    bar.name = shortNumber(bin.low) + " to " + shortNumber(bin.high) + " " + unit;
+    bar.value = bin.rms_mm;
+    bar.floor = bin.floor_mm;
+    bar.text = shortNumber(bin.rms_mm) + " mm";
+    chart.bars.push_back(std::move(bar));
+  }
+  return chart;
+}
+
+}  // namespace
+
+double GapBarChart::maximum() const {
+  double most = 0.0;
+  for (const GapBar& bar : bars) most = std::max({most, bar.value, bar.high90.value_or(0.0), bar.floor.value_or(0.0)});
+  return most > 0.0 ? most : 1.0;
+}
+
+std::string effectLabel(const std::string& id) { return id == "none" ? "No effect" : effects::labelOf(id); }
+
+GapBarChart waterfallChart(const gap::GapReport& report) {
+  GapBarChart chart{"waterfall", "Error above noise as each cause is added (mm, 90 % range)", {}};
+  for (const gap::GapStep& step : report.sequence) {
+    GapBar bar;
+    bar.name = step.effect.empty() ? "As simulated now" : "+ " + effectLabel(step.effect);
+    bar.value = step.excess_mm;
+    bar.low90 = step.low90_mm;
+    bar.high90 = step.high90_mm;
+    bar.text = millimetres(step.excess_mm, step.low90_mm, step.high90_mm);
+    chart.bars.push_back(std::move(bar));
+  }
+  if (chart.bars.empty()) return chart;
+  GapBar floor;
+  floor.name = "Noise floor";
+  floor.text = "0 mm (noise itself: " + shortNumber(report.floor_position_mm) + " mm)";
+  floor.muted = true;
+  chart.bars.push_back(std::move(floor));
+  return chart;
+}
+
+GapBarChart probabilityChart(const gap::GapReport& report, std::size_t most) {
+  GapBarChart chart{"probability", "How probable each cause is", {}};
+  for (const gap::GapCandidate& candidate : report.candidates) {
+    if (chart.bars.size() == most) break;
+    GapBar bar;
+    bar.name = effectLabel(candidate.effect);
+    bar.value = candidate.probability;
+    bar.text = percent(candidate.probability);
+    bar.note = noteOf(candidate);
+    bar.muted = !candidate.is_plausible;
+    chart.bars.push_back(std::move(bar));
+  }
+  return chart;
+}
+
+GapBarChart shrinkageChart(const gap::GapReport& report, std::size_t most) {
+  GapBarChart chart{"shrinkage", "How much of the gap it takes away (places the fit did not see)", {}};
+  const std::size_t shown = std::min(most, report.candidates.size());
+  for (std::size_t i = 0; i < shown; ++i) {
+    const gap::GapCandidate& candidate = report.candidates[i];
+    if (candidate.effect == "none") continue;
+    GapBar bar;
+    bar.name = effectLabel(candidate.effect);
+    bar.value = std::max(0.0, candidate.shrinkage.fraction);
+    bar.low90 = candidate.shrinkage.low90;
+    bar.high90 = candidate.shrinkage.high90;
+    bar.text = percent(candidate.shrinkage.fraction);
+    bar.muted = !candidate.is_plausible;
+    chart.bars.push_back(std::move(bar));
+  }
+  return chart;
+}
+
+GapBarChart rangeChart(const gap::GapReport& report) {
+  return binChart("range", "Gap by distance from the transmitter (mm; tick: noise)", report.by_range, "m");
+}
+
+GapBarChart timeChart(const gap::GapReport& report) {
+  return binChart("time", "Gap by time (mm; tick: noise)", report.by_time, "s");
+}
+
+GapBarChart originChart(const gap::GapReport& report) {
+  GapBarChart chart{"origin", "Where the gap comes from", {}};
+  const auto add = [&chart](const char* name, double share) {
+    GapBar bar;
+    bar.name = name;
+    bar.value = share;
+    bar.text = percent(share);
+    chart.bars.push_back(std::move(bar));
+  };
+  add("Room", report.origin.room);
+  add("Transmitter", report.origin.transmitter);
+  add("Sensor", report.origin.sensor);
+  add("Jig or time", report.origin.jig_or_time);
+  return chart;
+}
+
+std::vector<GapBarChart> gapCharts(const gap::GapReport& report) {
+  std::vector<GapBarChart> charts = {waterfallChart(report), probabilityChart(report), shrinkageChart(report),
+                                     originChart(report),    rangeChart(report),       timeChart(report)};
+  std::erase_if(charts, [](const GapBarChart& chart) { return chart.bars.empty(); });
+  return charts;
+}
+
+std::string gapHeadline(const gap::GapReport& report) {
+  std::string names;
+  for (const gap::SelectedEffect& effect : report.selected)
+    names += (names.empty() ? ": " : ", ") + effectLabel(effect.effect);
+  switch (report.verdict) {
+    case gap::GapVerdict::kNoGap:
+      return "The simulation matches the recording";
+    case gap::GapVerdict::kExplained:
+      return "Explained" + names;
+    case gap::GapVerdict::kPartlyExplained:
+      return "Partly explained" + names;
+    case gap::GapVerdict::kUnexplained:
+      return "Not explained by any known effect";
+  }
+  return {};
+}
+
+std::string predictionText(const gap::GapReport& report) {
+  if (report.predictions.empty()) return {};
+  const gap::Prediction& p = report.predictions.front();
+  return report.names.of(p.node) + " falls from " + shortNumber(p.now_mm) + " to " + shortNumber(p.then_mm) + " +- " +
+         shortNumber(p.then_sd_mm) + " mm without: " + effectLabel(p.effect) + ".";
+}
+
+}  // namespace fieldtrue::widgets

@@ -1,0 +1,499 @@
+#include "widgets/workbench/workbench.h"
+
+#include <QDateTime>
+#include <QDir>
+#include <QFile>
+#include <QFileInfo>
+#include <QSettings>
+#include <QStandardPaths>
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+
+#include "acquisition/plan/place_state.h"
+#include "acquisition/session/guarded_call.h"
+#include "calib/calibration/alignment.h"
+#include "calib/core/thread_pool.h"
+#include "calib/recording/unit_slip.h"
+#include "calib/tables/json_text.h"
+#include "calib/tables/table_sensors.h"
+#include "widgets/style/unit_texts.h"
+#include "widgets/workbench/background.h"
+#include "widgets/workbench/fitted_methods.h"
+
+namespace fieldtrue::widgets {
+namespace {
+
+constexpr int kRecentSessions = 6;
+/// A table with many rows costs the pages time: they are told of its changes no oftener than this for each row.
+constexpr double kTableInterval_ms = 0.05;
+
+}  // namespace
+
+Workbench::Workbench(QObject* parent) : QObject(parent) {
+  qRegisterMetaType<acquisition::AcquisitionStatus>();
+  qRegisterMetaType<Node>();
+  qRegisterMetaType<CalibrationTable>();
+  qRegisterMetaType<SampleTable>();
+  qRegisterMetaType<acquisition::DeviceState>();
+  table_timer_.setSingleShot(true);
+  connect(&table_timer_, &QTimer::timeout, this, &Workbench::tableChanged);
+  controller_ = new acquisition::AcquisitionController;
+  controller_->moveToThread(&thread_);
+  connect(&thread_, &QThread::finished, controller_, &QObject::deleteLater);
+  wireController();
+  thread_.setObjectName(QStringLiteral("acquisition"));
+  thread_.start();
+}
+
+Workbench::~Workbench() {
+  emit closing();
+  fit_jobs_.stop();
+  comparison_jobs_.stop();
+  const auto leave = [this] {
+    acquisition::guarded(*controller_, [this] { controller_->closeSession(); });
+    acquisition::guarded(*controller_, [this] { controller_->disconnectDevice(); });
+  };
+  QMetaObject::invokeMethod(controller_, leave, Qt::BlockingQueuedConnection);
+  thread_.quit();
+  thread_.wait();
+  QThreadPool::globalInstance()->waitForDone();
+}
+
+template <class... Arguments, class... Given>
+void Workbench::post(void (acquisition::AcquisitionController::*slot)(Arguments...), Given&&... given) {
+  QMetaObject::invokeMethod(
+      controller_,
+      [this, slot, ... values = std::decay_t<Given>(given)] {
+        acquisition::guarded(*controller_, [&] { (controller_->*slot)(values...); });
+      },
+      Qt::QueuedConnection);
+}
+
+void Workbench::wireController() {
+  connect(controller_, &acquisition::AcquisitionController::statusChanged, this, &Workbench::onStatus);
+  connect(controller_, &acquisition::AcquisitionController::tablesReady, this, &Workbench::onTables);
+  connect(controller_, &acquisition::AcquisitionController::placeChanged, this, &Workbench::onPlace);
+  connect(controller_, &acquisition::AcquisitionController::looseKept, this,
+          [this](const std::vector<SampleRow>& rows) {
+            loose_samples_.insert(loose_samples_.end(), rows.begin(), rows.end());
+          });
+  connect(controller_, &acquisition::AcquisitionController::metadataChanged, this,
+          [this](const TableMetadata& metadata) {
+            table_.metadata = metadata;
+            changeTable();
+          });
+  connect(controller_, &acquisition::AcquisitionController::remarked, this, [this](const QString& remark) {
+    showMessage({remark, Severity::kAttention, {}, {}, QStringLiteral("session/remark/") + remark});
+  });
+  connect(controller_, &acquisition::AcquisitionController::sessionOpened, this, &Workbench::onSessionOpened);
+  connect(controller_, &acquisition::AcquisitionController::fitOpened, this, &Workbench::onFitOpened);
+  connect(controller_, &acquisition::AcquisitionController::nodeStored, this, &Workbench::onNodeStored);
+  connect(controller_, &acquisition::AcquisitionController::takeFailed, this, &Workbench::onTakeFailed);
+  connect(controller_, &acquisition::AcquisitionController::takeRefused, this, &Workbench::onTakeRefused);
+  connect(controller_, &acquisition::AcquisitionController::finished, this, [this] {
+    showMessage({tr("Every place is done."), Severity::kInfo, tr("Compare the methods"),
+                 [this] { goToPage(QStringLiteral("compare")); }, QStringLiteral("session/finished")});
+  });
+  connect(controller_, &acquisition::AcquisitionController::deviceFailed, this, [this](const QString& text) {
+    showMessage({text, Severity::kDanger, {}, {}, QStringLiteral("device")});
+  });
+  connect(controller_, &acquisition::AcquisitionController::deviceBack, this, [this] {
+    endCondition(QStringLiteral("device"));
+    showMessage({tr("The tracker is back."), Severity::kInfo, {}, {}});
+  });
+  connect(controller_, &acquisition::AcquisitionController::failed, this, [this](const QString& message) {
+    showMessage({message, Severity::kDanger, {}, {}, QStringLiteral("session/failed")});
+  });
+}
+
+QString Workbench::nameOf(int place) const {
+  const auto index = static_cast<std::size_t>(place);
+  return place < 0 || index >= status_.session->places.size()
+             ? QString()
+             : QString::fromStdString(placeName(status_.session->places[index]));
+}
+
+void Workbench::onNodeStored(int place, const Node& node, const QString& suspicious) {
+  emit nodeStored(place, node, suspicious);
+  for (const char* kind : {"session/take/%1", "session/look/%1"}) endCondition(QString::fromLatin1(kind).arg(place));
+  endCondition(QStringLiteral("session/failed"));
+  if (suspicious.isEmpty()) return;
+  spoken_of_.insert(place);
+  showMessage({tr("%1: stored, but look at it: %2").arg(nameOf(place), suspicious), Severity::kAttention,
+               tr("Retake it"), [this, place] { goTo(place); }, QStringLiteral("session/look/%1").arg(place)});
+}
+
+void Workbench::onTakeFailed(const QString& reason, int place) {
+  if (place >= 0) spoken_of_.insert(place);
+  showMessage(
+      {reason, Severity::kAttention, {}, {}, place < 0 ? QString() : QStringLiteral("session/take/%1").arg(place)});
+}
+
+void Workbench::onTakeRefused(int place, double off_m) {
+  showMessage({tr("%1 is not taken: the sensor is %2 away from it. Carry it there, or press Space again to take it "
+                  "here all the same.")
+                   .arg(nameOf(place), distanceText(off_m)),
+               Severity::kAttention,
+               {},
+               {},
+               QStringLiteral("session/refused")});
+}
+
+void Workbench::tellMisfits(const acquisition::AcquisitionStatus& before, const acquisition::AcquisitionStatus& now) {
+  const auto has = [](const acquisition::AcquisitionStatus& status, std::size_t place) {
+    return std::any_of(status.recorded->misfits.begin(), status.recorded->misfits.end(),
+                       [place](const acquisition::PlaceMisfit& misfit) { return misfit.place == place; });
+  };
+  for (const acquisition::PlaceMisfit& misfit : before.recorded->misfits)
+    if (!has(now, misfit.place)) endCondition(QStringLiteral("session/misfit/%1").arg(misfit.place));
+  for (const acquisition::PlaceMisfit& misfit : now.recorded->misfits) {
+    if (std::find(before.recorded->misfits.begin(), before.recorded->misfits.end(), misfit) !=
+        before.recorded->misfits.end())
+      continue;
+    const int place = static_cast<int>(misfit.place);
+    showMessage({tr("%1 does not fit the others: %2 off.").arg(nameOf(place), distanceText(misfit.off_m)),
+                 Severity::kAttention, tr("Retake it"), [this, place] { goTo(place); },
+                 QStringLiteral("session/misfit/%1").arg(place)});
+  }
+}
+
+void Workbench::endWhatIsOver(const acquisition::AcquisitionStatus& now) {
+  if (now.device != status_.device && now.device != acquisition::DeviceState::kFailed)
+    endCondition(QStringLiteral("device"));
+  if (!now.refused) endCondition(QStringLiteral("session/refused"));
+  if (now.current) endCondition(QStringLiteral("session/finished"));
+  if (now.recorded->revision == status_.recorded->revision) return;
+  for (auto place = spoken_of_.begin(); place != spoken_of_.end();) {
+    const auto index = static_cast<std::size_t>(*place);
+    const acquisition::PlaceState state =
+        index < now.recorded->states.size() ? now.recorded->states[index] : acquisition::PlaceState::kDone;
+    const QString number = QString::number(*place);
+    if (state != acquisition::PlaceState::kSuspicious) endCondition(QStringLiteral("session/look/") + number);
+    const bool over = state == acquisition::PlaceState::kDone || state == acquisition::PlaceState::kSkipped;
+    if (over) endCondition(QStringLiteral("session/take/") + number);
+    place = over ? spoken_of_.erase(place) : std::next(place);
+  }
+}
+
+void Workbench::onStatus(const acquisition::AcquisitionStatus& status) {
+  endWhatIsOver(status);
+  const acquisition::AcquisitionStatus before = std::exchange(status_, status);
+  if (before.recorded->revision != status_.recorded->revision) tellMisfits(before, status_);
+  const bool running = status.device == acquisition::DeviceState::kRunning;
+  if (running && !demonstration_path_.isEmpty() && status.session->path == demonstration_path_) {
+    demonstration_path_.clear();
+    setAutomatic(true);
+  }
+  emit statusChanged(status_);
+}
+
+void Workbench::onTables(const CalibrationTable& table, const SampleTable& samples) {
+  std::map<std::pair<int, int>, PlaceRows*> by_key;
+  for (PlaceRows& place : places_) {
+    place.row.reset();
+    place.samples.clear();
+    by_key[{place.node, place.visit}] = &place;
+  }
+  loose_samples_.clear();
+  for (const Node& node : table.nodes) {
+    if (const auto at = by_key.find({node.node, node.visit}); at != by_key.end()) at->second->row = node;
+  }
+  for (const SampleRow& row : samples.rows) {
+    const auto at = by_key.find({row.node, row.visit});
+    if (row.node < 0) {
+      loose_samples_.push_back(row);
+    } else if (at != by_key.end()) {
+      at->second->samples.push_back(row.sample);
+    }
+  }
+  table_.metadata = table.metadata;
+  changeTable();
+}
+
+void Workbench::onPlace(int place, const std::optional<Node>& node, const std::vector<Sample>& samples) {
+  if (static_cast<std::size_t>(place) >= places_.size()) return;
+  places_[static_cast<std::size_t>(place)].row = node;
+  places_[static_cast<std::size_t>(place)].samples = samples;
+  changeTable();
+}
+
+void Workbench::changeTable() {
+  table_is_stale_ = true;
+  ++rows_version_;
+  refusal_.clear();
+  if (!table_timer_.isActive()) {
+    table_timer_.start(static_cast<int>(kTableInterval_ms * static_cast<double>(places_.size())));
+  }
+}
+
+const CalibrationTable& Workbench::table() const {
+  if (!table_is_stale_) return table_;
+  table_is_stale_ = false;
+  table_.nodes.clear();
+  for (const PlaceRows& place : places_) {
+    const bool is_meant = place.row && (!chosen_sensor_ || place.row->sensor == *chosen_sensor_);
+    if (is_meant) table_.nodes.push_back(*place.row);
+  }
+  return table_;
+}
+
+CalibrationTable Workbench::recordedTable() const {
+  CalibrationTable all{table_.metadata, {}};
+  for (const PlaceRows& place : places_) {
+    if (place.row) all.nodes.push_back(*place.row);
+  }
+  return all;
+}
+
+std::vector<int> Workbench::sensors() const { return sensorsOf(recordedTable()); }
+
+void Workbench::chooseSensor(int sensor) {
+  if (chosen_sensor_ == sensor) return;
+  comparison_jobs_.stop();
+  chosen_sensor_ = sensor;
+  refusal_.clear();
+  endCondition(QStringLiteral("session/table"));
+  comparison_.reset();
+  table_is_stale_ = true;
+  ++rows_version_;
+  emit comparisonChanged();
+  emit tableChanged();
+}
+
+bool Workbench::mayUse(const CalibrationTable& table, const std::function<void()>& then) {
+  refusal_.clear();
+  endCondition(QStringLiteral("session/table"));
+  if (const auto rows = rowsOfSensor(table, std::nullopt); !rows) {
+    refuse(rows.error().message, {}, {});
+  } else if (const auto units = recording::checkUnits(table); !units && !uses_any_units_) {
+    refuse(units.error().message, tr("Use anyway"), [this, then, path = session_path_] {
+      if (path != session_path_) return;
+      uses_any_units_ = true;
+      refusal_.clear();
+      emit tableChanged();
+      if (then) then();
+    });
+  }
+  return refusal_.isEmpty();
+}
+
+void Workbench::refuse(const std::string& why, const QString& action_label, std::function<void()> action) {
+  refusal_ = QString::fromStdString(why) + QLatin1Char('.');
+  refusal_[0] = refusal_[0].toUpper();
+  showMessage({refusal_, Severity::kAttention, action_label, std::move(action), QStringLiteral("session/table")});
+}
+
+SampleTable Workbench::samples() const {
+  SampleTable all{table_.metadata, {}};
+  for (const PlaceRows& place : places_) {
+    for (const Sample& sample : place.samples) all.rows.push_back({place.node, place.visit, sample});
+  }
+  all.rows.insert(all.rows.end(), loose_samples_.begin(), loose_samples_.end());
+  return all;
+}
+
+SampleTable Workbench::samplesAt(int node) const {
+  SampleTable some{table_.metadata, {}};
+  for (const PlaceRows& place : places_) {
+    if (place.node != node) continue;
+    for (const Sample& sample : place.samples) some.rows.push_back({place.node, place.visit, sample});
+  }
+  return some;
+}
+
+void Workbench::onSessionOpened(const QString& path, const QString& page, const QString& plan_json) {
+  if (path == session_path_) {  // It was open all along.
+    emit pageRequested(page == QStringLiteral("start") ? QStringLiteral("acquire") : page);
+    return;
+  }
+  stopComparing();
+  session_path_ = path;
+  table_ = {};
+  table_is_stale_ = false;
+  loose_samples_.clear();
+  chosen_sensor_.reset();
+  uses_any_units_ = false;
+  refusal_.clear();
+  comparison_.reset();
+  corrector_.reset();
+  spoken_of_.clear();
+  endCondition(QStringLiteral("session"));
+  const auto plan = parseJson(plan_json.toStdString(), path.toStdString()).and_then([&](const nlohmann::json& json) {
+    return acquisition::planFromJson(json, path.toStdString());
+  });
+  plan_ = plan ? *plan : acquisition::Plan{};
+  places_.clear();
+  for (const PlannedPlace& place : places(plan_)) places_.push_back({place.node, place.visit, {}, {}});
+  rememberSession(path);
+  emit sessionChanged();
+  emit comparisonChanged();
+  emit correctorChanged();
+  post(&acquisition::AcquisitionController::requestTables);
+  emit pageRequested(page);
+}
+
+void Workbench::onFitOpened(const QString& ftcal_text) {
+  Result<calibration::Corrector> loaded =
+      calibration::Corrector::fromText(ftcal_text.toStdString(), session_path_.toStdString());
+  if (!loaded) {
+    showMessage(
+        {QString::fromStdString(loaded.error().message), Severity::kAttention, {}, {}, QStringLiteral("session/fit")});
+    return;
+  }
+  corrector_ = std::move(*loaded);
+  emit correctorChanged();
+}
+
+bool Workbench::correctorIsCurrent() const {
+  if (!corrector_) return false;
+  const auto same = [](const Node& a, const Node& b) {
+    return a.node == b.node && a.sensor == b.sensor && a.visit == b.visit &&
+           a.tracker_from_sensor.position_m == b.tracker_from_sensor.position_m;
+  };
+  const std::vector<Node> now = fitRows(table());
+  const std::vector<Node>& then = corrector_->table().nodes;
+  return std::equal(now.begin(), now.end(), then.begin(), then.end(), same);
+}
+
+bool Workbench::correctorCorrects() const {
+  return corrector_ && (corrector_->choice().position_id != "none" || corrector_->choice().orientation_id != "none");
+}
+
+void Workbench::rememberSession(const QString& path) {
+  QSettings settings;
+  QStringList recent = settings.value(QStringLiteral("recent")).toStringList();
+  recent.removeAll(path);
+  recent.prepend(path);
+  settings.setValue(QStringLiteral("recent"), QStringList(recent.mid(0, kRecentSessions)));
+}
+
+void Workbench::startDemonstration() {
+  demonstration_path_ = freshSessionPath(QStringLiteral("demonstration"));
+  connectDevice(QStringLiteral("simulated:speed=3,travel_s=1"), builtInScene(QStringLiteral("steel_floor")));
+  acquisition::Plan plan;
+  createSession(demonstration_path_, plan, 60);
+}
+
+void Workbench::connectDevice(const QString& device, const QString& scene_path) {
+  post(&acquisition::AcquisitionController::connectDevice, device, scene_path);
+}
+
+void Workbench::disconnectDevice() { post(&acquisition::AcquisitionController::disconnectDevice); }
+
+void Workbench::createSession(const QString& path, const acquisition::Plan& plan, int samples_per_node) {
+  post(&acquisition::AcquisitionController::setSamplesPerNode, samples_per_node);
+  post(&acquisition::AcquisitionController::openSession, path, QString::fromStdString(toJson(plan).dump()));
+}
+
+void Workbench::openSession(const QString& path) {
+  post(&acquisition::AcquisitionController::openSession, path, QString());
+}
+
+void Workbench::take() { post(&acquisition::AcquisitionController::take); }
+void Workbench::cancelTake() { post(&acquisition::AcquisitionController::cancelTake); }
+void Workbench::skip() { post(&acquisition::AcquisitionController::skip); }
+void Workbench::undo() { post(&acquisition::AcquisitionController::undo); }
+void Workbench::redo() { post(&acquisition::AcquisitionController::redo); }
+void Workbench::goTo(int place) { post(&acquisition::AcquisitionController::goTo, place); }
+void Workbench::setAutomatic(bool automatic) { post(&acquisition::AcquisitionController::setAutomatic, automatic); }
+
+void Workbench::compare(const evaluation::ComparisonOptions& options, MethodCount count) {
+  comparison_jobs_.stop();
+  endCondition(QStringLiteral("session/compare"));
+  if (!mayUse(table())) {
+    comparison_.reset();
+    emit comparisonChanged();
+    return;
+  }
+  comparison_jobs_.run([table = table(), options](
+                           const RunControl& control) { return evaluation::compareMethods(table, options, control); },
+                       [this, count, rows = rows_version_](Result<evaluation::Comparison> result) {
+                         if (result) {
+                           comparison_ = std::move(*result);
+                           compared_ = count;
+                           compared_rows_ = rows;
+                         } else if (result.error().code != ErrorCode::kCancelled) {
+                           comparison_.reset();
+                           showMessage({QString::fromStdString(result.error().message),
+                                        Severity::kAttention,
+                                        {},
+                                        {},
+                                        QStringLiteral("session/compare")});
+                         }
+                         emit comparisonChanged();
+                       },
+                       [this](double fraction) { emit comparisonProgress(fraction); });
+  emit comparisonChanged();
+}
+
+void Workbench::stopComparing() {
+  if (!isComparing()) return;
+  comparison_jobs_.stop();
+  emit comparisonChanged();
+}
+
+void Workbench::fit(const calibration::CorrectorChoice& choice, calibration::AlignMode align) {
+  if (isFitting() || !mayUse(table())) return;
+  endCondition(QStringLiteral("session/fit"));
+  fit_jobs_.run(
+      [table = table(), choice, align](const RunControl& control) {
+        return calibration::Corrector::fit(fitRows(table), table.metadata, choice, align, control);
+      },
+      [this](Result<calibration::Corrector> result) {
+        emit fittingChanged();
+        if (!result) {
+          showMessage({QString::fromStdString(result.error().message),
+                       Severity::kAttention,
+                       {},
+                       {},
+                       QStringLiteral("session/fit")});
+          return;
+        }
+        corrector_ = std::move(*result);
+        const calibration::CorrectorChoice& fitted = corrector_->choice();
+        post(&acquisition::AcquisitionController::storeFit,
+             QString::fromStdString(fitted.position_id + " + " + fitted.orientation_id),
+             QString::fromStdString(corrector_->toText()));
+        emit correctorChanged();
+      });
+  emit fittingChanged();
+}
+
+void Workbench::goToPage(const QString& page) {
+  if (sessionIsOpen()) post(&acquisition::AcquisitionController::setSessionState, QStringLiteral("page"), page);
+  emit pageRequested(page);
+}
+
+void Workbench::setGapReport(std::optional<gap::GapReport> report) {
+  gap_report_ = std::move(report);
+  emit gapReportChanged();
+}
+
+void Workbench::showMessage(Message message) { emit messageShown(message); }
+
+QString Workbench::sessionFolder() {
+  const QString folder =
+      QStandardPaths::writableLocation(QStandardPaths::AppDataLocation) + QStringLiteral("/sessions");
+  QDir().mkpath(folder);
+  return folder;
+}
+
+QString Workbench::freshSessionPath(const QString& stem) {
+  const QString stamp = QDateTime::currentDateTime().toString(QStringLiteral("yyyy-MM-dd-HHmmss"));
+  QString path = QStringLiteral("%1/%2-%3.fieldtrue").arg(sessionFolder(), stem, stamp);
+  for (int n = 2; QFileInfo::exists(path); ++n)
+    path = QStringLiteral("%1/%2-%3-%4.fieldtrue").arg(sessionFolder(), stem, stamp).arg(n);
+  return path;
+}
+
+QString Workbench::builtInScene(const QString& name) {
+  const QString path = QStringLiteral("%1/%2.scene.json").arg(sessionFolder(), name);
+  QFile::remove(path);
+  QFile::copy(QStringLiteral(":/scenes/%1.scene.json").arg(name), path);
+  QFile::setPermissions(path, QFile::ReadOwner | QFile::WriteOwner);
+  return path;
+}
+
+}  // namespace fieldtrue::widgets
