@@ -20,8 +20,8 @@
 #include "app/cli.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
+#include "calib/core/json_text.h"
 #include "calib/core/number_text.h"
-#include "calib/tables/json_text.h"
 #include "widgets/report/numbers.h"
 
 /// acquire: records a plan with a tracker, place by place, into a session file.

@@ -17,7 +17,7 @@
 #include "calib/core/exception_barrier.h"
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
-#include "calib/gap/json.h"
+#include "calib/gap/report_json.h"
 #include "calib/recording/recording_change.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/report/gap_section.h"

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "calib/core/file_io.h"
-#include "calib/tables/json_text.h"
+#include "calib/core/json_text.h"
 
 namespace fieldtrue::acquisition {
 

@@ -7,9 +7,10 @@
 
 #include "acquisition/plan/place_state.h"
 #include "acquisition/session/acquisition_impl.h"
-#include "acquisition/session/metadata_json.h"
-#include "calib/tables/json_text.h"
+#include "calib/core/json_text.h"
 #include "calib/tables/metadata_keys.h"
+#include "calib/tables/table_json.h"
+#include "calib/tables/table_metadata.h"
 
 /// The session half of the controller: opening, places, and what is current.
 namespace fieldtrue::acquisition {

@@ -6,10 +6,10 @@
 #include <map>
 
 #include "acquisition/plan/place_state.h"
-#include "acquisition/session/metadata_json.h"
 #include "acquisition/session/session_file.h"
 #include "acquisition/session/session_rows.h"
-#include "calib/tables/json_text.h"
+#include "calib/core/json_text.h"
+#include "calib/tables/table_json.h"
 
 namespace fieldtrue::acquisition {
 
@@ -128,7 +128,9 @@ struct SessionStore::Impl {
     plan = *std::move(read_plan);
     const auto metadata_json = parseJson(metadata_text->toStdString(), name + ": metadata");
     if (!metadata_json) return tl::unexpected(metadata_json.error());
-    metadata = metadataFromJson(*metadata_json);
+    auto read_metadata = readJson<TableMetadata>(*metadata_json, name + ": metadata", metadataFrom);
+    if (!read_metadata) return tl::unexpected(read_metadata.error());
+    metadata = *std::move(read_metadata);
     created = QDateTime::fromString(*created_text, Qt::ISODateWithMs);
     return readPlaces();
   }

@@ -85,6 +85,8 @@ class Corrector {
 
  private:
   Corrector() = default;
+  static Corrector fromJson(const JsonReader& content);
+
   CorrectorChoice choice_;
   AlignMode align_ = AlignMode::kNone;
   Alignment alignment_;

@@ -1,16 +1,16 @@
-#include <charconv>
+#include <limits>
 #include <type_traits>
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/checksum.h"
 #include "calib/calibration/corrector.h"
-#include "calib/calibration/table_json.h"
 #include "calib/core/file_io.h"
+#include "calib/core/json_reader.h"
+#include "calib/core/json_text.h"
 #include "calib/correctors/baked/baked_lattice.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
-#include "calib/tables/json_text.h"
+#include "calib/tables/table_json.h"
 
 namespace fieldtrue::calibration {
 namespace {
@@ -41,14 +41,14 @@ json reportToJson(const FitReport& report) {
   return to;
 }
 
-FitReport reportFromJson(const json& from) {
+FitReport reportFrom(const JsonReader& from) {
   FitReport report;
-  report.n_nodes = from.at("n_nodes").get<std::size_t>();
-  report.rms_before_mm = from.at("rms_before_mm").get<double>();
-  report.rms_m = from.at("rms_m").get<double>();
-  report.max_m = from.at("max_m").get<double>();
-  report.notes = from.at("notes").get<std::vector<std::string>>();
-  if (from.contains("orientation_rms_rad")) report.orientation_rms_rad = from.at("orientation_rms_rad").get<double>();
+  report.n_nodes = static_cast<std::size_t>(from["n_nodes"].integer(0, std::numeric_limits<int>::max()));
+  report.rms_before_mm = from["rms_before_mm"].number();
+  report.rms_m = from["rms_m"].number();
+  report.max_m = from["max_m"].number();
+  report.notes = from["notes"].texts();
+  if (const auto rms_rad = from.find("orientation_rms_rad")) report.orientation_rms_rad = rms_rad->number();
   return report;
 }
 
@@ -62,54 +62,32 @@ struct LoadedPart {
 };
 
 template <class Model>
-Result<std::unique_ptr<Model>> loadModel(const correctors::CorrectionMethod<Model>& method, const json& part,
-                                         bool is_baked) {
-  if constexpr (std::is_same_v<Model, correctors::PositionModel>)
-    if (is_baked) return correctors::BakedLattice::load(part.at("baked"));
-  return method.load(part.at("parameters"));
-}
-
-template <class Model>
-Result<LoadedPart<Model>> loadPart(const json& part,
-                                   Result<const correctors::CorrectionMethod<Model>*> (*find)(std::string_view)) {
+LoadedPart<Model> partFrom(const JsonReader& part,
+                           Result<const correctors::CorrectionMethod<Model>*> (*find)(std::string_view)) {
   LoadedPart<Model> loaded;
-  loaded.id = part.at("method").get<std::string>();
-  const auto method = find(loaded.id);
-  if (!method) return tl::unexpected(method.error());
+  loaded.id = part["method"].text();
+  const correctors::CorrectionMethod<Model>& method = *part["method"].valueOf(find(loaded.id));
   // A setting that came to the method after the file was written stands at its default, as it did without it.
-  json stored_settings = part.at("settings");
-  const json defaults = toJson(resolveSettings(loaded.id, (*method)->settings, {}).value());
-  if (stored_settings.is_object())
-    for (const auto& [key, value] : defaults.items()) stored_settings.emplace(key, value);
-  auto settings = settingsFromJson(loaded.id, (*method)->settings, stored_settings);
-  if (!settings) return tl::unexpected(settings.error());
-  loaded.settings = *std::move(settings);
-  if constexpr (std::is_same_v<Model, correctors::PositionModel>) loaded.is_baked = part.contains("baked");
-  auto model = loadModel(**method, part, loaded.is_baked);
-  if (!model) return tl::unexpected(model.error());
-  loaded.model = *std::move(model);
+  const JsonReader settings = part["settings"];
+  json stored_settings = settings.object();
+  const json defaults = toJson(resolveSettings(loaded.id, method.settings, {}).value());
+  for (const auto& [key, value] : defaults.items()) stored_settings.emplace(key, value);
+  loaded.settings = settings.valueOf(settingsFromJson(loaded.id, method.settings, stored_settings));
+  if constexpr (std::is_same_v<Model, correctors::PositionModel>) {
+    loaded.is_baked = part.has("baked");
+    if (loaded.is_baked) loaded.model = correctors::BakedLattice::fromJson(part["baked"]);
+  }
+  if (!loaded.is_baked) loaded.model = method.read(part["parameters"]);
   return loaded;
 }
 
 /// Schema and checksum: whether this is a whole calibration file that this version can read.
-Result<void> checkEnvelope(const json& content, const std::string& name) {
-  const std::string schema = content.is_object() ? content.value("schema", std::string()) : std::string();
-  if (!schema.starts_with(kSchemaName))
-    return fail(ErrorCode::kBadInput, name + " is not a Fieldtrue calibration: its schema must be " +
-                                          std::string(kSchemaName) + std::to_string(kSchemaVersion) +
-                                          (schema.empty() ? ", and none is stated" : ", not " + schema));
-  int version = 0;
-  const char* const end = schema.data() + schema.size();
-  const auto [rest, error] = std::from_chars(schema.data() + kSchemaName.size(), end, version);
-  if (error != std::errc() || rest != end || version < 1)
-    return fail(ErrorCode::kBadInput, name + " has a schema version that is not a number: " + schema);
-  if (version > kSchemaVersion)
-    return fail(ErrorCode::kNewerVersion, name + " was written by a newer version of Fieldtrue (" + schema +
-                                              "); this one reads up to version " + std::to_string(kSchemaVersion));
-  if (content.value("checksum", std::string()) != checksumOf(content))
-    return fail(ErrorCode::kBadInput,
-                name + " is damaged: its content does not match its checksum; export the calibration again");
-  return {};
+void checkEnvelope(const JsonReader& content) {
+  if (!content.schema(kSchemaName, kSchemaVersion, "a calibration"))
+    content.fail("is not a Fieldtrue calibration; it needs the key schema with \"" + std::string(kSchemaName) +
+                 std::to_string(kSchemaVersion) + "\".");
+  if (const auto checksum = content.find("checksum"); !checksum || checksum->raw() != checksumOf(content.raw()))
+    content.fail("is damaged: its content does not match its checksum; export the calibration again.");
 }
 
 }  // namespace
@@ -122,8 +100,8 @@ std::string Corrector::toText() const {
       {"units", "m, rad; quaternions w x y z"},
       {"align", align_ == AlignMode::kRigid ? "rigid" : "none"},
       {"alignment",
-       {{"reference_from_tracker", correctors::jsonOf(alignment_.reference_from_tracker)},
-        {"sensor_from_mount_wxyz", correctors::jsonOf(alignment_.sensor_from_mount)}}},
+       {{"reference_from_tracker", jsonOf(alignment_.reference_from_tracker)},
+        {"sensor_from_mount_wxyz", jsonOf(alignment_.sensor_from_mount)}}},
       {"position",
        {{"method", choice_.position_id},
         {"settings", toJson(choice_.position_settings)},
@@ -134,7 +112,7 @@ std::string Corrector::toText() const {
         {"parameters", orientation_->parameters()}}},
       {"region", region_.toJson()},
       {"report", reportToJson(report_)},
-      {"table", tableToJson(table_)},
+      {"table", fieldtrue::toJson(table_)},
   };
   content["checksum"] = checksumOf(content);
   // One line a top-level key: readable at the head, and compact where thousands of numbers stand.
@@ -153,34 +131,28 @@ Result<Corrector> Corrector::load(const std::filesystem::path& path) {
   return readFile(path).and_then([&](const std::string& text) { return fromText(text, path.filename().string()); });
 }
 
-Result<Corrector> Corrector::fromText(const std::string& text, const std::string& name) {
-  const Result<json> parsed = parseJson(text, name);
-  if (!parsed) return tl::unexpected(parsed.error());
-  const json& content = *parsed;
-  return correctors::guarded<Corrector>("calibration " + name, [&]() -> Result<Corrector> {
-    if (auto checked = checkEnvelope(content, name); !checked) return tl::unexpected(checked.error());
-    auto position = loadPart<correctors::PositionModel>(content.at("position"), correctors::findPositionMethod);
-    if (!position) return fail(position.error().code, name + ": " + position.error().message);
-    auto orientation =
-        loadPart<correctors::OrientationModel>(content.at("orientation"), correctors::findOrientationMethod);
-    if (!orientation) return fail(orientation.error().code, name + ": " + orientation.error().message);
-    auto region = Region::fromJson(content.at("region"));
-    if (!region) return fail(region.error().code, name + ": " + region.error().message);
+Corrector Corrector::fromJson(const JsonReader& content) {
+  checkEnvelope(content);
+  auto position = partFrom<correctors::PositionModel>(content["position"], correctors::findPositionMethod);
+  auto orientation = partFrom<correctors::OrientationModel>(content["orientation"], correctors::findOrientationMethod);
+  const JsonReader alignment = content["alignment"];
+  Corrector corrector;
+  corrector.choice_ = {position.id, position.settings, orientation.id, orientation.settings};
+  corrector.align_ = content["align"].oneOf({"rigid", "none"}) == "rigid" ? AlignMode::kRigid : AlignMode::kNone;
+  corrector.alignment_.reference_from_tracker = alignment["reference_from_tracker"].pose();
+  corrector.alignment_.sensor_from_mount = alignment["sensor_from_mount_wxyz"].quaternion();
+  corrector.position_ = position.model;
+  corrector.is_baked_ = position.is_baked;
+  corrector.orientation_ = orientation.model;
+  corrector.region_ = Region::fromJson(content["region"]);
+  corrector.report_ = reportFrom(content["report"]);
+  corrector.table_ = tableFrom(content["table"]);
+  return corrector;
+}
 
-    Corrector corrector;
-    corrector.choice_ = {position->id, position->settings, orientation->id, orientation->settings};
-    corrector.align_ = content.at("align").get<std::string>() == "rigid" ? AlignMode::kRigid : AlignMode::kNone;
-    corrector.alignment_.reference_from_tracker =
-        correctors::poseFrom(content.at("alignment").at("reference_from_tracker"));
-    corrector.alignment_.sensor_from_mount =
-        correctors::quaternionFrom(content.at("alignment").at("sensor_from_mount_wxyz"));
-    corrector.position_ = position->model;
-    corrector.is_baked_ = position->is_baked;
-    corrector.orientation_ = orientation->model;
-    corrector.region_ = *std::move(region);
-    corrector.report_ = reportFromJson(content.at("report"));
-    corrector.table_ = tableFromJson(content.at("table"));
-    return corrector;
+Result<Corrector> Corrector::fromText(const std::string& text, const std::string& name) {
+  return parseJson(text, name).and_then([&](const json& content) {
+    return readJson<Corrector>(content, name, Corrector::fromJson);
   });
 }
 

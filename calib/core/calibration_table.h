@@ -4,6 +4,8 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "calib/core/pose.h"
@@ -27,6 +29,12 @@ struct SampleRow {
 
 enum class NodeRole { kFit, kValidation, kSkipped };
 
+/// Roles as files name them.
+inline constexpr std::array<std::pair<std::string_view, NodeRole>, 3> kNodeRoles{
+    {{"fit", NodeRole::kFit}, {"validation", NodeRole::kValidation}, {"skipped", NodeRole::kSkipped}}};
+
+constexpr std::string_view nameOf(NodeRole role) { return kNodeRoles[static_cast<std::size_t>(role)].first; }
+
 /// What is planned for one stop of the jig: where the rig says the sensor is.
 struct PlannedPlace {
   int node = 0;
@@ -49,8 +57,8 @@ struct Node {
   std::optional<double> sd_rot_rad;              ///< RMS rotation angle of a single accepted sample about the mean.
   int n_used = 1;
   int n_rejected = 0;
-  double n_effective =
-      1.0;  ///< Independent samples n_used is worth; covariance of the mean = covariance_m2 / n_effective.
+  /// Independent samples n_used is worth; covariance of the mean = covariance_m2 / n_effective.
+  double n_effective = 1.0;
   std::optional<double> t_start_s;
   std::optional<double> t_end_s;
   NodeRole role = NodeRole::kFit;
@@ -68,12 +76,29 @@ struct TableMetadata {
   std::optional<double> quantum_m;
   std::optional<double> jig_tolerance_m;    ///< SD of placing, per axis.
   std::optional<double> jig_tolerance_rad;  ///< SD of placing, per axis.
-  bool alignment_known =
-      false;  ///< `alignment: known`; false means the rigid part between rig and transmitter is a nuisance.
+  /// `alignment: known`; false means the rigid part between rig and transmitter is a nuisance.
+  bool alignment_known = false;
   std::optional<double> alignment_tolerance_m;
   std::optional<double> alignment_tolerance_rad;
   std::map<std::string, std::string> other;  ///< Keys this program does not interpret; kept and written back.
 };
+
+/// Calls visit(key, pointer to member) for each optional member, in the order of the files: readers, writers and
+/// merging share this one list.
+template <class Visit>
+void forEachStatement(Visit visit) {
+  visit("tracker", &TableMetadata::tracker);
+  visit("rig", &TableMetadata::rig);
+  visit("date", &TableMetadata::date);
+  visit("excitation", &TableMetadata::excitation);
+  visit("carrier_hz", &TableMetadata::carrier_hz);
+  visit("rate_hz", &TableMetadata::rate_hz);
+  visit("quantum_m", &TableMetadata::quantum_m);
+  visit("jig_tolerance_m", &TableMetadata::jig_tolerance_m);
+  visit("jig_tolerance_rad", &TableMetadata::jig_tolerance_rad);
+  visit("alignment_tolerance_m", &TableMetadata::alignment_tolerance_m);
+  visit("alignment_tolerance_rad", &TableMetadata::alignment_tolerance_rad);
+}
 
 struct CalibrationTable {
   TableMetadata metadata;

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/core/convex_hull.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue {
 
@@ -67,15 +68,11 @@ std::vector<Eigen::Vector3d> fallbackNormals(const PointSpread& spread) {
   return normals;
 }
 
-std::optional<Eigen::Vector4d> halfSpaceFromJson(const nlohmann::json& json) {
-  if (!json.is_array() || json.size() != 4) return std::nullopt;
-  Eigen::Vector4d half_space;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (!json[i].is_number()) return std::nullopt;
-    half_space[static_cast<Eigen::Index>(i)] = json[i].get<double>();
-  }
-  const bool is_unit = std::abs(half_space.head<3>().norm() - 1.0) < 1e-6;
-  return half_space.allFinite() && is_unit ? std::optional(half_space) : std::nullopt;
+Eigen::Vector4d halfSpaceFrom(const JsonReader& json) {
+  const std::vector<double> numbers = json.numbers();
+  const bool is_plane = numbers.size() == 4 && std::abs(Eigen::Vector3d(numbers.data()).norm() - 1.0) < 1e-6;
+  if (!is_plane) json.refuse("a unit normal and a distance");
+  return Eigen::Vector4d(numbers.data());
 }
 
 }  // namespace
@@ -174,23 +171,11 @@ nlohmann::json Region::toJson() const {
   return {{"half_spaces_nx_ny_nz_d_m", rows}, {"margin_m", margin_m_}};
 }
 
-Result<Region> Region::fromJson(const nlohmann::json& json) {
-  const auto bad = [](const std::string& what) { return fail(ErrorCode::kBadInput, "The region " + what); };
-  if (!json.is_object() || !json.contains("half_spaces_nx_ny_nz_d_m") || !json.contains("margin_m")) {
-    return bad("needs half_spaces_nx_ny_nz_d_m and margin_m");
-  }
-  const nlohmann::json& margin = json["margin_m"];
-  if (!margin.is_number() || !(margin.get<double>() >= 0.0) || !std::isfinite(margin.get<double>())) {
-    return bad("needs a margin_m of 0 or more, got " + margin.dump());
-  }
-  if (!json["half_spaces_nx_ny_nz_d_m"].is_array()) return bad("needs half_spaces_nx_ny_nz_d_m as a list");
+Region Region::fromJson(const JsonReader& json) {
   Region region;
-  region.margin_m_ = margin.get<double>();
-  for (const nlohmann::json& row : json["half_spaces_nx_ny_nz_d_m"]) {
-    const std::optional<Eigen::Vector4d> half_space = halfSpaceFromJson(row);
-    if (!half_space) return bad("has a half-space that is not a unit normal and a distance: " + row.dump());
-    region.half_spaces_.push_back(*half_space);
-  }
+  region.half_spaces_ = json["half_spaces_nx_ny_nz_d_m"].list(halfSpaceFrom);
+  region.margin_m_ = json["margin_m"].number();
+  if (region.margin_m_ < 0.0) json["margin_m"].refuse("0 or more");
   return region;
 }
 

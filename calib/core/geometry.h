@@ -9,6 +9,8 @@
 
 namespace fieldtrue {
 
+class JsonReader;
+
 /// Least-squares rigid transform to_from_from: minimises sum |to_i - (R from_i + t)|^2, det R = +1.
 /// @source Horn 1987 / Umeyama 1991 (without scale)
 /// @error kTooFewNodes below 3 points; kDegenerate when the points lie on one line
@@ -19,8 +21,8 @@ struct PointSpread {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   Eigen::Vector3d sd_m = Eigen::Vector3d::Zero();
-  int dimension = 0;  ///< 3 volume, 2 one plane, 1 one line, 0 one point; an axis counts when its SD exceeds
-                      ///< `flat_ratio` of the longest.
+  /// 3 volume, 2 one plane, 1 one line, 0 one point; an axis counts when its SD exceeds `flat_ratio` of the longest.
+  int dimension = 0;
 };
 PointSpread pointSpread(std::span<const Eigen::Vector3d> points_m, double flat_ratio = 0.01);
 
@@ -38,7 +40,7 @@ class Region {
   bool empty() const { return half_spaces_.empty(); }
   double margin_m() const { return margin_m_; }
   nlohmann::json toJson() const;
-  static Result<Region> fromJson(const nlohmann::json& json);
+  static Region fromJson(const JsonReader& json);
 
  private:
   std::vector<Eigen::Vector4d> half_spaces_;  ///< Outward unit normal n and offset d: n.x + d <= margin inside.

@@ -2,8 +2,8 @@
 #include <array>
 #include <cstdio>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/automatic_choice.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/method_label.h"
@@ -124,22 +124,18 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
   return std::make_unique<AutomaticModel>(*std::move(model), std::move(table));
 }
 
-Result<std::unique_ptr<PositionModel>> loadAutomatic(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>("parameters of auto", [&]() -> Result<std::unique_ptr<PositionModel>> {
-    const auto method = findPositionMethod(parameters.at("method").get<std::string>());
-    if (!method) return tl::unexpected(method.error());
-    if ((*method)->id == "auto") throwMalformed("an automatic choice cannot have chosen itself");
-    auto settings = settingsFromJson((*method)->id, (*method)->settings, parameters.at("settings"));
-    if (!settings) return tl::unexpected(settings.error());
-    if (!parameters.at("candidates").is_array()) throwMalformed("a list of candidates is needed");
-    auto model = (*method)->load(parameters.at("model"));
-    if (!model) return tl::unexpected(model.error());
-    nlohmann::json table = {{"method", (*method)->id},
-                            {"settings", toJson(*settings)},
-                            {"candidates", parameters.at("candidates")},
-                            {"note", parameters.at("note").get<std::string>()}};
-    return std::make_unique<AutomaticModel>(*std::move(model), std::move(table));
-  });
+std::unique_ptr<PositionModel> loadAutomatic(const JsonReader& parameters) {
+  const PositionMethod& method = *parameters["method"].valueOf(findPositionMethod(parameters["method"].text()));
+  if (method.id == "auto") parameters["method"].refuse("another one: an automatic choice cannot have chosen itself");
+  const JsonReader stored = parameters["settings"];
+  const Settings settings = stored.valueOf(settingsFromJson(method.id, method.settings, stored.raw()));
+  const JsonReader candidates = parameters["candidates"];
+  candidates.entries();
+  nlohmann::json table = {{"method", method.id},
+                          {"settings", toJson(settings)},
+                          {"candidates", candidates.raw()},
+                          {"note", parameters["note"].text()}};
+  return std::make_unique<AutomaticModel>(method.read(parameters["model"]), std::move(table));
 }
 
 }  // namespace
@@ -161,7 +157,7 @@ PositionMethod automaticPosition() {
                       .help = "Methods to choose from: the survey's, those that came after it, or all; no correction, "
                               "a rigid motion and an affine map are always among them."}};
   method.fit = fitAutomatic;
-  method.load = loadAutomatic;
+  method.read = loadAutomatic;
   method.most_folds = 5;
   method.origin = MethodOrigin::kLater;
   return method;

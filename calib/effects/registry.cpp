@@ -20,10 +20,11 @@
 #include <cmath>
 
 #include "calib/core/file_io.h"
+#include "calib/core/json_reader.h"
+#include "calib/core/nearest_name.h"
 #include "calib/effects/closed_loop.h"
 #include "calib/effects/compact_metal.h"
 #include "calib/effects/effect_row.h"
-#include "calib/effects/object_reader.h"
 #include "calib/effects/rows.h"
 
 namespace fieldtrue::effects {

@@ -28,9 +28,6 @@ const Names kCovariance{"cov_xy_m2", "cov_xz_m2", "cov_yz_m2"};
 const Names kSingles{"sensor", "visit",      "t_start_s",   "t_end_s", "sd_rot_rad",
                      "n_used", "n_rejected", "n_effective", "role"};
 
-constexpr std::array<std::pair<std::string_view, NodeRole>, 3> kRoles{
-    {{"fit", NodeRole::kFit}, {"validation", NodeRole::kValidation}, {"skipped", NodeRole::kSkipped}}};
-
 struct NodeColumns {
   std::vector<std::size_t> required;
   Group index, true_rotation, rotation, sd, covariance;
@@ -152,7 +149,7 @@ NodeRole readRole(CsvReader& reader, const Column& column) {
     return NodeRole::kFit;
   }
   const std::string_view text = reader.field(*column);
-  for (const auto& [name, role] : kRoles) {
+  for (const auto& [name, role] : kNodeRoles) {
     if (name == text) return role;
   }
   reader.failAt(*column, "'" + std::string(text) + "' is not one of fit, validation, skipped");

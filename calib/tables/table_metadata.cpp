@@ -6,31 +6,11 @@
 #include <set>
 
 #include "calib/core/file_io.h"
+#include "calib/core/nearest_name.h"
 
 namespace fieldtrue {
 
 namespace {
-
-struct NumberKey {
-  std::string_view key;
-  std::optional<double> TableMetadata::*value;
-};
-constexpr std::array<NumberKey, 7> kNumberKeys{{{"carrier_hz", &TableMetadata::carrier_hz},
-                                                {"rate_hz", &TableMetadata::rate_hz},
-                                                {"quantum_m", &TableMetadata::quantum_m},
-                                                {"jig_tolerance_m", &TableMetadata::jig_tolerance_m},
-                                                {"jig_tolerance_rad", &TableMetadata::jig_tolerance_rad},
-                                                {"alignment_tolerance_m", &TableMetadata::alignment_tolerance_m},
-                                                {"alignment_tolerance_rad", &TableMetadata::alignment_tolerance_rad}}};
-
-struct TextKey {
-  std::string_view key;
-  std::optional<std::string> TableMetadata::*value;
-};
-constexpr std::array<TextKey, 4> kTextKeys{{{"tracker", &TableMetadata::tracker},
-                                            {"rig", &TableMetadata::rig},
-                                            {"date", &TableMetadata::date},
-                                            {"excitation", &TableMetadata::excitation}}};
 
 /// Keys whose value must be one of a few words.
 struct WordKey {
@@ -55,21 +35,30 @@ std::string checkWord(const std::string& key, const std::string& value) {
   return {};
 }
 
+/// @return what is wrong with the value, empty when nothing
+std::string storeIn(std::optional<double>& member, const std::string& value) {
+  const std::optional<double> number = parseFinite(value);
+  if (!number || *number < 0.0) return "'" + value + "' is not a number of 0 or more";
+  member = *number;
+  return {};
+}
+
+std::string storeIn(std::optional<std::string>& member, const std::string& value) {
+  member = value;
+  return {};
+}
+
 /// Stores a value under a known key. @return what is wrong with it, empty when nothing
 std::string store(TableMetadata& metadata, const std::string& key, const std::string& value) {
-  if (const std::string wrong = checkWord(key, value); !wrong.empty()) return wrong;
-  for (const NumberKey& row : kNumberKeys) {
-    if (row.key != key) continue;
-    const std::optional<double> number = parseFinite(value);
-    if (!number || *number < 0.0) return "'" + value + "' is not a number of 0 or more";
-    metadata.*row.value = *number;
-    return {};
-  }
-  for (const TextKey& row : kTextKeys) {
-    if (row.key != key) continue;
-    metadata.*row.value = value;
-    return {};
-  }
+  if (std::string is_no_word = checkWord(key, value); !is_no_word.empty()) return is_no_word;
+  bool is_known = false;
+  std::string wrong;
+  forEachStatement([&](std::string_view name, auto member) {
+    if (name != key) return;
+    is_known = true;
+    wrong = storeIn(metadata.*member, value);
+  });
+  if (is_known) return wrong;
   if (key == "frame") {
     metadata.frame = value;
   } else if (key == "alignment") {
@@ -84,29 +73,11 @@ std::string store(TableMetadata& metadata, const std::string& key, const std::st
 const std::vector<std::string_view>& knownKeys() {
   static const std::vector<std::string_view> keys = [] {
     std::vector<std::string_view> all;
-    all.reserve(kNumberKeys.size() + kTextKeys.size() + wordKeys().size());
-    for (const NumberKey& row : kNumberKeys) all.push_back(row.key);
-    for (const TextKey& row : kTextKeys) all.push_back(row.key);
+    forEachStatement([&](std::string_view key, auto) { all.push_back(key); });
     for (const WordKey& row : wordKeys()) all.push_back(row.key);
     return all;
   }();
   return keys;
-}
-
-/// Letters to insert, remove or replace to make one word of the other (V. I. Levenshtein, 1966).
-std::size_t editDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row.back();
 }
 
 /// Letters only, small: Jig-Tolerance_M and jig_tolerance_m are the same.
@@ -139,6 +110,9 @@ std::string oneLine(std::string text) {
       text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
   return text;
 }
+
+std::string valueText(double value) { return formatNumber(value); }
+const std::string& valueText(const std::string& value) { return value; }
 
 }  // namespace
 
@@ -173,14 +147,20 @@ void writeMetadata(std::ostream& out, const TableMetadata& metadata) {
     out << "# " << key << ": " << oneLine(value) << '\n';
   };
   line("frame", metadata.frame);
-  for (const TextKey& row : kTextKeys) {
-    if (metadata.*row.value) line(row.key, *(metadata.*row.value));
-  }
-  for (const NumberKey& row : kNumberKeys) {
-    if (metadata.*row.value) line(row.key, formatNumber(*(metadata.*row.value)));
-  }
+  forEachStatement([&](std::string_view key, auto member) {
+    if (metadata.*member) line(key, valueText(*(metadata.*member)));
+  });
   if (metadata.alignment_known) line("alignment", "known");
   for (const auto& [key, value] : metadata.other) line(key, value);
+}
+
+TableMetadata merged(TableMetadata known, const TableMetadata& more) {
+  forEachStatement([&](std::string_view, auto member) {
+    if (!(known.*member)) known.*member = more.*member;
+  });
+  known.alignment_known = known.alignment_known || more.alignment_known;
+  known.other.insert(more.other.begin(), more.other.end());
+  return known;
 }
 
 }  // namespace fieldtrue

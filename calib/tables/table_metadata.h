@@ -20,4 +20,7 @@ std::vector<std::string> notesOnMetadata(const CsvReader& reader);
 /// Writes what is set as `# key: value` lines.
 void writeMetadata(std::ostream& out, const TableMetadata& metadata);
 
+/// What is known, and from `more` what is not known yet.
+TableMetadata merged(TableMetadata known, const TableMetadata& more);
+
 }  // namespace fieldtrue

@@ -71,18 +71,6 @@ class RowText {
   bool is_first_ = true;
 };
 
-const char* nameOf(NodeRole role) {
-  switch (role) {
-    case NodeRole::kFit:
-      return "fit";
-    case NodeRole::kValidation:
-      return "validation";
-    case NodeRole::kSkipped:
-      return "skipped";
-  }
-  return "";
-}
-
 void appendCovariance(RowText& row, const std::optional<Eigen::Matrix3d>& covariance_m2) {
   if (!covariance_m2) {
     row.blanks(6);

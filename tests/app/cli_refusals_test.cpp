@@ -5,7 +5,7 @@
 #include <QTemporaryDir>
 #include <QTest>
 
-#include "calib/tables/json_text.h"
+#include "calib/core/json_text.h"
 #include "calib/tables/line_reader.h"
 #include "calib/tables/table_io.h"
 #include "calib/tables/table_writer.h"

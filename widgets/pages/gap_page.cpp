@@ -16,7 +16,7 @@
 
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
-#include "calib/gap/json.h"
+#include "calib/gap/report_json.h"
 #include "calib/recording/finding.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/figures/field_scale.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/baked/base64.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/numerics/aligned_vector.h"
 
 namespace fieldtrue::correctors {
@@ -42,44 +42,42 @@ std::vector<std::uint8_t> packed(const std::vector<bool>& bits) {
   return bytes;
 }
 
-std::vector<std::uint8_t> bytesOf(const nlohmann::json& json, std::size_t size, const std::string& what) {
-  const auto bytes = fromBase64(json.get_ref<const std::string&>());
-  if (!bytes || bytes->size() != size)
-    throwMalformed(what + " must be base64 text of " + std::to_string(size) + " bytes");
+std::vector<std::uint8_t> bytesOf(const JsonReader& json, std::size_t size) {
+  const auto bytes = fromBase64(json.text());
+  if (!bytes || bytes->size() != size) json.refuse("base64 text of " + std::to_string(size) + " bytes");
   return *bytes;
 }
 
 /// Only the numbers that say something: three a coefficient without an uncertainty.
-AlignedVector<float> coefficientsFrom(const nlohmann::json& json, std::size_t count, std::size_t stored) {
-  const std::vector<float> values =
-      fromLittleEndianBytes(bytesOf(json, count * stored * sizeof(float), "coefficients_base64"));
+AlignedVector<float> coefficientsFrom(const JsonReader& json, std::size_t count, std::size_t stored) {
+  const std::vector<float> values = fromLittleEndianBytes(bytesOf(json, count * stored * sizeof(float)));
   AlignedVector<float> coefficients(kNumbers * count, 0.0F);
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i])) throwMalformed("a coefficient of the lattice is not a finite number");
+    if (!std::isfinite(values[i])) json.refuse("finite numbers only");
     coefficients[i / stored * kNumbers + i % stored] = values[i];
   }
   return coefficients;
 }
 
-LatticeParts partsFrom(const nlohmann::json& json) {
+LatticeParts partsFrom(const JsonReader& json) {
   LatticeParts parts;
-  parts.origin_m = vectorFrom(json.at("origin_m"));
-  parts.spacing_m = json.at("spacing_m").get<double>();
-  parts.counts = json.at("counts").get<std::array<int, 3>>();
-  parts.has_uncertainty = json.at("has_uncertainty").get<bool>();
-  parts.note = json.at("note").get<std::string>();
+  parts.origin_m = json["origin_m"].vector3();
+  parts.spacing_m = json["spacing_m"].number();
+  parts.counts = json["counts"].integers3();
+  parts.has_uncertainty = json["has_uncertainty"].flag();
+  parts.note = json["note"].text();
   const auto in_range = [](int count) { return count >= 4 && count <= static_cast<int>(kMostLatticeCoefficients); };
   if (!std::all_of(parts.counts.begin(), parts.counts.end(), in_range) ||
       double(parts.counts[0]) * parts.counts[1] * parts.counts[2] > double(kMostLatticeCoefficients) ||
       !(parts.spacing_m > 0.0))
-    throwMalformed("a lattice needs a positive spacing, 4 coefficients and more along each axis and at most " +
-                   std::to_string(kMostLatticeCoefficients) + " in all");
+    json.fail("needs a positive spacing_m, counts of 4 and more along each axis and at most " +
+              std::to_string(kMostLatticeCoefficients) + " coefficients in all.");
   parts.coefficients =
-      coefficientsFrom(json.at("coefficients_base64"), coefficientCount(parts), parts.has_uncertainty ? 4 : 3);
-  const nlohmann::json& covered = json.at("covered_base64");
-  if (covered.is_null()) return parts;
+      coefficientsFrom(json["coefficients_base64"], coefficientCount(parts), parts.has_uncertainty ? 4 : 3);
+  const JsonReader covered = json["covered_base64"];
+  if (covered.isNull()) return parts;
   const std::size_t n_cells = cellCount(parts);
-  const std::vector<std::uint8_t> bytes = bytesOf(covered, (n_cells + 7) / 8, "covered_base64");
+  const std::vector<std::uint8_t> bytes = bytesOf(covered, (n_cells + 7) / 8);
   for (std::size_t i = 0; i < n_cells; ++i) parts.covered.push_back((bytes[i / 8] >> (i % 8) & 1U) != 0);
   return parts;
 }
@@ -176,10 +174,8 @@ nlohmann::json BakedLattice::parameters() const {
   return json;
 }
 
-Result<std::unique_ptr<PositionModel>> BakedLattice::load(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>("baked lattice", [&]() -> Result<std::unique_ptr<PositionModel>> {
-    return std::make_unique<BakedLattice>(partsFrom(parameters));
-  });
+std::unique_ptr<PositionModel> BakedLattice::fromJson(const JsonReader& parameters) {
+  return std::make_unique<BakedLattice>(partsFrom(parameters));
 }
 
 }  // namespace fieldtrue::correctors

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/core/error.h"
+#include "calib/core/json_reader.h"
 #include "calib/correctors/baked/baked_lattice_kernel.h"
 #include "calib/correctors/base/position_model.h"
 #include "calib/correctors/multiquadric/hmq_field.h"
@@ -45,8 +46,7 @@ class BakedLattice : public PositionModel {
 
   const LatticeParts& parts() const { return parts_; }
 
-  /// @error kBadInput
-  static Result<std::unique_ptr<PositionModel>> load(const nlohmann::json& parameters);
+  static std::unique_ptr<PositionModel> fromJson(const JsonReader& parameters);
 
  private:
   LatticeParts parts_;

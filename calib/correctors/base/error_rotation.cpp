@@ -1,6 +1,6 @@
 #include "calib/correctors/base/error_rotation.h"
 
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 
@@ -33,10 +33,9 @@ nlohmann::json ErrorRotationModel::parameters() const {
   return json;
 }
 
-ErrorFrame errorFrameFrom(const nlohmann::json& parameters) {
-  const std::string name = parameters.at("error_frame").get<std::string>();
-  if (name != "tracker" && name != "sensor") throwMalformed("error_frame must be tracker or sensor, got " + name);
-  return name == "sensor" ? ErrorFrame::kSensor : ErrorFrame::kTracker;
+ErrorFrame errorFrameFrom(const JsonReader& parameters) {
+  return parameters["error_frame"].oneOf({"tracker", "sensor"}) == "sensor" ? ErrorFrame::kSensor
+                                                                            : ErrorFrame::kTracker;
 }
 
 Setting errorFrameSetting() {

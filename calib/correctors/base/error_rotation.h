@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calib/core/error.h"
+#include "calib/core/json_reader.h"
 #include "calib/core/settings.h"
 #include "calib/correctors/base/fit_data.h"
 #include "calib/correctors/base/orientation_model.h"
@@ -39,8 +40,8 @@ class ErrorRotationModel : public OrientationModel {
   ErrorFrame frame_;
 };
 
-/// The frame that `parameters` stored. Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-ErrorFrame errorFrameFrom(const nlohmann::json& parameters);
+/// The frame that `parameters` stored.
+ErrorFrame errorFrameFrom(const JsonReader& parameters);
 
 /// `error_frame`, the frame in which the error rotation is modelled: `tracker` (default) or `sensor`.
 Setting errorFrameSetting();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/core/error.h"
+#include "calib/core/json_reader.h"
 #include "calib/core/run_control.h"
 #include "calib/core/settings.h"
 #include "calib/correctors/base/fit_data.h"
@@ -55,7 +56,8 @@ struct CorrectionMethod {
   std::vector<Setting> settings;
   /// @error when the data does not determine the method
   Result<std::unique_ptr<Model>> (*fit)(const FitData&, const Settings&, const RunControl&) = nullptr;
-  Result<std::unique_ptr<Model>> (*load)(const nlohmann::json& parameters) = nullptr;
+  /// The model that stored parameters describe; throws as a JsonReader does.
+  std::unique_ptr<Model> (*read)(const JsonReader& parameters) = nullptr;
   /// Fits with rows left out, without fitting anew; null where the method has no closed form.
   Result<std::unique_ptr<HoldOutFits<Model>>> (*hold_out)(const FitData&, const Settings&, const RunControl&) = nullptr;
   /// A comparison refits a costly method at most so often, over larger folds; 0 = as often as asked.
@@ -63,6 +65,11 @@ struct CorrectionMethod {
   MethodOrigin origin = MethodOrigin::kSurvey;
   /// What the automatic choice tries of it; empty = nothing.
   std::vector<AutomaticTry> tries = {};
+
+  /// @error kBadInput when the JSON is not what the method stores
+  Result<std::unique_ptr<Model>> load(const nlohmann::json& parameters) const {
+    return readJson<std::unique_ptr<Model>>(parameters, "parameters of " + id, read);
+  }
 };
 using PositionMethod = CorrectionMethod<PositionModel>;
 using OrientationMethod = CorrectionMethod<OrientationModel>;

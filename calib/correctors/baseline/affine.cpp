@@ -17,10 +17,6 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutAffine(const FitData&
   return holdOutPolynomialPosition(data, kLinear, kName);
 }
 
-Result<std::unique_ptr<PositionModel>> loadAffine(const nlohmann::json& parameters) {
-  return loadPolynomialPosition(parameters, "affine");
-}
-
 }  // namespace
 
 PositionMethod affinePosition() {
@@ -29,7 +25,7 @@ PositionMethod affinePosition() {
           .source = "Survey by Kindratenko, section 3.4, eq. 14 with r = 1",
           .settings = {},
           .fit = fitAffine,
-          .load = loadAffine,
+          .read = loadPolynomialPosition,
           .hold_out = holdOutAffine,
           .origin = MethodOrigin::kBaseline,
           .tries = {{"", 2}}};

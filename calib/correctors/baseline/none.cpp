@@ -39,9 +39,7 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutNone(const FitData& d
   return std::make_unique<NothingHeldOut>(data.size());
 }
 
-Result<std::unique_ptr<PositionModel>> loadNone(const nlohmann::json&) {
-  return std::make_unique<NoPositionCorrection>();
-}
+std::unique_ptr<PositionModel> loadNone(const JsonReader&) { return std::make_unique<NoPositionCorrection>(); }
 
 }  // namespace
 
@@ -51,7 +49,7 @@ PositionMethod nonePosition() {
           .source = "The tracker as it is, after the alignment if one is fitted",
           .settings = {},
           .fit = fitNone,
-          .load = loadNone,
+          .read = loadNone,
           .hold_out = holdOutNone,
           .origin = MethodOrigin::kBaseline,
           .tries = {{"", 0}}};

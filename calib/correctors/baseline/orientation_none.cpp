@@ -19,9 +19,7 @@ Result<std::unique_ptr<OrientationModel>> fitNone(const FitData&, const Settings
   return std::make_unique<NoOrientationCorrection>();
 }
 
-Result<std::unique_ptr<OrientationModel>> loadNone(const nlohmann::json&) {
-  return std::make_unique<NoOrientationCorrection>();
-}
+std::unique_ptr<OrientationModel> loadNone(const JsonReader&) { return std::make_unique<NoOrientationCorrection>(); }
 
 }  // namespace
 
@@ -31,7 +29,7 @@ OrientationMethod noneOrientation() {
           .source = "The tracker as it is, after the alignment if one is fitted",
           .settings = {},
           .fit = fitNone,
-          .load = loadNone};
+          .read = loadNone};
 }
 
 }  // namespace fieldtrue::correctors

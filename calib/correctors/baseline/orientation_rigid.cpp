@@ -1,7 +1,7 @@
+#include "calib/core/json_reader.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 
@@ -28,12 +28,8 @@ Result<std::unique_ptr<OrientationModel>> fitConstant(const FitData& data, const
   return std::make_unique<ConstantErrorRotation>(frame, canonical(meanRotation(errorRotations(data, frame))));
 }
 
-Result<std::unique_ptr<OrientationModel>> loadConstant(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<OrientationModel>>(
-      "parameters of rigid (orientation)", [&]() -> Result<std::unique_ptr<OrientationModel>> {
-        return std::make_unique<ConstantErrorRotation>(errorFrameFrom(parameters),
-                                                       quaternionFrom(parameters.at("q_error_wxyz")));
-      });
+std::unique_ptr<OrientationModel> loadConstant(const JsonReader& parameters) {
+  return std::make_unique<ConstantErrorRotation>(errorFrameFrom(parameters), parameters["q_error_wxyz"].quaternion());
 }
 
 }  // namespace
@@ -44,7 +40,7 @@ OrientationMethod rigidOrientation() {
           .source = "Markley, Cheng, Crassidis, Oshman 2007, eq. 12-13, over the error rotations",
           .settings = {errorFrameSetting()},
           .fit = fitConstant,
-          .load = loadConstant};
+          .read = loadConstant};
 }
 
 }  // namespace fieldtrue::correctors

@@ -1,9 +1,9 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/hold_out_rows.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 
@@ -126,12 +126,8 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutRigid(const FitData& 
   return std::make_unique<RigidHoldOut>(data);
 }
 
-Result<std::unique_ptr<PositionModel>> loadRigidPosition(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of rigid", [&]() -> Result<std::unique_ptr<PositionModel>> {
-        return std::make_unique<RigidPosition>(poseFrom(parameters.at("true_from_tracked")),
-                                               parameters.at("planar").get<bool>());
-      });
+std::unique_ptr<PositionModel> loadRigidPosition(const JsonReader& parameters) {
+  return std::make_unique<RigidPosition>(parameters["true_from_tracked"].pose(), parameters["planar"].flag());
 }
 
 }  // namespace
@@ -142,7 +138,7 @@ PositionMethod rigidPosition() {
           .source = "Horn 1987; Umeyama 1991 without scale",
           .settings = {},
           .fit = fitRigidPosition,
-          .load = loadRigidPosition,
+          .read = loadRigidPosition,
           .hold_out = holdOutRigid,
           .origin = MethodOrigin::kBaseline,
           .tries = {{"", 1}}};

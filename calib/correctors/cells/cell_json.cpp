@@ -3,9 +3,12 @@
 namespace fieldtrue::correctors {
 namespace {
 
-void needCount(const nlohmann::json& json, std::size_t count) {
-  if (!json.is_array() || json.empty() || (count > 0 && json.size() != count))
-    throwMalformed("an array with a row for each place is needed, got " + json.dump().substr(0, 60));
+/// Every entry, as many as asked for and at least one.
+template <class Read>
+auto countedList(const JsonReader& json, std::size_t count, Read read) {
+  auto items = json.list(read);
+  if (items.empty() || (count > 0 && items.size() != count)) json.refuse("a list with a row for each place");
+  return items;
 }
 
 }  // namespace
@@ -22,20 +25,12 @@ nlohmann::json jsonOfRotations(const std::vector<Eigen::Quaterniond>& rotations)
   return json;
 }
 
-std::vector<Eigen::Vector3d> pointsFrom(const nlohmann::json& json, std::size_t count) {
-  needCount(json, count);
-  std::vector<Eigen::Vector3d> points;
-  points.reserve(json.size());
-  for (const nlohmann::json& row : json) points.push_back(vectorFrom(row));
-  return points;
+std::vector<Eigen::Vector3d> pointsFrom(const JsonReader& json, std::size_t count) {
+  return countedList(json, count, [](const JsonReader& row) { return row.vector3(); });
 }
 
-std::vector<Eigen::Quaterniond> rotationsFrom(const nlohmann::json& json, std::size_t count) {
-  needCount(json, count);
-  std::vector<Eigen::Quaterniond> rotations;
-  rotations.reserve(json.size());
-  for (const nlohmann::json& row : json) rotations.push_back(quaternionFrom(row));
-  return rotations;
+std::vector<Eigen::Quaterniond> rotationsFrom(const JsonReader& json, std::size_t count) {
+  return countedList(json, count, [](const JsonReader& row) { return row.quaternion(); });
 }
 
 }  // namespace fieldtrue::correctors

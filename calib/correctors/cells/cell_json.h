@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 
@@ -13,34 +13,27 @@ nlohmann::json jsonOfPoints(const std::vector<Eigen::Vector3d>& points);
 /// Rotations as [[w, x, y, z], ...].
 nlohmann::json jsonOfRotations(const std::vector<Eigen::Quaterniond>& rotations);
 
-/// The inverses. They throw nlohmann::json::exception when the JSON has another form: call them inside `guarded`.
+/// The inverses.
 /// @param count how many there must be; 0 = any
-std::vector<Eigen::Vector3d> pointsFrom(const nlohmann::json& json, std::size_t count = 0);
-std::vector<Eigen::Quaterniond> rotationsFrom(const nlohmann::json& json, std::size_t count);
+std::vector<Eigen::Vector3d> pointsFrom(const JsonReader& json, std::size_t count = 0);
+std::vector<Eigen::Quaterniond> rotationsFrom(const JsonReader& json, std::size_t count);
 
 /// Corner numbers of cells as rows.
-template <std::size_t kCorners>
-nlohmann::json jsonOfCells(const std::vector<std::array<int, kCorners>>& cells) {
-  return nlohmann::json(cells);
-}
-
 /// @param n_points every number must be below
 template <std::size_t kCorners>
-std::vector<std::array<int, kCorners>> cellsFrom(const nlohmann::json& json, std::size_t n_points) {
-  if (!json.is_array() || json.empty()) throwMalformed("cells must be an array of rows of corner numbers");
-  std::vector<std::array<int, kCorners>> cells;
-  cells.reserve(json.size());
-  for (const nlohmann::json& row : json) {
-    if (!row.is_array() || row.size() != kCorners)
-      throwMalformed("a cell needs " + std::to_string(kCorners) + " corner numbers, got " + row.dump().substr(0, 60));
+std::vector<std::array<int, kCorners>> cellsFrom(const JsonReader& json, std::size_t n_points) {
+  const auto cells = json.list([&](const JsonReader& row) {
+    const std::vector<int> corners = row.integers();
+    if (corners.size() != kCorners) row.refuse(std::to_string(kCorners) + " corner numbers");
     std::array<int, kCorners> cell{};
     for (std::size_t c = 0; c < kCorners; ++c) {
-      cell[c] = row[c].get<int>();
+      cell[c] = corners[c];
       if (cell[c] < 0 || static_cast<std::size_t>(cell[c]) >= n_points)
-        throwMalformed("a cell has corner " + std::to_string(cell[c]) + " of " + std::to_string(n_points) + " places");
+        row.refuse("corner numbers from 0 to " + std::to_string(n_points - 1));
     }
-    cells.push_back(cell);
-  }
+    return cell;
+  });
+  if (cells.empty()) json.refuse("a list of at least one cell");
   return cells;
 }
 

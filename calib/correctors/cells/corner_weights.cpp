@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -193,16 +193,15 @@ nlohmann::json toJson(const WeightRule& rule) {
           {"d_max_m", rule.d_max_m ? nlohmann::json(*rule.d_max_m) : nlohmann::json("auto")}};
 }
 
-WeightRule weightRuleFrom(const nlohmann::json& json) {
-  const std::string name = json.at("weights").get<std::string>();
+WeightRule weightRuleFrom(const JsonReader& json) {
+  const std::string name = json["weights"].text();
   const KindName* const found = findKind(name);
-  if (found == nullptr) throwMalformed("weights of corners called " + name + " are not known");
+  if (found == nullptr) json["weights"].refuse("the name of a weight of corners");
   WeightRule rule;
   rule.kind = found->kind;
-  rule.length_unit_m = json.at("length_unit_m").get<double>();
-  if (!(rule.length_unit_m > 0.0)) throwMalformed("length_unit_m must be above 0");
-  const nlohmann::json& d_max = json.at("d_max_m");
-  if (d_max != "auto") rule.d_max_m = d_max.get<double>();
+  rule.length_unit_m = json["length_unit_m"].number();
+  if (!(rule.length_unit_m > 0.0)) json["length_unit_m"].refuse("above 0");
+  if (const JsonReader d_max = json["d_max_m"]; d_max.raw() != "auto") rule.d_max_m = d_max.number();
   return rule;
 }
 

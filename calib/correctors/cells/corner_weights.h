@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/core/json_reader.h"
 #include "calib/core/settings.h"
 #include "calib/correctors/cells/hexahedral_cells.h"
 
@@ -63,8 +64,7 @@ WeightRule weightRule(WeightKind kind, const Settings& settings);
 
 /// {"weights": name, "length_unit_m": number, "d_max_m": number or "auto"}
 nlohmann::json toJson(const WeightRule& rule);
-/// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-WeightRule weightRuleFrom(const nlohmann::json& json);
+WeightRule weightRuleFrom(const JsonReader& json);
 
 /// Says where a bump reaches past the nearest corner, so that the correction misses its places; empty when nowhere.
 std::string bumpNote(const WeightRule& rule, const HexahedralCells& cells);

@@ -211,13 +211,11 @@ std::vector<std::size_t> HexahedralCells::foldedCells() const {
   return folded;
 }
 
-nlohmann::json HexahedralCells::toJson() const {
-  return {{"tracked_m", jsonOfPoints(corners_m_)}, {"cells", jsonOfCells<8>(cells_)}};
-}
+nlohmann::json HexahedralCells::toJson() const { return {{"tracked_m", jsonOfPoints(corners_m_)}, {"cells", cells_}}; }
 
-HexahedralCells HexahedralCells::fromJson(const nlohmann::json& json) {
-  std::vector<Eigen::Vector3d> corners_m = pointsFrom(json.at("tracked_m"));
-  std::vector<Corners> cells = cellsFrom<8>(json.at("cells"), corners_m.size());
+HexahedralCells HexahedralCells::fromJson(const JsonReader& json) {
+  std::vector<Eigen::Vector3d> corners_m = pointsFrom(json["tracked_m"]);
+  std::vector<Corners> cells = cellsFrom<8>(json["cells"], corners_m.size());
   return {std::move(corners_m), std::move(cells)};
 }
 

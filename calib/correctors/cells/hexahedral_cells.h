@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/cells/place_grid.h"
 #include "calib/correctors/numerics/box_lookup.h"
 
@@ -50,8 +51,7 @@ class HexahedralCells {
 
   /// {"tracked_m": [[x, y, z], ...], "cells": [[8 numbers], ...]}
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static HexahedralCells fromJson(const nlohmann::json& json);
+  static HexahedralCells fromJson(const JsonReader& json);
 
  private:
   /// Position as a polynomial of the natural coordinates: coefficients of 1, r, s, t, rs, rt, st, rst [m].

@@ -133,19 +133,13 @@ Result<std::unique_ptr<PositionModel>> fitHexahedralShape(const FitData& data, c
   return model;
 }
 
-Result<std::unique_ptr<PositionModel>> loadHexahedralShape(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of hexahedral_shape", [&]() -> Result<std::unique_ptr<PositionModel>> {
-        HexahedralCells cells = HexahedralCells::fromJson(parameters);
-        std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters.at("v_m"), cells.corners_m().size());
-        const std::string map = parameters.at("map").get<std::string>();
-        const std::string axes = parameters.at("axes").get<std::string>();
-        if (map != "shape" && map != "isoparametric") throwMalformed("map must be shape or isoparametric, got " + map);
-        if (axes != "cell" && axes != "tracker") throwMalformed("axes must be cell or tracker, got " + axes);
-        const ShapeChoice choice{map == "isoparametric", axes == "cell" ? ShapeAxes::kCell : ShapeAxes::kTracker};
-        return std::make_unique<HexahedralShapePosition>(std::move(cells), std::move(v_m), choice,
-                                                         parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<PositionModel> loadHexahedralShape(const JsonReader& parameters) {
+  HexahedralCells cells = HexahedralCells::fromJson(parameters);
+  std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], cells.corners_m().size());
+  const std::string map = parameters["map"].oneOf({"shape", "isoparametric"});
+  const std::string axes = parameters["axes"].oneOf({"cell", "tracker"});
+  const ShapeChoice choice{map == "isoparametric", axes == "cell" ? ShapeAxes::kCell : ShapeAxes::kTracker};
+  return std::make_unique<HexahedralShapePosition>(std::move(cells), std::move(v_m), choice, parameters["note"].text());
 }
 
 Setting choiceOf(std::string key, std::string label, std::vector<std::string> choices, std::string help) {
@@ -175,7 +169,7 @@ PositionMethod hexahedralShapePosition() {
                     "Axes of the shape functions; tracker is as published and singular for a cube turned by 45 "
                     "degrees.")},
       .fit = fitHexahedralShape,
-      .load = loadHexahedralShape,
+      .read = loadHexahedralShape,
       .origin = MethodOrigin::kSurvey,
       .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -17,10 +17,6 @@ Result<std::unique_ptr<PositionModel>> fitLocalBriggs(const FitData& data, const
   return makeLocalPosition(std::move(grid->cells), std::move(grid->v_m), weightRule(kind, settings), std::move(note));
 }
 
-Result<std::unique_ptr<PositionModel>> loadLocalBriggs(const nlohmann::json& parameters) {
-  return loadLocalPosition(parameters, "local_briggs");
-}
-
 std::vector<Setting> briggsSettings() {
   std::vector<Setting> settings = resampleSettings();
   settings.push_back({.key = "as_published",
@@ -45,7 +41,7 @@ PositionMethod localBriggsPosition() {
           .source = "Briggs 1999; survey by Kindratenko, section 3.3, eq. 12-13",
           .settings = briggsSettings(),
           .fit = fitLocalBriggs,
-          .load = loadLocalBriggs,
+          .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

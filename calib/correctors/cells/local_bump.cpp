@@ -9,10 +9,6 @@ Result<std::unique_ptr<PositionModel>> fitLocalBump(const FitData& data, const S
   return fitLocalPosition(data, weightRule(WeightKind::kBrysonBump, settings), "Bryson's bump interpolation");
 }
 
-Result<std::unique_ptr<PositionModel>> loadLocalBump(const nlohmann::json& parameters) {
-  return loadLocalPosition(parameters, "local_bump");
-}
-
 }  // namespace
 
 PositionMethod localBumpPosition() {
@@ -21,7 +17,7 @@ PositionMethod localBumpPosition() {
           .source = "Bryson 1992; survey by Kindratenko, section 3.3, eq. 8-10",
           .settings = {lengthUnitSetting(), bumpEndSetting()},
           .fit = fitLocalBump,
-          .load = loadLocalBump,
+          .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -82,14 +82,10 @@ Result<std::unique_ptr<PositionModel>> fitLocalPosition(const FitData& data, con
   return makeLocalPosition(std::move(cells), errorVectors_m(grid->places), rule, std::move(note));
 }
 
-Result<std::unique_ptr<PositionModel>> loadLocalPosition(const nlohmann::json& parameters, const std::string& name) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of " + name, [&]() -> Result<std::unique_ptr<PositionModel>> {
-        HexahedralCells cells = HexahedralCells::fromJson(parameters);
-        std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters.at("v_m"), cells.corners_m().size());
-        return makeLocalPosition(std::move(cells), std::move(v_m), weightRuleFrom(parameters),
-                                 parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<PositionModel> loadLocalPosition(const JsonReader& parameters) {
+  HexahedralCells cells = HexahedralCells::fromJson(parameters);
+  std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], cells.corners_m().size());
+  return makeLocalPosition(std::move(cells), std::move(v_m), weightRuleFrom(parameters), parameters["note"].text());
 }
 
 }  // namespace fieldtrue::correctors

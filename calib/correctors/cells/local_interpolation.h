@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/position_model.h"
 #include "calib/correctors/cells/corner_weights.h"
 
@@ -24,8 +25,8 @@ std::unique_ptr<PositionModel> makeLocalPosition(HexahedralCells cells, std::vec
 Result<std::unique_ptr<PositionModel>> fitLocalPosition(const FitData& data, const WeightRule& rule,
                                                         const std::string& name);
 
-/// @error kBadInput
-Result<std::unique_ptr<PositionModel>> loadLocalPosition(const nlohmann::json& parameters, const std::string& name);
+/// Of any of the local methods.
+std::unique_ptr<PositionModel> loadLocalPosition(const JsonReader& parameters);
 
 /// Error vectors q - p of places, tracker frame [m].
 std::vector<Eigen::Vector3d> errorVectors_m(const Places& places);

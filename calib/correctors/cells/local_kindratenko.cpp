@@ -11,10 +11,6 @@ Result<std::unique_ptr<PositionModel>> fitLocalKindratenko(const FitData& data, 
                           "Kindratenko's local interpolation");
 }
 
-Result<std::unique_ptr<PositionModel>> loadLocalKindratenko(const nlohmann::json& parameters) {
-  return loadLocalPosition(parameters, "local_kindratenko");
-}
-
 Setting weightSetting() {
   return {.key = "weight",
           .label = "Weights",
@@ -35,7 +31,7 @@ PositionMethod localKindratenkoPosition() {
           .source = "Kindratenko, Bennett 2000; survey by Kindratenko, section 3.3, eq. 8, 9 and 11",
           .settings = {weightSetting()},
           .fit = fitLocalKindratenko,
-          .load = loadLocalKindratenko,
+          .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -10,10 +10,6 @@ Result<std::unique_ptr<PositionModel>> fitLocalLinear(const FitData& data, const
   return fitLocalPosition(data, weightRule(WeightKind::kBrysonLinear, settings), "Bryson's linear interpolation");
 }
 
-Result<std::unique_ptr<PositionModel>> loadLocalLinear(const nlohmann::json& parameters) {
-  return loadLocalPosition(parameters, "local_linear");
-}
-
 }  // namespace
 
 PositionMethod localLinearPosition() {
@@ -22,7 +18,7 @@ PositionMethod localLinearPosition() {
           .source = "Bryson 1992; survey by Kindratenko, section 3.3, eq. 8-10",
           .settings = {},
           .fit = fitLocalLinear,
-          .load = loadLocalLinear,
+          .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -63,16 +63,11 @@ Result<std::unique_ptr<OrientationModel>> fitLocalQuaternion(const FitData& data
                                               rule, std::move(note));
 }
 
-Result<std::unique_ptr<OrientationModel>> loadLocalQuaternion(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<OrientationModel>>(
-      "parameters of local_quaternion", [&]() -> Result<std::unique_ptr<OrientationModel>> {
-        HexahedralCells cells = HexahedralCells::fromJson(parameters);
-        std::vector<Eigen::Quaterniond> q_error =
-            rotationsFrom(parameters.at("q_error_wxyz"), cells.corners_m().size());
-        return std::make_unique<LocalErrorRotation>(errorFrameFrom(parameters), std::move(cells), std::move(q_error),
-                                                    weightRuleFrom(parameters),
-                                                    parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<OrientationModel> loadLocalQuaternion(const JsonReader& parameters) {
+  HexahedralCells cells = HexahedralCells::fromJson(parameters);
+  std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters["q_error_wxyz"], cells.corners_m().size());
+  return std::make_unique<LocalErrorRotation>(errorFrameFrom(parameters), std::move(cells), std::move(q_error),
+                                              weightRuleFrom(parameters), parameters["note"].text());
 }
 
 Setting weightSetting() {
@@ -95,7 +90,7 @@ OrientationMethod localQuaternionOrientation() {
           .source = "Kindratenko, Bennett 2000; survey by Kindratenko, section 4.1, weights of eq. 9-11 and 13",
           .settings = {weightSetting(), lengthUnitSetting(), bumpEndSetting(), errorFrameSetting()},
           .fit = fitLocalQuaternion,
-          .load = loadLocalQuaternion};
+          .read = loadLocalQuaternion};
 }
 
 }  // namespace fieldtrue::correctors

@@ -56,15 +56,11 @@ Result<std::unique_ptr<OrientationModel>> fitSlerpTrilinear(const FitData& data,
                                               std::move(note));
 }
 
-Result<std::unique_ptr<OrientationModel>> loadSlerpTrilinear(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<OrientationModel>>(
-      "parameters of slerp_trilinear", [&]() -> Result<std::unique_ptr<OrientationModel>> {
-        HexahedralCells cells = HexahedralCells::fromJson(parameters);
-        std::vector<Eigen::Quaterniond> q_error =
-            rotationsFrom(parameters.at("q_error_wxyz"), cells.corners_m().size());
-        return std::make_unique<SlerpErrorRotation>(errorFrameFrom(parameters), std::move(cells), std::move(q_error),
-                                                    parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<OrientationModel> loadSlerpTrilinear(const JsonReader& parameters) {
+  HexahedralCells cells = HexahedralCells::fromJson(parameters);
+  std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters["q_error_wxyz"], cells.corners_m().size());
+  return std::make_unique<SlerpErrorRotation>(errorFrameFrom(parameters), std::move(cells), std::move(q_error),
+                                              parameters["note"].text());
 }
 
 }  // namespace
@@ -75,7 +71,7 @@ OrientationMethod slerpTrilinearOrientation() {
           .source = "Livingston, State 1997; survey by Kindratenko, section 4.1",
           .settings = {errorFrameSetting()},
           .fit = fitSlerpTrilinear,
-          .load = loadSlerpTrilinear};
+          .read = loadSlerpTrilinear};
 }
 
 }  // namespace fieldtrue::correctors

@@ -62,14 +62,10 @@ Result<std::unique_ptr<PositionModel>> fitTetrahedral(const FitData& data, const
       });
 }
 
-Result<std::unique_ptr<PositionModel>> loadTetrahedral(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of tetrahedral", [&]() -> Result<std::unique_ptr<PositionModel>> {
-        TetrahedralMesh mesh = TetrahedralMesh::fromJson(parameters);
-        std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters.at("v_m"), mesh.corners_m().size());
-        return std::make_unique<TetrahedralPosition>(std::move(mesh), std::move(v_m),
-                                                     parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<PositionModel> loadTetrahedral(const JsonReader& parameters) {
+  TetrahedralMesh mesh = TetrahedralMesh::fromJson(parameters);
+  std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], mesh.corners_m().size());
+  return std::make_unique<TetrahedralPosition>(std::move(mesh), std::move(v_m), parameters["note"].text());
 }
 
 }  // namespace
@@ -80,7 +76,7 @@ PositionMethod tetrahedralPosition() {
           .source = "Ellis et al. 1999; Kenwright, Lane 1996; survey by Kindratenko, section 3.2, eq. 5-7",
           .settings = {splitSetting()},
           .fit = fitTetrahedral,
-          .load = loadTetrahedral,
+          .read = loadTetrahedral,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -148,12 +148,12 @@ nlohmann::json TetrahedralMesh::toJson() const {
   std::vector<Corners> cells;
   cells.reserve(cells_.size());
   for (const Cell& cell : cells_) cells.push_back(cell.corners);
-  return {{"tracked_m", jsonOfPoints(corners_m_)}, {"cells", jsonOfCells<4>(cells)}};
+  return {{"tracked_m", jsonOfPoints(corners_m_)}, {"cells", cells}};
 }
 
-TetrahedralMesh TetrahedralMesh::fromJson(const nlohmann::json& json) {
-  std::vector<Eigen::Vector3d> corners_m = pointsFrom(json.at("tracked_m"));
-  const std::vector<Corners> cells = cellsFrom<4>(json.at("cells"), corners_m.size());
+TetrahedralMesh TetrahedralMesh::fromJson(const JsonReader& json) {
+  std::vector<Eigen::Vector3d> corners_m = pointsFrom(json["tracked_m"]);
+  const std::vector<Corners> cells = cellsFrom<4>(json["cells"], corners_m.size());
   return {std::move(corners_m), cells};
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/numerics/box_lookup.h"
 
 namespace fieldtrue::correctors {
@@ -38,8 +39,7 @@ class TetrahedralMesh {
 
   /// {"tracked_m": [[x, y, z], ...], "cells": [[4 numbers], ...]}
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static TetrahedralMesh fromJson(const nlohmann::json& json);
+  static TetrahedralMesh fromJson(const JsonReader& json);
 
  private:
   struct Cell {

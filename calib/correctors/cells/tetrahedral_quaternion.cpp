@@ -52,14 +52,11 @@ Result<std::unique_ptr<OrientationModel>> fitTetrahedralQuaternion(const FitData
                                                     std::move(tetrahedra->note));
 }
 
-Result<std::unique_ptr<OrientationModel>> loadTetrahedralQuaternion(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<OrientationModel>>(
-      "parameters of tetrahedral_quaternion", [&]() -> Result<std::unique_ptr<OrientationModel>> {
-        TetrahedralMesh mesh = TetrahedralMesh::fromJson(parameters);
-        std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters.at("q_error_wxyz"), mesh.corners_m().size());
-        return std::make_unique<TetrahedralErrorRotation>(errorFrameFrom(parameters), std::move(mesh),
-                                                          std::move(q_error), parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<OrientationModel> loadTetrahedralQuaternion(const JsonReader& parameters) {
+  TetrahedralMesh mesh = TetrahedralMesh::fromJson(parameters);
+  std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters["q_error_wxyz"], mesh.corners_m().size());
+  return std::make_unique<TetrahedralErrorRotation>(errorFrameFrom(parameters), std::move(mesh), std::move(q_error),
+                                                    parameters["note"].text());
 }
 
 }  // namespace
@@ -70,7 +67,7 @@ OrientationMethod tetrahedralQuaternionOrientation() {
           .source = "Ellis et al. 1999; survey by Kindratenko, section 4.1, weights of eq. 7",
           .settings = {splitSetting(), errorFrameSetting()},
           .fit = fitTetrahedralQuaternion,
-          .load = loadTetrahedralQuaternion};
+          .read = loadTetrahedralQuaternion};
 }
 
 }  // namespace fieldtrue::correctors

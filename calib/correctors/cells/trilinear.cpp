@@ -46,14 +46,10 @@ Result<std::unique_ptr<PositionModel>> fitTrilinear(const FitData& data, const S
       });
 }
 
-Result<std::unique_ptr<PositionModel>> loadTrilinear(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of trilinear", [&]() -> Result<std::unique_ptr<PositionModel>> {
-        HexahedralCells cells = HexahedralCells::fromJson(parameters);
-        std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters.at("v_m"), cells.corners_m().size());
-        return std::make_unique<TrilinearPosition>(
-            TrackedGrid{std::move(cells), std::move(v_m), parameters.at("note").get<std::string>()});
-      });
+std::unique_ptr<PositionModel> loadTrilinear(const JsonReader& parameters) {
+  HexahedralCells cells = HexahedralCells::fromJson(parameters);
+  std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], cells.corners_m().size());
+  return std::make_unique<TrilinearPosition>(TrackedGrid{std::move(cells), std::move(v_m), parameters["note"].text()});
 }
 
 }  // namespace
@@ -67,7 +63,7 @@ PositionMethod trilinearPosition() {
           "3.1, eq. 1-2",
       .settings = resampleSettings(),
       .fit = fitTrilinear,
-      .load = loadTrilinear,
+      .read = loadTrilinear,
       .origin = MethodOrigin::kSurvey,
       .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <mutex>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
@@ -231,20 +231,15 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const
   return std::make_unique<GaussianProcessHoldOut>(*std::move(system), *std::move(solutions));
 }
 
-Result<std::unique_ptr<PositionModel>> loadGaussianProcess(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of gaussian_process", [&]() -> Result<std::unique_ptr<PositionModel>> {
-        RadialField field = RadialField::fromJson(parameters);
-        const GaussianProcessScales scales{vectorFrom(parameters.at("length_m")),
-                                           parameters.at("signal_sd_m").get<double>(),
-                                           parameters.at("nugget_sd_m").get<double>()};
-        const auto stored_m2 = parameters.at("noise_m2").get<std::vector<double>>();
-        if (stored_m2.size() != field.centers_m().size()) throwMalformed("one noise_m2 for each centre is needed");
-        const Eigen::VectorXd noise_m2 =
-            Eigen::Map<const Eigen::VectorXd>(stored_m2.data(), static_cast<Eigen::Index>(stored_m2.size()));
-        return std::make_unique<GaussianProcessPosition>(std::move(field), scales, noise_m2,
-                                                         parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<PositionModel> loadGaussianProcess(const JsonReader& parameters) {
+  RadialField field = RadialField::fromJson(parameters);
+  const GaussianProcessScales scales{parameters["length_m"].vector3(), parameters["signal_sd_m"].number(),
+                                     parameters["nugget_sd_m"].number()};
+  const auto stored_m2 = parameters["noise_m2"].numbers();
+  if (stored_m2.size() != field.centers_m().size()) parameters["noise_m2"].refuse("one number for each centre");
+  const Eigen::VectorXd noise_m2 =
+      Eigen::Map<const Eigen::VectorXd>(stored_m2.data(), static_cast<Eigen::Index>(stored_m2.size()));
+  return std::make_unique<GaussianProcessPosition>(std::move(field), scales, noise_m2, parameters["note"].text());
 }
 
 std::vector<Setting> gaussianProcessSettings() {
@@ -291,7 +286,7 @@ PositionMethod gaussianProcessPosition() {
           "restricted likelihood: Patterson and Thompson 1971",
       .settings = gaussianProcessSettings(),
       .fit = fitGaussianProcess,
-      .load = loadGaussianProcess,
+      .read = loadGaussianProcess,
       .hold_out = holdOutGaussianProcess,
       .origin = MethodOrigin::kLater,
       .tries = {{"", simplicity::kSmoothing}}};

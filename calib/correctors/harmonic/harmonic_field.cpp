@@ -1,8 +1,8 @@
 #include <algorithm>
 
+#include "calib/core/json_reader.h"
 #include "calib/core/memory_limit.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/harmonic/harmonic_field_fit.h"
@@ -121,15 +121,14 @@ Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Se
   return std::make_unique<HarmonicField>(fit->field, fit->field_from_truth, box, fit->posterior, noteOf(data, *fit));
 }
 
-FieldPosterior posteriorFrom(const nlohmann::json& parameters, const std::vector<FieldSource>& sources) {
+FieldPosterior posteriorFrom(const JsonReader& parameters, const std::vector<FieldSource>& sources) {
   FieldPosterior posterior;
   for (const FieldSource& source : sources) posterior.sources.emplace_back(source.at_m);
-  posterior.about_m = vectorFrom(parameters.at("turned_about_m"));
-  const auto packed = parameters.at("covariance_root").get<std::vector<double>>();
+  posterior.about_m = parameters["turned_about_m"].vector3();
+  const auto packed = parameters["covariance_root"].numbers();
   const auto n = kPerSource * static_cast<Eigen::Index>(sources.size()) + 6;
   if (packed.size() != static_cast<std::size_t>(n * (n + 1) / 2))
-    throwMalformed("covariance_root needs " + std::to_string(n * (n + 1) / 2) + " numbers, got " +
-                   std::to_string(packed.size()));
+    parameters["covariance_root"].refuse(std::to_string(n * (n + 1) / 2) + " numbers");
   posterior.root = Eigen::MatrixXd::Zero(n, n);
   auto next = packed.begin();
   for (Eigen::Index row = 0; row < n; ++row)
@@ -137,22 +136,19 @@ FieldPosterior posteriorFrom(const nlohmann::json& parameters, const std::vector
   return posterior;
 }
 
-Result<std::unique_ptr<PositionModel>> loadHarmonic(const nlohmann::json& parameters) {
+std::unique_ptr<PositionModel> loadHarmonic(const JsonReader& parameters) {
   using Loaded = Result<std::unique_ptr<PositionModel>>;
-  return guarded<std::unique_ptr<PositionModel>>("parameters of harmonic_field", [&]() -> Loaded {
-    const Eigen::MatrixXd rows = matrixFrom(parameters.at("sources"), 12);
-    std::vector<FieldSource> sources(static_cast<std::size_t>(rows.rows()));
-    for (Eigen::Index k = 0; k < rows.rows(); ++k) {
-      const Eigen::Matrix<double, 9, 1> response = rows.row(k).tail<9>().transpose();
-      sources[static_cast<std::size_t>(k)] = {rows.row(k).head<3>().transpose(),
-                                              Eigen::Map<const Eigen::Matrix3d>(response.data())};
-    }
-    const TrackedBox box{vectorFrom(parameters.at("low_m")), vectorFrom(parameters.at("high_m"))};
-    FieldPosterior posterior = posteriorFrom(parameters, sources);
-    return std::make_unique<HarmonicField>(DisturbedField(std::move(sources)),
-                                           poseFrom(parameters.at("field_from_truth")), box, std::move(posterior),
-                                           parameters.at("note").get<std::string>());
-  });
+  const Eigen::MatrixXd rows = parameters["sources"].matrix(12);
+  std::vector<FieldSource> sources(static_cast<std::size_t>(rows.rows()));
+  for (Eigen::Index k = 0; k < rows.rows(); ++k) {
+    const Eigen::Matrix<double, 9, 1> response = rows.row(k).tail<9>().transpose();
+    sources[static_cast<std::size_t>(k)] = {rows.row(k).head<3>().transpose(),
+                                            Eigen::Map<const Eigen::Matrix3d>(response.data())};
+  }
+  const TrackedBox box{parameters["low_m"].vector3(), parameters["high_m"].vector3()};
+  FieldPosterior posterior = posteriorFrom(parameters, sources);
+  return std::make_unique<HarmonicField>(DisturbedField(std::move(sources)), parameters["field_from_truth"].pose(), box,
+                                         std::move(posterior), parameters["note"].text());
 }
 
 }  // namespace
@@ -199,7 +195,7 @@ PositionMethod harmonicFieldPosition() {
       "2003";
   method.settings = {least_gain, most_sources};
   method.fit = fitHarmonic;
-  method.load = loadHarmonic;
+  method.read = loadHarmonic;
   method.most_folds = 10;
   method.origin = MethodOrigin::kLater;
   method.tries = {{"", simplicity::kPhysical}};

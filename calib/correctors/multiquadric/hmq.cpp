@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/multiquadric/hmq_hold_out.h"
@@ -63,11 +63,7 @@ Result<std::unique_ptr<PositionModel>> fitHmq(const FitData& data, const Setting
   return std::make_unique<HmqPosition>(*std::move(field), problem->precision, note);
 }
 
-Result<std::unique_ptr<PositionModel>> loadHmq(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>("parameters of hmq", [&]() -> Result<std::unique_ptr<PositionModel>> {
-    return HmqPosition::fromJson(parameters);
-  });
-}
+std::unique_ptr<PositionModel> loadHmq(const JsonReader& parameters) { return HmqPosition::fromJson(parameters); }
 
 }  // namespace
 
@@ -109,7 +105,7 @@ PositionMethod hmqPosition() {
           .source = "Zachmann 1997; survey by Kindratenko, section 3.5, eq. 16-18; automatic R squared by Rippa 1999",
           .settings = {r2Setting(), precisionSetting()},
           .fit = fitHmq,
-          .load = loadHmq,
+          .read = loadHmq,
           .hold_out = holdOutHmq,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"r2_cm2=10", simplicity::kInterpolating},

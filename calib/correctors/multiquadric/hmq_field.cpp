@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 #include "calib/correctors/multiquadric/hmq_kernel.h"
 #include "calib/correctors/multiquadric/hmq_mixed.h"
 #include "calib/correctors/multiquadric/hmq_system.h"
@@ -87,12 +87,12 @@ nlohmann::json MultiquadricField::toJson() const {
   return {{"r2_m2", r2_m2_}, {"centers_m", std::move(centers)}, {"alpha", std::move(alphas)}};
 }
 
-MultiquadricField MultiquadricField::fromJson(const nlohmann::json& json, std::size_t outputs) {
-  const Eigen::MatrixXd centers = matrixFrom(json.at("centers_m"), 3);
-  const Eigen::MatrixXd alphas = matrixFrom(json.at("alpha"), static_cast<Eigen::Index>(outputs));
-  const double r2_m2 = json.at("r2_m2").get<double>();
+MultiquadricField MultiquadricField::fromJson(const JsonReader& json, std::size_t outputs) {
+  const Eigen::MatrixXd centers = json["centers_m"].matrix(3);
+  const Eigen::MatrixXd alphas = json["alpha"].matrix(static_cast<Eigen::Index>(outputs));
+  const double r2_m2 = json["r2_m2"].number();
   if (centers.rows() != alphas.rows() || centers.rows() == 0 || !(r2_m2 > 0.0))
-    throwMalformed("as many coefficients as centres and a positive r2_m2 are needed");
+    json.fail("needs as many coefficients as centres and a positive r2_m2.");
   std::vector<Eigen::Vector3d> centers_m;
   for (Eigen::Index j = 0; j < centers.rows(); ++j) centers_m.emplace_back(centers.row(j).transpose());
   return MultiquadricField(centers_m, alphas, r2_m2);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/core/error.h"
+#include "calib/core/json_reader.h"
 #include "calib/core/run_control.h"
 #include "calib/correctors/numerics/aligned_vector.h"
 
@@ -47,8 +48,7 @@ class MultiquadricField {
   Eigen::Matrix3d gradient3(const Eigen::Vector3d& p_m) const;
 
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static MultiquadricField fromJson(const nlohmann::json& json, std::size_t outputs);
+  static MultiquadricField fromJson(const JsonReader& json, std::size_t outputs);
 
  private:
   MultiquadricField() = default;

@@ -3,11 +3,11 @@
 #include <cstdio>
 #include <numbers>
 
+#include "calib/core/json_reader.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_memory.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/multiquadric/hmq_field.h"
@@ -98,13 +98,9 @@ Result<std::unique_ptr<OrientationModel>> fitHmqMatrix(const FitData& data, cons
   return std::make_unique<HmqErrorRotation>(frame, *std::move(field), note);
 }
 
-Result<std::unique_ptr<OrientationModel>> loadHmqMatrix(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<OrientationModel>>(
-      "parameters of hmq_matrix", [&]() -> Result<std::unique_ptr<OrientationModel>> {
-        return std::make_unique<HmqErrorRotation>(errorFrameFrom(parameters),
-                                                  MultiquadricField::fromJson(parameters, 9),
-                                                  parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<OrientationModel> loadHmqMatrix(const JsonReader& parameters) {
+  return std::make_unique<HmqErrorRotation>(errorFrameFrom(parameters), MultiquadricField::fromJson(parameters, 9),
+                                            parameters["note"].text());
 }
 
 }  // namespace
@@ -115,7 +111,7 @@ OrientationMethod hmqMatrixOrientation() {
           .source = "Zachmann 2000; survey by Kindratenko, section 4.3",
           .settings = {r2Setting(), errorFrameSetting()},
           .fit = fitHmqMatrix,
-          .load = loadHmqMatrix};
+          .read = loadHmqMatrix};
 }
 
 }  // namespace fieldtrue::correctors

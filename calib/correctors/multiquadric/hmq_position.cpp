@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 
@@ -46,13 +46,12 @@ nlohmann::json HmqPosition::parameters() const {
   return json;
 }
 
-std::unique_ptr<HmqPosition> HmqPosition::fromJson(const nlohmann::json& parameters) {
-  const std::string precision = parameters.value("precision", std::string("double"));
-  if (precision != "single" && precision != "double")
-    throwMalformed("precision must be double or single, got " + precision);
+std::unique_ptr<HmqPosition> HmqPosition::fromJson(const JsonReader& parameters) {
+  std::string precision = "double";
+  parameters.oneOf("precision", precision, {"double", "single"});
   return std::make_unique<HmqPosition>(MultiquadricField::fromJson(parameters, 3),
                                        precision == "single" ? HmqPrecision::kSingle : HmqPrecision::kDouble,
-                                       parameters.at("note").get<std::string>());
+                                       parameters["note"].text());
 }
 
 }  // namespace fieldtrue::correctors

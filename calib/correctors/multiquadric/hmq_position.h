@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/position_model.h"
 #include "calib/correctors/multiquadric/hmq_field.h"
 #include "calib/correctors/multiquadric/hmq_single.h"
@@ -23,8 +24,7 @@ class HmqPosition : public PositionModel {
   std::string note() const override { return note_; }
   nlohmann::json parameters() const override;
 
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static std::unique_ptr<HmqPosition> fromJson(const nlohmann::json& parameters);
+  static std::unique_ptr<HmqPosition> fromJson(const JsonReader& parameters);
 
  private:
   void values(std::span<const Eigen::Vector3d> p_m, std::span<Eigen::Vector3d> f) const;

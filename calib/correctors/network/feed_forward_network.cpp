@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -99,14 +99,14 @@ nlohmann::json FeedForwardNetwork::toJson() const {
           {"weights", std::vector<double>(weights_.data(), weights_.data() + weights_.size())}};
 }
 
-FeedForwardNetwork FeedForwardNetwork::fromJson(const nlohmann::json& json) {
-  const auto hidden = json.at("hidden").get<std::vector<int>>();
+FeedForwardNetwork FeedForwardNetwork::fromJson(const JsonReader& json) {
+  const auto hidden = json["hidden"].integers();
   if (hidden.size() != 2 || hidden[0] < 1 || hidden[0] > kMostHidden || hidden[1] < 1 || hidden[1] > kMostHidden)
-    throwMalformed("two hidden layers of 1 to " + std::to_string(kMostHidden) + " nodes are needed");
-  const auto weights = json.at("weights").get<std::vector<double>>();
+    json["hidden"].refuse("two layers of 1 to " + std::to_string(kMostHidden) + " nodes");
+  const auto weights = json["weights"].numbers();
   FeedForwardNetwork network(hidden[0], hidden[1]);
   if (static_cast<Eigen::Index>(weights.size()) != network.weights_.size())
-    throwMalformed("the number of weights does not fit the layers");
+    json["weights"].refuse(std::to_string(network.weights_.size()) + " numbers");
   network.weights_ = Eigen::Map<const Eigen::VectorXd>(weights.data(), network.weights_.size());
   return network;
 }

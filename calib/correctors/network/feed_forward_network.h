@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 
+#include "calib/core/json_reader.h"
+
 namespace fieldtrue::correctors {
 
 /// A network of 3 linear inputs, two hidden layers of logistic nodes f(s) = 1/(1 + e^-s) and 3 linear outputs, with a
@@ -39,8 +41,7 @@ class FeedForwardNetwork {
   int secondHidden() const { return n_second_; }
 
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static FeedForwardNetwork fromJson(const nlohmann::json& json);
+  static FeedForwardNetwork fromJson(const JsonReader& json);
 
  private:
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

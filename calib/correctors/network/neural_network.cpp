@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/network/feed_forward_network.h"
@@ -33,9 +33,9 @@ struct Scaling {
   Eigen::Vector3d scaled(const Eigen::Vector3d& p_m) const { return (p_m - center_m) / half_m; }
 
   nlohmann::json toJson() const { return {{"center_m", jsonOf(center_m)}, {"half_m", half_m}}; }
-  static Scaling fromJson(const nlohmann::json& json) {
-    const Scaling scaling{vectorFrom(json.at("center_m")), json.at("half_m").get<double>()};
-    if (!(scaling.half_m > 0.0)) throwMalformed("half_m must be above 0");
+  static Scaling fromJson(const JsonReader& json) {
+    const Scaling scaling{json["center_m"].vector3(), json["half_m"].number()};
+    if (!(scaling.half_m > 0.0)) json["half_m"].refuse("above 0");
     return scaling;
   }
 };
@@ -136,13 +136,10 @@ Result<std::unique_ptr<PositionModel>> fitNeuralNetwork(const FitData& data, con
   return std::make_unique<NeuralNetworkPosition>(std::move(trained->network), tracked, truth, note);
 }
 
-Result<std::unique_ptr<PositionModel>> loadNeuralNetwork(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of neural_network", [&]() -> Result<std::unique_ptr<PositionModel>> {
-        return std::make_unique<NeuralNetworkPosition>(
-            FeedForwardNetwork::fromJson(parameters.at("network")), Scaling::fromJson(parameters.at("tracked")),
-            Scaling::fromJson(parameters.at("true")), parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<PositionModel> loadNeuralNetwork(const JsonReader& parameters) {
+  return std::make_unique<NeuralNetworkPosition>(FeedForwardNetwork::fromJson(parameters["network"]),
+                                                 Scaling::fromJson(parameters["tracked"]),
+                                                 Scaling::fromJson(parameters["true"]), parameters["note"].text());
 }
 
 Setting number(const char* key, const char* label, const char* unit, double min, double max, double value,
@@ -208,7 +205,7 @@ PositionMethod neuralNetworkPosition() {
           "by Kindratenko, section 3.6",
       .settings = neuralNetworkSettings(),
       .fit = fitNeuralNetwork,
-      .load = loadNeuralNetwork,
+      .read = loadNeuralNetwork,
       .most_folds = 10,
       .origin = MethodOrigin::kSurvey};
 }

@@ -3,9 +3,9 @@
 #include <map>
 #include <numbers>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_rows.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/radial/rbf_field.h"
@@ -244,32 +244,22 @@ Result<std::unique_ptr<PositionModel>> fitPhysicsResidual(const FitData& data, c
   return modelOf(data, std::move(fit->positions), note, settings, control);
 }
 
-Result<identify::ScenePositions> sceneFrom(const nlohmann::json& json) {
+identify::ScenePositions sceneFrom(const JsonReader& json) {
   identify::PositionScene scene;
-  scene.tracker_from_reference = poseFrom(json.at("tracker_from_reference"));
-  scene.tracker_from_sensor = quaternionFrom(json.at("tracker_from_sensor_q_wxyz"));
-  if (!json.at("effects").is_array()) throwMalformed("a list of effects is needed");
-  for (const nlohmann::json& effect : json.at("effects"))
-    scene.effects.push_back({effect.at("id").get<std::string>(), effect.at("parameters")});
-  const Eigen::MatrixXd places_m = matrixFrom(json.at("places_m"), 3);
+  scene.tracker_from_reference = json["tracker_from_reference"].pose();
+  scene.tracker_from_sensor = json["tracker_from_sensor_q_wxyz"].quaternion();
+  for (const JsonReader& effect : json["effects"].entries())
+    scene.effects.push_back({effect["id"].text(), effect["parameters"].raw()});
+  const Eigen::MatrixXd places_m = json["places_m"].matrix(3);
   for (Eigen::Index i = 0; i < places_m.rows(); ++i) scene.places_m.emplace_back(places_m.row(i).transpose());
-  return identify::ScenePositions::make(std::move(scene));
+  return json.valueOf(identify::ScenePositions::make(std::move(scene)));
 }
 
-Result<std::unique_ptr<PositionModel>> loadPhysicsResidual(const nlohmann::json& parameters) {
-  using Loaded = Result<std::unique_ptr<PositionModel>>;
-  return guarded<std::unique_ptr<PositionModel>>("parameters of physics_residual", [&]() -> Loaded {
-    std::optional<identify::ScenePositions> physics;
-    if (!parameters.at("scene").is_null()) {
-      auto scene = sceneFrom(parameters.at("scene"));
-      if (!scene) return tl::unexpected(scene.error());
-      physics = *std::move(scene);
-    }
-    auto remainder = gaussianProcessPosition().load(parameters.at("remainder"));
-    if (!remainder) return tl::unexpected(remainder.error());
-    return std::make_unique<PhysicsResidual>(std::move(physics), *std::move(remainder),
-                                             parameters.at("note").get<std::string>());
-  });
+std::unique_ptr<PositionModel> loadPhysicsResidual(const JsonReader& parameters) {
+  std::optional<identify::ScenePositions> physics;
+  if (const JsonReader scene = parameters["scene"]; !scene.isNull()) physics = sceneFrom(scene);
+  return std::make_unique<PhysicsResidual>(std::move(physics), gaussianProcessPosition().read(parameters["remainder"]),
+                                           parameters["note"].text());
 }
 
 Setting integerOf(std::string key, std::string label, double min, double max, std::int64_t usual, std::string help) {
@@ -303,7 +293,7 @@ PositionMethod physicsResidualPosition() {
                                       "With more places than these, the scene is sought on a well-spread part of them; "
                                       "the Gaussian process takes all."));
   method.fit = fitPhysicsResidual;
-  method.load = loadPhysicsResidual;
+  method.read = loadPhysicsResidual;
   method.most_folds = 5;
   method.origin = MethodOrigin::kLater;
   return method;

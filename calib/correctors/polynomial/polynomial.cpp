@@ -28,10 +28,6 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomial(const FitD
   return holdOutPolynomialPosition(data, *degree, degreeName(kLabel, degree->degree));
 }
 
-Result<std::unique_ptr<PositionModel>> loadPolynomial(const nlohmann::json& parameters) {
-  return loadPolynomialPosition(parameters, "polynomial");
-}
-
 }  // namespace
 
 PositionMethod polynomialPosition() {
@@ -42,7 +38,7 @@ PositionMethod polynomialPosition() {
           "Kindratenko 1999; Ikits, Brederson, Hansen, Hollerbach 2001; survey by Kindratenko, section 3.4, eq. 14-15",
       .settings = {degreeSetting()},
       .fit = fitPolynomial,
-      .load = loadPolynomial,
+      .read = loadPolynomialPosition,
       .hold_out = holdOutPolynomial,
       .origin = MethodOrigin::kSurvey,
       .tries = {{"degree=2", 3}, {"degree=3", 4}, {"degree=4", 5}, {"degree=5", 6}, {"degree=6", 7}}};

@@ -4,8 +4,8 @@
 #include <map>
 #include <optional>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/polynomial/polynomial_position.h"
 
 namespace fieldtrue::correctors {
@@ -100,8 +100,10 @@ nlohmann::json ChosenPolynomial::toJson() const {
   return json;
 }
 
-ChosenPolynomial ChosenPolynomial::fromJson(const nlohmann::json& json) {
-  return {PolynomialField::fromJson(json), json.value("degree_note", std::string())};
+ChosenPolynomial ChosenPolynomial::fromJson(const JsonReader& json) {
+  ChosenPolynomial chosen{PolynomialField::fromJson(json), {}};
+  json.text("degree_note", chosen.degree_note);
+  return chosen;
 }
 
 Setting degreeSetting() {

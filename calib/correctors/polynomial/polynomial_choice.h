@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/core/json_reader.h"
 #include "calib/core/run_control.h"
 #include "calib/core/settings.h"
 #include "calib/correctors/base/fit_data.h"
@@ -33,8 +34,7 @@ struct ChosenPolynomial {
   /// Everything the user should know about it; empty when nothing.
   std::string note() const;
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static ChosenPolynomial fromJson(const nlohmann::json& json);
+  static ChosenPolynomial fromJson(const JsonReader& json);
 };
 
 /// The degree that the setting `degree` asks for. For `auto` every degree from 1 to 6 that the places determine is

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/core/json_reader.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_names.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/polynomial/polynomial_choice.h"
@@ -82,13 +82,9 @@ Result<std::unique_ptr<OrientationModel>> fitPolynomialEuler(const FitData& data
       });
 }
 
-Result<std::unique_ptr<OrientationModel>> loadPolynomialEuler(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<OrientationModel>>(
-      "parameters of polynomial_euler", [&]() -> Result<std::unique_ptr<OrientationModel>> {
-        return std::make_unique<EulerErrorRotation>(
-            errorFrameFrom(parameters), quaternionFrom(parameters.at("q_reference_wxyz")),
-            ChosenPolynomial::fromJson(parameters.at("azimuth_elevation_roll")));
-      });
+std::unique_ptr<OrientationModel> loadPolynomialEuler(const JsonReader& parameters) {
+  return std::make_unique<EulerErrorRotation>(errorFrameFrom(parameters), parameters["q_reference_wxyz"].quaternion(),
+                                              ChosenPolynomial::fromJson(parameters["azimuth_elevation_roll"]));
 }
 
 }  // namespace
@@ -99,7 +95,7 @@ OrientationMethod polynomialEulerOrientation() {
           .source = "Kindratenko 1999; survey by Kindratenko, section 4.2",
           .settings = {degreeSetting(), errorFrameSetting()},
           .fit = fitPolynomialEuler,
-          .load = loadPolynomialEuler};
+          .read = loadPolynomialEuler};
 }
 
 }  // namespace fieldtrue::correctors

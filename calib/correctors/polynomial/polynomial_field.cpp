@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "calib/core/geometry.h"
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -169,24 +169,20 @@ nlohmann::json PolynomialField::toJson() const {
           {"pivot_ratio", pivot_ratio_}};
 }
 
-PolynomialField PolynomialField::fromJson(const nlohmann::json& json) {
+PolynomialField PolynomialField::fromJson(const JsonReader& json) {
   PolynomialField field;
-  field.dimension_ = json.at("dimension").get<int>();
-  field.degree_ = json.at("degree").get<int>();
-  if (field.dimension_ < 2 || field.dimension_ > 3 || field.degree_ < 0 || field.degree_ > kMaxDegree)
-    throwMalformed("dimension 2 or 3 and a degree of 0 to 6 are needed");
-  field.center_m_ = vectorFrom(json.at("center_m"));
-  const Eigen::MatrixXd axes = matrixFrom(json.at("axes"), 3);
-  if (axes.rows() != 3) throwMalformed("axes must be a 3 by 3 matrix");
-  field.axes_ = axes;
-  field.scale_m_ = vectorFrom(json.at("scale_m"));
+  field.dimension_ = static_cast<int>(json["dimension"].integer(2, 3));
+  field.degree_ = static_cast<int>(json["degree"].integer(0, kMaxDegree));
+  field.center_m_ = json["center_m"].vector3();
+  field.axes_ = json["axes"].matrix3();
+  field.scale_m_ = json["scale_m"].vector3();
   const Eigen::Index n_terms = termCount(field.dimension_, field.degree_);
-  field.coefficients_ = matrixFrom(json.at("coefficients"), 3);
-  field.inverse_root_ = matrixFrom(json.at("inverse_root"), n_terms);
+  field.coefficients_ = json["coefficients"].matrix(3);
+  field.inverse_root_ = json["inverse_root"].matrix(n_terms);
   if (field.coefficients_.rows() != n_terms || field.inverse_root_.rows() != n_terms)
-    throwMalformed("the number of coefficients does not fit the degree");
-  field.residual_sd_ = json.at("residual_sd").get<double>();
-  field.pivot_ratio_ = json.at("pivot_ratio").get<double>();
+    json.fail("needs " + std::to_string(n_terms) + " rows of coefficients and of inverse_root for its degree.");
+  field.residual_sd_ = json["residual_sd"].number();
+  field.pivot_ratio_ = json["pivot_ratio"].number();
   return field;
 }
 

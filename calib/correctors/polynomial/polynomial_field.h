@@ -7,6 +7,7 @@
 #include <string>
 
 #include "calib/core/error.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 
@@ -47,8 +48,7 @@ class PolynomialField {
   double pivotRatio() const { return pivot_ratio_; }
 
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static PolynomialField fromJson(const nlohmann::json& json);
+  static PolynomialField fromJson(const JsonReader& json);
 
  private:
   friend class PolynomialHoldOut;

@@ -1,7 +1,7 @@
 #include "calib/correctors/polynomial/polynomial_position.h"
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/polynomial/polynomial_hold_out.h"
 
@@ -90,12 +90,8 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomialPosition(co
       });
 }
 
-Result<std::unique_ptr<PositionModel>> loadPolynomialPosition(const nlohmann::json& parameters,
-                                                              const std::string& name) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of " + name, [&]() -> Result<std::unique_ptr<PositionModel>> {
-        return std::make_unique<PolynomialPosition>(ChosenPolynomial::fromJson(parameters));
-      });
+std::unique_ptr<PositionModel> loadPolynomialPosition(const JsonReader& parameters) {
+  return std::make_unique<PolynomialPosition>(ChosenPolynomial::fromJson(parameters));
 }
 
 }  // namespace fieldtrue::correctors

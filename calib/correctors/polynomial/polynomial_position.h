@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_data.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/position_model.h"
@@ -24,9 +25,8 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomialPosition(co
                                                                               const PolynomialDegree& degree,
                                                                               const std::string& name);
 
-/// @error kBadInput
-Result<std::unique_ptr<PositionModel>> loadPolynomialPosition(const nlohmann::json& parameters,
-                                                              const std::string& name);
+/// Of any degree, the affine map included.
+std::unique_ptr<PositionModel> loadPolynomialPosition(const JsonReader& parameters);
 
 /// p_true - p_tracked of every row [m].
 std::vector<Eigen::Vector3d> displacements_m(const FitData& data);

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/core/json_reader.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/polynomial/polynomial_choice.h"
@@ -57,13 +57,10 @@ Result<std::unique_ptr<OrientationModel>> fitPolynomialQuaternion(const FitData&
       });
 }
 
-Result<std::unique_ptr<OrientationModel>> loadPolynomialQuaternion(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<OrientationModel>>(
-      "parameters of polynomial_quaternion", [&]() -> Result<std::unique_ptr<OrientationModel>> {
-        return std::make_unique<PolynomialErrorRotation>(errorFrameFrom(parameters),
-                                                         quaternionFrom(parameters.at("q_reference_wxyz")),
-                                                         ChosenPolynomial::fromJson(parameters.at("vector_part")));
-      });
+std::unique_ptr<OrientationModel> loadPolynomialQuaternion(const JsonReader& parameters) {
+  return std::make_unique<PolynomialErrorRotation>(errorFrameFrom(parameters),
+                                                   parameters["q_reference_wxyz"].quaternion(),
+                                                   ChosenPolynomial::fromJson(parameters["vector_part"]));
 }
 
 }  // namespace
@@ -74,7 +71,7 @@ OrientationMethod polynomialQuaternionOrientation() {
           .source = "Ikits, Brederson, Hansen, Hollerbach 2001; survey by Kindratenko, section 4.2",
           .settings = {degreeSetting(), errorFrameSetting()},
           .fit = fitPolynomialQuaternion,
-          .load = loadPolynomialQuaternion};
+          .read = loadPolynomialQuaternion};
 }
 
 }  // namespace fieldtrue::correctors

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
-#include "calib/correctors/base/json_values.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/radial/field_position.h"
@@ -169,10 +169,8 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutRbf(const FitData& da
   return std::make_unique<RbfHoldOut>(*std::move(system), *std::move(solutions));
 }
 
-Result<std::unique_ptr<PositionModel>> loadRbf(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>("parameters of rbf", [&]() -> Result<std::unique_ptr<PositionModel>> {
-    return std::make_unique<RbfPosition>(RadialField::fromJson(parameters), parameters.at("note").get<std::string>());
-  });
+std::unique_ptr<PositionModel> loadRbf(const JsonReader& parameters) {
+  return std::make_unique<RbfPosition>(RadialField::fromJson(parameters), parameters["note"].text());
 }
 
 std::vector<Setting> rbfSettings() {
@@ -217,7 +215,7 @@ PositionMethod rbfPosition() {
           .source = "Hardy 1971; Duchon 1977; shape and smoothing by leave-one-out: Rippa 1999, eq. 17",
           .settings = rbfSettings(),
           .fit = fitRbf,
-          .load = loadRbf,
+          .read = loadRbf,
           .hold_out = holdOutRbf,
           .origin = MethodOrigin::kLater,
           .tries = {{"", simplicity::kSmoothing}, {"kernel=thin_plate", simplicity::kSmoothing}}};

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "calib/core/geometry.h"
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 #include "calib/correctors/multiquadric/hmq_kernel.h"
 
 namespace fieldtrue::correctors {
@@ -79,15 +79,12 @@ nlohmann::json FieldFrame::toJson() const {
           {"dimension", dimension}};
 }
 
-FieldFrame FieldFrame::fromJson(const nlohmann::json& json) {
+FieldFrame FieldFrame::fromJson(const JsonReader& json) {
   FieldFrame frame;
-  frame.center_m = vectorFrom(json.at("center_m"));
-  const Eigen::MatrixXd axes = matrixFrom(json.at("axes"), 3);
-  if (axes.rows() != 3) throwMalformed("axes must be a 3 by 3 matrix");
-  frame.axes = axes;
-  frame.per_m = vectorFrom(json.at("per_m"));
-  frame.dimension = json.at("dimension").get<int>();
-  if (frame.dimension < 2 || frame.dimension > 3) throwMalformed("dimension 2 or 3 is needed");
+  frame.center_m = json["center_m"].vector3();
+  frame.axes = json["axes"].matrix3();
+  frame.per_m = json["per_m"].vector3();
+  frame.dimension = static_cast<int>(json["dimension"].integer(2, 3));
   return frame;
 }
 
@@ -184,17 +181,17 @@ nlohmann::json RadialField::toJson() const {
           {"tail", jsonOf(Eigen::MatrixXd(tail_.topRows(1 + frame_.dimension)))}};
 }
 
-RadialField RadialField::fromJson(const nlohmann::json& json) {
-  const auto kernel = radialKernelFrom(json.at("kernel").get<std::string>());
-  if (!kernel) throwMalformed("the kernel '" + json.at("kernel").get<std::string>() + "' is not known");
-  const FieldFrame frame = FieldFrame::fromJson(json.at("frame"));
-  const Eigen::MatrixXd centers = matrixFrom(json.at("centers_m"), 3);
-  const RadialSolution solution{matrixFrom(json.at("coefficients"), 3), matrixFrom(json.at("tail"), 3)};
+RadialField RadialField::fromJson(const JsonReader& json) {
+  const auto kernel = radialKernelFrom(json["kernel"].text());
+  if (!kernel) json["kernel"].refuse("the name of a kernel");
+  const FieldFrame frame = FieldFrame::fromJson(json["frame"]);
+  const Eigen::MatrixXd centers = json["centers_m"].matrix(3);
+  const RadialSolution solution{json["coefficients"].matrix(3), json["tail"].matrix(3)};
   if (solution.coefficients.rows() != centers.rows() || solution.tail.rows() != 1 + frame.dimension)
-    throwMalformed("as many coefficients as centres and a tail of the frame's dimension are needed");
+    json.fail("needs as many coefficients as centres and a tail of the frame's dimension.");
   std::vector<Eigen::Vector3d> centers_m;
   for (Eigen::Index i = 0; i < centers.rows(); ++i) centers_m.emplace_back(centers.row(i).transpose());
-  return RadialField(*kernel, json.at("shape_squared").get<double>(), frame, centers_m, solution);
+  return RadialField(*kernel, json["shape_squared"].number(), frame, centers_m, solution);
 }
 
 Eigen::VectorXd placeNoise_m2(const FitData& data, const Places& places) {

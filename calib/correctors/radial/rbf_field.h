@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/radial/rbf_kernels.h"
 
@@ -30,8 +31,7 @@ struct FieldFrame {
   Eigen::MatrixXd tail(std::span<const Eigen::Vector3d> p_m) const;
 
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static FieldFrame fromJson(const nlohmann::json& json);
+  static FieldFrame fromJson(const JsonReader& json);
 };
 
 /// Root mean squared distance of places from their mean [m]; 1 where they are all at one point.
@@ -61,8 +61,7 @@ class RadialField {
   const std::vector<Eigen::Vector3d>& centers_m() const { return centers_m_; }
 
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static RadialField fromJson(const nlohmann::json& json);
+  static RadialField fromJson(const JsonReader& json);
 
  private:
   RadialArrays arrays(std::size_t start, std::size_t count) const;

@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "calib/core/geometry.h"
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/radial/field_position.h"
@@ -144,12 +144,8 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutBspline(const FitData
   return std::make_unique<BsplineHoldOut>(*std::move(system));
 }
 
-Result<std::unique_ptr<PositionModel>> loadBspline(const nlohmann::json& parameters) {
-  return guarded<std::unique_ptr<PositionModel>>(
-      "parameters of bspline", [&]() -> Result<std::unique_ptr<PositionModel>> {
-        return std::make_unique<BsplinePosition>(SplineField::fromJson(parameters),
-                                                 parameters.at("note").get<std::string>());
-      });
+std::unique_ptr<PositionModel> loadBspline(const JsonReader& parameters) {
+  return std::make_unique<BsplinePosition>(SplineField::fromJson(parameters), parameters["note"].text());
 }
 
 std::vector<Setting> bsplineSettings() {
@@ -185,7 +181,7 @@ PositionMethod bsplinePosition() {
       .source = "Eilers and Marx 1996, penalised B-splines; generalised cross-validation: Golub, Heath and Wahba 1979",
       .settings = bsplineSettings(),
       .fit = fitBspline,
-      .load = loadBspline,
+      .read = loadBspline,
       .hold_out = holdOutBspline,
       .origin = MethodOrigin::kLater,
       .tries = {{"", simplicity::kSmoothing}}};

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/correctors/base/json_values.h"
+#include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -132,18 +132,18 @@ nlohmann::json SplineLattice::toJson() const {
   return {{"frame", frame_.toJson()}, {"low_m", jsonOf(low_m_)}, {"high_m", jsonOf(high_m_)}, {"spans", spans_}};
 }
 
-SplineLattice SplineLattice::fromJson(const nlohmann::json& json) {
+SplineLattice SplineLattice::fromJson(const JsonReader& json) {
   constexpr int kMostSpans = 1000;
   SplineLattice lattice;
-  lattice.frame_ = FieldFrame::fromJson(json.at("frame"));
-  lattice.low_m_ = vectorFrom(json.at("low_m"));
-  lattice.high_m_ = vectorFrom(json.at("high_m"));
-  lattice.spans_ = json.at("spans").get<std::array<int, 3>>();
+  lattice.frame_ = FieldFrame::fromJson(json["frame"]);
+  lattice.low_m_ = json["low_m"].vector3();
+  lattice.high_m_ = json["high_m"].vector3();
+  lattice.spans_ = json["spans"].integers3();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const int least = static_cast<int>(axis) < lattice.frame_.dimension ? 1 : 0;
     const auto a = static_cast<int>(axis);
     if (lattice.spans_[axis] < least || lattice.spans_[axis] > kMostSpans || !(lattice.high_m_[a] > lattice.low_m_[a]))
-      throwMalformed("a box with at least one span along every axis is needed");
+      json.fail("needs a box with at least one span along every axis.");
   }
   return lattice;
 }
@@ -207,12 +207,12 @@ nlohmann::json SplineField::toJson() const {
   return json;
 }
 
-SplineField SplineField::fromJson(const nlohmann::json& json) {
+SplineField SplineField::fromJson(const JsonReader& json) {
   SplineLattice lattice = SplineLattice::fromJson(json);
-  const Matrix coefficients = matrixFrom(json.at("coefficients"), 3);
-  const Matrix trend = matrixFrom(json.at("trend"), 3);
+  const Matrix coefficients = json["coefficients"].matrix(3);
+  const Matrix trend = json["trend"].matrix(3);
   if (coefficients.rows() != lattice.size() || trend.rows() != 1 + lattice.frame().dimension)
-    throwMalformed("one coefficient for each function of the lattice and a trend of the frame's dimension are needed");
+    json.fail("needs one coefficient for each function of the lattice and a trend of the frame's dimension.");
   return SplineField(std::move(lattice), coefficients, trend);
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "calib/core/json_reader.h"
 #include "calib/correctors/radial/rbf_field.h"
 
 namespace fieldtrue::correctors {
@@ -36,8 +37,7 @@ class SplineLattice {
   Eigen::MatrixXd bendingPenalty() const;
 
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static SplineLattice fromJson(const nlohmann::json& json);
+  static SplineLattice fromJson(const JsonReader& json);
 
  private:
   Eigen::Index functionsAlong(int axis) const;
@@ -61,8 +61,7 @@ class SplineField {
   Eigen::Matrix3d gradient(const Eigen::Vector3d& p_m) const;
 
   nlohmann::json toJson() const;
-  /// Throws nlohmann::json::exception for other JSON: call inside `guarded`.
-  static SplineField fromJson(const nlohmann::json& json);
+  static SplineField fromJson(const JsonReader& json);
 
  private:
   Eigen::Vector3d sum(const Eigen::Vector3d& u_m, const std::array<int, 3>& order) const;

@@ -262,40 +262,40 @@ class PlanTest : public QObject {
     QTest::newRow("empty") << "{}"
                            << "lab: needs grid or nodes";
     QTest::newRow("list") << "[]"
-                          << "a plan must be a JSON object";
+                          << "lab: the file is []; it must be an object";
     QTest::newRow("grid") << R"({"grid": "5x5@0.3"})"
                           << "lab: grid 5x5@0.3: expected NXxNYxNZ, got 5x5";
     QTest::newRow("grid is a number") << R"({"grid": 5})"
-                                      << "grid must be text like \"5x5x4@0.3048\", got 5";
+                                      << "grid is 5; it must be text like \"5x5x4@0.3048\"";
     QTest::newRow("unknown key") << R"({"grid": "1x1x1@1", "pitch": 1})"
-                                 << "unknown key pitch (known: schema, grid";
+                                 << "pitch is not known; did you mean grid? Known: schema, grid";
     QTest::newRow("origin") << R"({"grid": "1x1x1@1", "origin": [1, 2]})"
-                            << "origin must be [x, y, z] in metres";
+                            << "origin is [1,2]; it must be three numbers of size up to 1000 [m]";
     QTest::newRow("origin text") << R"({"grid": "1x1x1@1", "origin": [1, 2, "3"]})"
-                                 << "origin must be [x, y, z]";
+                                 << "it must be three numbers";
     QTest::newRow("order") << R"({"grid": "1x1x1@1", "order": "left"})"
-                           << R"(got "left")";
+                           << R"(order is the text "left"; it must be "serpentine" or "random")";
     QTest::newRow("seed") << R"({"grid": "1x1x1@1", "seed": -3})"
-                          << "seed must be a whole number from 0, got -3";
+                          << "seed is -3; it must be a whole number from 0";
     QTest::newRow("reseat") << R"({"grid": "1x1x1@1", "reseat": 1.5})"
-                            << "reseat must be a whole number";
+                            << "reseat is 1.5; it must be a whole number from 1 to 1000";
     QTest::newRow("no nodes") << R"({"nodes": []})"
-                              << "nodes must be a list with at least one node";
-    QTest::newRow("no z") << node("\"y_m\": 2")
-                          << "lab: nodes[0]: z_m must be a number of metres within 1000, got nothing";
-    QTest::newRow("far away") << node("\"z_m\": 1e9") << "z_m must be a number of metres within 1000";
-    QTest::newRow("half a quaternion") << node("\"z_m\": 3, \"qw\": 1")
-                                       << "qx must be a number (qw, qx, qy and qz stand together)";
-    QTest::newRow("zero quaternion") << node("\"z_m\": 3, \"qw\": 0, \"qx\": 0, \"qy\": 0, \"qz\": 0") << "not zero";
-    QTest::newRow("half an index") << node("\"z_m\": 3, \"i\": 1")
-                                   << "j must be a whole number (i, j and k stand together)";
-    QTest::newRow("role") << node("\"z_m\": 3, \"role\": \"skipped\"") << R"(role must be "fit" or "validation")";
+                              << "nodes is []; it must be a list with at least one node";
+    QTest::newRow("no z") << node("\"y_m\": 2") << "lab: nodes[0].z_m is missing";
+    QTest::newRow("far away") << node("\"z_m\": 1e9")
+                              << "nodes[0].z_m is 1000000000; it must be a number of metres within 1000";
+    QTest::newRow("half a quaternion") << node("\"z_m\": 3, \"qw\": 1") << "nodes[0] needs qw, qx, qy and qz together";
+    QTest::newRow("zero quaternion") << node("\"z_m\": 3, \"qw\": 0, \"qx\": 0, \"qy\": 0, \"qz\": 0")
+                                     << "quaternion of zeros";
+    QTest::newRow("half an index") << node("\"z_m\": 3, \"i\": 1") << "nodes[0] needs i, j and k together";
+    QTest::newRow("role") << node("\"z_m\": 3, \"role\": \"skipped\"")
+                          << R"(role is the text "skipped"; it must be "fit" or "validation")";
     QTest::newRow("twice") << R"({"nodes": [{"node": 1, "visit": 0, "x_m": 1, "y_m": 2, "z_m": 3},
         {"node": 1, "visit": 0, "x_m": 1, "y_m": 2, "z_m": 3}]})"
-                           << "nodes[1]: node 1 visit 0 is listed twice";
+                           << "nodes[1] is node 1, visit 0, which is listed twice";
     QTest::newRow("visits twice over")
         << R"({"reseat": 2, "nodes": [{"node": 1, "visit": 1, "x_m": 1, "y_m": 2, "z_m": 3}]})"
-        << "visit must be 0 when orientations or reseat ask for further visits";
+        << "nodes[0].visit is 1; it must be 0 when orientations or reseat ask for further visits";
   }
   void badJsonIsNamed() {
     QFETCH(QString, text);

@@ -237,7 +237,7 @@ class GeometryTest : public QObject {
 
   void regionSurvivesJson() {
     const Region region = Region::around(moved(grid(3, 4, 3, 0.3), kPose), 3, 0.015);
-    const auto back = Region::fromJson(nlohmann::json::parse(region.toJson().dump()));
+    const auto back = readJson<Region>(nlohmann::json::parse(region.toJson().dump()), "region", Region::fromJson);
     FT_VERIFY_OK(back);
     FT_VERIFY_MATCH(sameBits(back->margin_m(), region.margin_m()));
     for (const double x : {-0.3, 0.1, 2.0}) {
@@ -256,7 +256,7 @@ class GeometryTest : public QObject {
   }
   void regionRefusesJson() {
     QFETCH(QByteArray, text);
-    const auto region = Region::fromJson(nlohmann::json::parse(text.toStdString()));
+    const auto region = readJson<Region>(nlohmann::json::parse(text.toStdString()), "region", Region::fromJson);
     QVERIFY(!region);
     QVERIFY(region.error().code == ErrorCode::kBadInput);
   }

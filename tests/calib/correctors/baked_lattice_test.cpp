@@ -37,6 +37,10 @@ class FormulaModel : public PositionModel {
   Displacement formula_m_;
 };
 
+Result<std::unique_ptr<PositionModel>> load(const json& stored) {
+  return readJson<std::unique_ptr<PositionModel>>(stored, "lattice", BakedLattice::fromJson);
+}
+
 std::vector<Eigen::Vector3d> places() { return shakenGrid({5, 5, 4}, 0.25, 0.01); }
 
 Region regionOf(const std::vector<Eigen::Vector3d>& places_m) { return Region::around(places_m, 3, 0.06); }
@@ -280,7 +284,7 @@ class BakedLatticeTest : public QObject {
     model.covers_ = [](const Eigen::Vector3d& p) { return p.x() + p.y() < 1.3; };
     const auto lattice = bake(model, 1e-3);
     FT_VERIFY_OK(lattice);
-    const auto reloaded = BakedLattice::load(json::parse((*lattice)->parameters().dump()));
+    const auto reloaded = load(json::parse((*lattice)->parameters().dump()));
     FT_VERIFY_OK(reloaded);
     QVERIFY((*reloaded)->parameters() == (*lattice)->parameters());
     QVERIFY((*reloaded)->note() == (*lattice)->note());
@@ -325,7 +329,7 @@ class BakedLatticeTest : public QObject {
   }
   void damagedLatticesAreRefused() {
     QFETCH(QByteArray, text);
-    const auto loaded = BakedLattice::load(json::parse(text.toStdString()));
+    const auto loaded = load(json::parse(text.toStdString()));
     QVERIFY(!loaded);
     QCOMPARE(loaded.error().code, ErrorCode::kBadInput);
     FT_VERIFY_MATCH(holdsAll(loaded.error().message, {"baked lattice"}));

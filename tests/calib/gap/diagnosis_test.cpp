@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "calib/gap/json.h"
+#include "calib/gap/report_json.h"
 #include "tests/calib/gap/diagnosis_checks.h"
 #include "tests/support/test_main.h"
 

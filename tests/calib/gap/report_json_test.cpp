@@ -1,10 +1,11 @@
+#include "calib/gap/report_json.h"
+
 #include <QTemporaryDir>
 #include <QTest>
 #include <fstream>
 #include <limits>
 
-#include "calib/gap/json.h"
-#include "calib/gap/json_reader.h"
+#include "calib/gap/report_reader.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 

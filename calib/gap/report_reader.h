@@ -5,8 +5,8 @@
 #include <string>
 
 #include "calib/core/error.h"
-#include "calib/gap/json.h"
 #include "calib/gap/report.h"
+#include "calib/gap/report_json.h"
 
 namespace fieldtrue::gap {
 

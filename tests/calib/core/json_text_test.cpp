@@ -1,4 +1,4 @@
-#include "calib/tables/json_text.h"
+#include "calib/core/json_text.h"
 
 #include <QTest>
 #include <nlohmann/json.hpp>

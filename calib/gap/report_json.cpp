@@ -1,4 +1,4 @@
-#include "calib/gap/json.h"
+#include "calib/gap/report_json.h"
 
 #include <cmath>
 #include <numbers>
