@@ -17,13 +17,6 @@ namespace {
 
 struct ListOptions {};
 
-std::string defaultText(const SettingValue& value) {
-  if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
-  if (const auto* whole = std::get_if<std::int64_t>(&value)) return std::to_string(*whole);
-  if (const auto* number = std::get_if<double>(&value)) return formatNumber(*number);
-  return std::get<std::string>(value);
-}
-
 std::string rangeText(const Setting& setting) {
   if (setting.type == SettingType::kBool) return "true or false";
   if (setting.type == SettingType::kChoice) {
@@ -31,8 +24,8 @@ std::string rangeText(const Setting& setting) {
     for (const std::string& choice : setting.choices) text += (text.empty() ? "" : "|") + choice;
     return text.empty() ? "text" : text;
   }
-  const bool bounded = setting.min != 0.0 || setting.max != 0.0;
-  std::string text = bounded ? formatNumber(setting.min) + " to " + formatNumber(setting.max) : "any number";
+  std::string text =
+      setting.isBounded() ? formatNumber(setting.min) + " to " + formatNumber(setting.max) : "any number";
   if (setting.type == SettingType::kAutoNumber) text = "auto, or " + text;
   return setting.unit.empty() ? text : text + " " + setting.unit;
 }
@@ -40,7 +33,7 @@ std::string rangeText(const Setting& setting) {
 std::string settingsLines(const std::vector<Setting>& settings) {
   std::string text;
   for (const Setting& setting : settings) {
-    const std::string default_value = defaultText(setting.default_value);
+    const std::string default_value = textOf(setting.default_value);
     text += "      " + setting.key + "=" + rangeText(setting);
     text += default_value.empty() ? "" : " (default " + default_value + ")";
     text += "  " + (setting.help.empty() ? setting.label : setting.help) + "\n";

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdio>
 
+#include "calib/core/declare.h"
+
 namespace fieldtrue::acquisition {
 namespace {
 
@@ -39,36 +41,21 @@ std::string firstBytes(const std::string& bytes) {
 }  // namespace
 
 std::vector<Setting> fastrakSettings() {
-  const auto choice = [](const char* key, const char* label, std::vector<std::string> choices, const char* help) {
-    Setting setting;
-    setting.key = key;
-    setting.label = label;
-    setting.type = SettingType::kChoice;
-    setting.default_value = choices.front();
-    setting.choices = std::move(choices);
-    setting.help = help;
-    return setting;
-  };
-  const auto flag = [](const char* key, const char* label, const char* help) {
-    Setting setting;
-    setting.key = key;
-    setting.label = label;
-    setting.type = SettingType::kBool;
-    setting.default_value = true;
-    setting.help = help;
-    return setting;
-  };
   return {
-      choice("stations", "Stations",
-             {"auto", "1", "2", "3", "4", "12", "13", "14", "23", "24", "34", "123", "124", "134", "234", "1234"},
-             "Receivers to read; auto takes those that are plugged in."),
-      choice("hemisphere", "Hemisphere", {"+x", "-x", "+y", "-y", "+z", "-z", "tracked"},
-             "Side of the transmitter on which the sensor is; tracked follows it as long as it is not interrupted."),
-      choice("filter", "Filter", {"off", "low", "medium", "heavy"},
-             "The tracker's own smoothing; off for a calibration, because smoothed readings are not independent."),
-      flag("raw_frame", "Raw frame",
-           "Reset alignment and boresight, so that poses are in the transmitter's own frame."),
-      flag("may_reset", "May re-initialise", "Restart the tracker (about 12 s) when it does not answer."),
+      declare::choice(
+          "stations", "Stations",
+          {"auto", "1", "2", "3", "4", "12", "13", "14", "23", "24", "34", "123", "124", "134", "234", "1234"}, "auto",
+          "Receivers to read; auto takes those that are plugged in."),
+      declare::choice(
+          "hemisphere", "Hemisphere", {"+x", "-x", "+y", "-y", "+z", "-z", "tracked"}, "+x",
+          "Side of the transmitter on which the sensor is; tracked follows it as long as it is not interrupted."),
+      declare::choice(
+          "filter", "Filter", {"off", "low", "medium", "heavy"}, "off",
+          "The tracker's own smoothing; off for a calibration, because smoothed readings are not independent."),
+      declare::flag("raw_frame", "Raw frame", true,
+                    "Reset alignment and boresight, so that poses are in the transmitter's own frame."),
+      declare::flag("may_reset", "May re-initialise", true,
+                    "Restart the tracker (about 12 s) when it does not answer."),
   };
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "calib/core/declare.h"
+
 namespace fieldtrue::acquisition {
 namespace {
 
@@ -27,35 +29,18 @@ FastrakSetup driverSetup(double speed, double rate_hz) {
 }  // namespace
 
 std::vector<Setting> simulatedSettings() {
-  const auto number = [](const char* key, const char* label, const char* unit, double min, double max, double value,
-                         const char* help) {
-    return Setting{key, label, SettingType::kNumber, unit, min, max, value, {}, help};
-  };
-  Setting fault{"fault",
-                "Fault",
-                SettingType::kChoice,
-                "",
-                0.0,
-                0.0,
-                std::string("none"),
-                {"none"},
-                "What the emulated tracker does wrong on purpose."};
+  Setting fault =
+      declare::choice("fault", "Fault", {"none"}, "none", "What the emulated tracker does wrong on purpose.");
   for (const auto& row : emulatorFaults()) {
     if (!row.needs_count) fault.choices.push_back(row.id);
   }
   return {
-      number("speed", "Speed", "", 0.1, 100.0, 1.0, "The tracker's seconds per second."),
-      Setting{"seed",
-              "Seed",
-              SettingType::kInteger,
-              "",
-              0.0,
-              2147483647.0,
-              std::int64_t{1},
-              {},
-              "Noise and placing errors follow from it."},
-      number("travel_s", "Travel", "s", 0.0, 60.0, 1.0, "Time the operator takes from one place to the next."),
-      number("tremor_m", "Tremor", "m", 0.0, 0.05, OperatorHabits{}.tremor_m, "Amplitude of the hand while carrying."),
+      declare::number("speed", "Speed", {0.1, 100.0}, 1.0, "The tracker's seconds per second."),
+      declare::integer("seed", "Seed", {0.0, 2147483647.0}, 1, "Noise and placing errors follow from it."),
+      declare::number("travel_s", "Travel", {0.0, 60.0, "s"}, 1.0,
+                      "Time the operator takes from one place to the next."),
+      declare::number("tremor_m", "Tremor", {0.0, 0.05, "m"}, OperatorHabits{}.tremor_m,
+                      "Amplitude of the hand while carrying."),
       fault,
   };
 }

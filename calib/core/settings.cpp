@@ -18,8 +18,9 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
+/// The whole of a text as a number.
 template <class Number>
-std::optional<Number> wholeNumber(std::string_view text) {
+std::optional<Number> numberFrom(std::string_view text) {
   Number value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
@@ -32,30 +33,32 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-bool isBounded(const Setting& setting) { return setting.min != 0.0 || setting.max != 0.0; }
-
 bool inRange(const Setting& setting, double value) {
-  return std::isfinite(value) && (!isBounded(setting) || (value >= setting.min && value <= setting.max));
+  return std::isfinite(value) && (!setting.isBounded() || (value >= setting.min && value <= setting.max));
 }
 
-/// What a valid value looks like: "an integer from 1 to 6".
-std::string needed(const Setting& setting) {
-  const std::string range =
-      isBounded(setting) ? " from " + formatNumber(setting.min) + " to " + formatNumber(setting.max) : "";
-  const std::string unit = setting.unit.empty() ? "" : " [" + setting.unit + "]";
-  switch (setting.type) {
-    case SettingType::kNumber:
-      return "a number" + range + unit;
-    case SettingType::kInteger:
-      return "a whole number" + range + unit;
-    case SettingType::kBool:
-      return "true or false";
-    case SettingType::kAutoNumber:
-      return (setting.whole ? "auto or a whole number" : "auto or a number") + range + unit;
-    case SettingType::kChoice:
-      return setting.choices.empty() ? "a text" : "one of " + joined(setting.choices);
-  }
-  return {};
+constexpr std::size_t kLongestList = 64;
+
+bool areNumbers(const Setting& setting, const nlohmann::json& value, std::size_t count) {
+  return value.is_array() && value.size() == count &&
+         std::all_of(value.begin(), value.end(), [&](const nlohmann::json& entry) {
+           return entry.is_number() && inRange(setting, entry.get<double>());
+         });
+}
+
+/// Figures rounded to six digits still pass.
+bool isSymmetric(const nlohmann::json& flat) {
+  double largest = 0.0;
+  for (const nlohmann::json& entry : flat) largest = std::max(largest, std::abs(entry.get<double>()));
+  const auto differs = [&](std::size_t a, std::size_t b) {
+    return std::abs(flat[a].get<double>() - flat[b].get<double>()) > 1e-6 * largest;
+  };
+  return !differs(1, 3) && !differs(2, 6) && !differs(5, 7);
+}
+
+bool isChoice(const Setting& setting, std::string_view text) {
+  return setting.choices.empty() ||
+         std::find(setting.choices.begin(), setting.choices.end(), text) != setting.choices.end();
 }
 
 std::optional<bool> parseBool(std::string_view text) {
@@ -68,34 +71,37 @@ std::optional<bool> parseBool(std::string_view text) {
   return std::nullopt;
 }
 
-std::optional<SettingValue> parseNumber(const Setting& setting, std::string_view text) {
-  const std::optional<double> value = wholeNumber<double>(text);
-  if (!value || !inRange(setting, *value)) return std::nullopt;
-  if (setting.whole && *value != std::floor(*value)) return std::nullopt;
-  return SettingValue(*value);
+std::optional<nlohmann::json> parseNumbers(std::string_view text) {
+  nlohmann::json numbers = nlohmann::json::array();
+  while (!(text = trimmed(text)).empty()) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    const std::optional<double> number = numberFrom<double>(text.substr(0, end));
+    if (!number) return std::nullopt;
+    numbers.push_back(*number);
+    text.remove_prefix(end);
+  }
+  return numbers;
 }
 
-bool isChoice(const Setting& setting, std::string_view text) {
-  return setting.choices.empty() ||
-         std::find(setting.choices.begin(), setting.choices.end(), text) != setting.choices.end();
-}
-
-std::optional<SettingValue> parseValue(const Setting& setting, std::string_view text) {
+/// What a text says, not yet checked.
+std::optional<nlohmann::json> jsonFrom(const Setting& setting, std::string_view text) {
+  const auto json = [](const auto& parsed) { return parsed ? std::optional<nlohmann::json>(*parsed) : std::nullopt; };
   switch (setting.type) {
     case SettingType::kBool:
-      if (const auto value = parseBool(text)) return SettingValue(*value);
-      return std::nullopt;
+      return json(parseBool(text));
     case SettingType::kInteger:
-      if (const auto value = wholeNumber<std::int64_t>(text); value && inRange(setting, static_cast<double>(*value))) {
-        return SettingValue(*value);
-      }
-      return std::nullopt;
-    case SettingType::kNumber:
-      return parseNumber(setting, text);
+      return json(numberFrom<std::int64_t>(text));
     case SettingType::kAutoNumber:
-      return text == "auto" ? SettingValue(std::string(text)) : parseNumber(setting, text);
+      if (text == "auto") return text;
+      return json(numberFrom<double>(text));
+    case SettingType::kNumber:
+      return json(numberFrom<double>(text));
     case SettingType::kChoice:
-      return isChoice(setting, text) ? std::optional(SettingValue(std::string(text))) : std::nullopt;
+      return text;
+    case SettingType::kVector3:
+    case SettingType::kMatrix3:
+    case SettingType::kNumbers:
+      return parseNumbers(text);
   }
   return std::nullopt;
 }
@@ -123,23 +129,17 @@ tl::unexpected<Error> unknownKey(std::string_view owner, std::span<const Setting
 
 tl::unexpected<Error> badValue(std::string_view owner, const Setting& setting, const std::string& seen) {
   return fail(ErrorCode::kBadInput,
-              std::string(owner) + ": " + setting.key + " must be " + needed(setting) + ", got '" + seen + "'");
+              std::string(owner) + ": " + setting.key + " must be " + neededFor(setting) + ", got '" + seen + "'");
 }
 
-/// The text form of a JSON value of the setting's own type; none when the type is another.
-std::optional<std::string> textOf(const Setting& setting, const nlohmann::json& value) {
-  const bool takes_text = setting.type == SettingType::kChoice || setting.type == SettingType::kAutoNumber;
-  if (value.is_string()) return takes_text ? std::optional(value.get<std::string>()) : std::nullopt;
-  if (value.is_boolean()) {
-    return setting.type == SettingType::kBool ? std::optional<std::string>(value.get<bool>() ? "true" : "false")
-                                              : std::nullopt;
-  }
-  if (!value.is_number()) return std::nullopt;
-  if (setting.type == SettingType::kInteger) {
-    return value.is_number_integer() ? std::optional(value.dump()) : std::nullopt;
-  }
-  const bool takes_number = setting.type == SettingType::kNumber || setting.type == SettingType::kAutoNumber;
-  return takes_number ? std::optional(formatNumber(value.get<double>())) : std::nullopt;
+/// The value of accepted JSON.
+SettingValue valueFrom(const Setting& setting, const nlohmann::json& json) {
+  if (json.is_boolean()) return json.get<bool>();
+  if (json.is_string()) return json.get<std::string>();
+  if (json.is_null()) return nullptr;
+  if (json.is_array()) return json.get<std::vector<double>>();
+  if (setting.type == SettingType::kInteger) return json.get<std::int64_t>();
+  return json.get<double>();
 }
 
 template <class Value>
@@ -149,10 +149,6 @@ const Value& typedSetting(const Settings& settings, const std::string& key) {
   const Value* value = std::get_if<Value>(&found->second);
   FT_CHECK(value != nullptr);
   return *value;
-}
-
-nlohmann::json toJson(const SettingValue& value) {
-  return std::visit([](const auto& held) { return nlohmann::json(held); }, value);
 }
 
 const char* nameOf(SettingType type) {
@@ -167,11 +163,90 @@ const char* nameOf(SettingType type) {
       return "choice";
     case SettingType::kAutoNumber:
       return "auto_number";
+    case SettingType::kVector3:
+      return "vector3";
+    case SettingType::kMatrix3:
+      return "matrix3";
+    case SettingType::kNumbers:
+      return "list";
   }
   return "";
 }
 
+struct ValueText {
+  std::string operator()(bool value) const { return value ? "true" : "false"; }
+  std::string operator()(std::int64_t value) const { return std::to_string(value); }
+  std::string operator()(double value) const { return formatNumber(value); }
+  std::string operator()(const std::string& value) const { return value; }
+  std::string operator()(std::nullptr_t) const { return {}; }
+  std::string operator()(const std::vector<double>& values) const {
+    std::string text;
+    for (const double value : values) text += (text.empty() ? "" : " ") + formatNumber(value);
+    return text;
+  }
+};
+
 }  // namespace
+
+bool accepts(const Setting& setting, const nlohmann::json& value) {
+  if (value.is_null()) return std::holds_alternative<std::nullptr_t>(setting.default_value);
+  switch (setting.type) {
+    case SettingType::kNumber:
+      return value.is_number() && inRange(setting, value.get<double>());
+    case SettingType::kInteger:
+      return value.is_number_integer() && inRange(setting, value.get<double>());
+    case SettingType::kBool:
+      return value.is_boolean();
+    case SettingType::kAutoNumber:
+      if (value.is_number() && setting.whole && value.get<double>() != std::floor(value.get<double>())) return false;
+      return value == "auto" || (value.is_number() && inRange(setting, value.get<double>()));
+    case SettingType::kChoice:
+      return value.is_string() && isChoice(setting, value.get_ref<const std::string&>());
+    case SettingType::kVector3:
+      return areNumbers(setting, value, 3);
+    case SettingType::kMatrix3:
+      return areNumbers(setting, value, 9) && isSymmetric(value);
+    case SettingType::kNumbers:
+      return !value.empty() && value.size() <= kLongestList && areNumbers(setting, value, value.size());
+  }
+  return false;
+}
+
+std::string neededFor(const Setting& setting) {
+  const std::string range =
+      setting.isBounded() ? " from " + formatNumber(setting.min) + " to " + formatNumber(setting.max) : "";
+  const std::string unit = setting.unit.empty() ? "" : " [" + setting.unit + "]";
+  switch (setting.type) {
+    case SettingType::kNumber:
+      return "a number" + range + unit;
+    case SettingType::kInteger:
+      return "a whole number" + range + unit;
+    case SettingType::kBool:
+      return "true or false";
+    case SettingType::kAutoNumber:
+      return (setting.whole ? "auto or a whole number" : "auto or a number") + range + unit;
+    case SettingType::kChoice:
+      return setting.choices.empty() ? "a text" : "one of " + joined(setting.choices);
+    case SettingType::kVector3:
+      return "three numbers" + range + unit;
+    case SettingType::kMatrix3:
+      return "nine numbers of a symmetric matrix, row by row," + range + unit;
+    case SettingType::kNumbers:
+      return "a list of 1 to " + std::to_string(kLongestList) + " numbers" + range + unit;
+  }
+  return {};
+}
+
+nlohmann::json toJson(const SettingValue& value) {
+  return std::visit([](const auto& held) { return nlohmann::json(held); }, value);
+}
+
+std::string textOf(const SettingValue& value) { return std::visit(ValueText(), value); }
+
+std::optional<SettingValue> valueOf(const Setting& setting, std::string_view text) {
+  const std::optional<nlohmann::json> json = jsonFrom(setting, text);
+  return json && accepts(setting, *json) ? std::optional(valueFrom(setting, *json)) : std::nullopt;
+}
 
 Result<MethodText> parseMethodText(std::string_view text) {
   const std::size_t colon = text.find(':');
@@ -206,7 +281,7 @@ Result<Settings> resolveSettings(std::string_view owner, std::span<const Setting
   for (const auto& [key, text] : given) {
     const Setting* setting = findSetting(declared, key);
     if (setting == nullptr) return unknownKey(owner, declared, key);
-    const std::optional<SettingValue> value = parseValue(*setting, text);
+    const std::optional<SettingValue> value = valueOf(*setting, text);
     if (!value) return badValue(owner, *setting, text);
     settings[key] = *value;
   }
@@ -237,8 +312,8 @@ nlohmann::json toJson(std::span<const Setting> declared) {
     nlohmann::json row = {{"key", setting.key},   {"label", setting.label},
                           {"unit", setting.unit}, {"type", nameOf(setting.type)},
                           {"help", setting.help}, {"default", toJson(defaultOf(setting))}};
-    row["min"] = isBounded(setting) ? nlohmann::json(setting.min) : nlohmann::json();
-    row["max"] = isBounded(setting) ? nlohmann::json(setting.max) : nlohmann::json();
+    row["min"] = setting.isBounded() ? nlohmann::json(setting.min) : nlohmann::json();
+    row["max"] = setting.isBounded() ? nlohmann::json(setting.max) : nlohmann::json();
     if (setting.type == SettingType::kChoice) row["choices"] = setting.choices;
     json.push_back(std::move(row));
   }
@@ -248,20 +323,19 @@ nlohmann::json toJson(std::span<const Setting> declared) {
 Result<Settings> settingsFromJson(std::string_view owner, std::span<const Setting> declared,
                                   const nlohmann::json& json) {
   if (!json.is_object()) return fail(ErrorCode::kBadInput, std::string(owner) + ": settings must be a JSON object");
-  std::map<std::string, std::string> given;
+  Settings settings;
   for (const Setting& setting : declared) {
     const auto found = json.find(setting.key);
     if (found == json.end()) {
       return fail(ErrorCode::kBadInput, std::string(owner) + ": setting " + setting.key + " is missing");
     }
-    const std::optional<std::string> text = textOf(setting, *found);
-    if (!text) return badValue(owner, setting, found->dump());
-    given[setting.key] = *text;
+    if (!accepts(setting, *found)) return badValue(owner, setting, found->dump());
+    settings[setting.key] = valueFrom(setting, *found);
   }
   for (const auto& [key, value] : json.items()) {
     if (findSetting(declared, key) == nullptr) return unknownKey(owner, declared, key);
   }
-  return resolveSettings(owner, declared, given);
+  return settings;
 }
 
 }  // namespace fieldtrue

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdio>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/automatic_choice.h"
 #include "calib/correctors/base/method.h"
@@ -146,16 +147,9 @@ PositionMethod automaticPosition() {
   method.id = "auto";
   method.label = "Automatic choice";
   method.source = "Nested cross-validation: Stone 1974; one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984";
-  method.settings = {{.key = "candidates",
-                      .label = "Candidates",
-                      .type = SettingType::kChoice,
-                      .unit = "",
-                      .min = 0.0,
-                      .max = 0.0,
-                      .default_value = std::string("all"),
-                      .choices = {"survey", "ours", "all"},
-                      .help = "Methods to choose from: the survey's, those that came after it, or all; no correction, "
-                              "a rigid motion and an affine map are always among them."}};
+  method.settings = {declare::choice("candidates", "Candidates", {"survey", "ours", "all"}, "all",
+                                     "Methods to choose from: the survey's, those that came after it, or all; no "
+                                     "correction, a rigid motion and an affine map are always among them.")};
   method.fit = fitAutomatic;
   method.read = loadAutomatic;
   method.most_folds = 5;

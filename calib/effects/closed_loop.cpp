@@ -243,47 +243,19 @@ Effect closedLoopEffect() {
   effect.source = "Jackson 1999, Classical Electrodynamics, section 5.5; inductance: Maxwell 1873, art. 704";
   effect.parameters = {
       centerParameter("Middle of the loop, tracker frame."),
-      {.name = "normal",
-       .shape = "vector3",
-       .default_value = {0.0, 0.0, 1.0},
-       .help = "Axis of the loop, tracker frame; any length."},
-      {.name = "radius_m",
-       .unit = "m",
-       .shape = "scalar",
-       .default_value = 0.3,
-       .min = 0.01,
-       .max = 10.0,
-       .help = "Of the loop.",
-       .plausible_min = 0.05,
-       .plausible_max = 2.0},
-      {.name = "wire_radius_m",
-       .unit = "m",
-       .shape = "scalar",
-       .default_value = 0.005,
-       .min = 1e-4,
-       .max = 0.5,
-       .help = "Of the wire or tube it is made of.",
-       .plausible_min = 5e-4,
-       .plausible_max = 0.02},
-      {.name = "conductivity_s_per_m",
-       .unit = "S/m",
-       .shape = "scalar",
-       .min = 1.0,
-       .max = 1e8,
-       .help = "Of the wire: copper 5.8e7, aluminium 3.5e7, steel 6e6. When given, its resistance and the tracker's "
-               "carrier or "
-               "sampling delay decide how much of the current is left; null is a loop without resistance.",
-       .plausible_min = 5e6,
-       .plausible_max = 6e7},
-      {.name = "strength",
-       .shape = "scalar",
-       .default_value = 1.0,
-       .min = -100.0,
-       .max = 100.0,
-       .help = "Share of the current a loop without resistance would carry; below 1 for thin wire, bad joints or a low "
-               "carrier. No real loop has more than 1 or less than 0.",
-       .plausible_min = 0.0,
-       .plausible_max = 1.0}};
+      declare::vector3("normal", {}, {0.0, 0.0, 1.0}, "Axis of the loop, tracker frame; any length."),
+      declare::number("radius_m", {0.01, 10.0, "m"}, 0.3, "Of the loop.").plausibly(0.05, 2.0),
+      declare::number("wire_radius_m", {1e-4, 0.5, "m"}, 0.005, "Of the wire or tube it is made of.")
+          .plausibly(5e-4, 0.02),
+      declare::number(
+          "conductivity_s_per_m", {1.0, 1e8, "S/m"}, nullptr,
+          "Of the wire: copper 5.8e7, aluminium 3.5e7, steel 6e6. When given, its resistance and the tracker's carrier "
+          "or sampling delay decide how much of the current is left; null is a loop without resistance.")
+          .plausibly(5e6, 6e7),
+      declare::number("strength", {-100.0, 100.0}, 1.0,
+                      "Share of the current a loop without resistance would carry; below 1 for thin wire, bad joints "
+                      "or a low carrier. No real loop has more than 1 or less than 0.")
+          .plausibly(0.0, 1.0)};
   effect.make = make;
   effect.fits = fits;
   effect.body = loopOf;

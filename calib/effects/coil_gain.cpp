@@ -62,22 +62,12 @@ Effect coilGainEffect() {
   effect.id = "coil_gain";
   effect.label = "Coil gains";
   effect.source = "Coupling matrix: Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; first order";
-  effect.parameters = {{.name = "transmitter_gain",
-                        .shape = "vector3",
-                        .default_value = {0.0, 0.0, 0.0},
-                        .min = -1e3,
-                        .max = 1e3,
-                        .help = "Relative gain error of the transmitter's coils x, y, z: 0.01 is 1 % too strong.",
-                        .plausible_min = -kPlausible,
-                        .plausible_max = kPlausible},
-                       {.name = "receiver_gain",
-                        .shape = "vector3",
-                        .default_value = {0.0, 0.0, 0.0},
-                        .min = -1e3,
-                        .max = 1e3,
-                        .help = "Likewise of the receiver's coils.",
-                        .plausible_min = -kPlausible,
-                        .plausible_max = kPlausible}};
+  effect.parameters = {
+      declare::vector3("transmitter_gain", {-1e3, 1e3}, {0.0, 0.0, 0.0},
+                       "Relative gain error of the transmitter's coils x, y, z: 0.01 is 1 % too strong.")
+          .plausibly(-kPlausible, kPlausible),
+      declare::vector3("receiver_gain", {-1e3, 1e3}, {0.0, 0.0, 0.0}, "Likewise of the receiver's coils.")
+          .plausibly(-kPlausible, kPlausible)};
   effect.make = make;
   effect.fits = fits;
   return effect;

@@ -78,26 +78,12 @@ Effect coilNonorthogonalityEffect() {
   effect.label = "Coils not at right angles";
   effect.source = "Coupling matrix: Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; first order";
   effect.parameters = {
-      {.name = "transmitter_rad",
-       .unit = "rad",
-       .shape = "vector3",
-       .default_value = {0.0, 0.0, 0.0},
-       .min = -100.0,
-       .max = 100.0,
-       .help = "How far the transmitter's coils lean toward each other, pairs xy, xz, yz; the angle between "
-               "two coils is 90 deg "
-               "less twice this.",
-       .plausible_min = -kPlausible_rad,
-       .plausible_max = kPlausible_rad},
-      {.name = "receiver_rad",
-       .unit = "rad",
-       .shape = "vector3",
-       .default_value = {0.0, 0.0, 0.0},
-       .min = -100.0,
-       .max = 100.0,
-       .help = "Likewise the receiver's coils.",
-       .plausible_min = -kPlausible_rad,
-       .plausible_max = kPlausible_rad}};
+      declare::vector3("transmitter_rad", {-100.0, 100.0, "rad"}, {0.0, 0.0, 0.0},
+                       "How far the transmitter's coils lean toward each other, pairs xy, xz, yz; the angle between "
+                       "two coils is 90 deg less twice this.")
+          .plausibly(-kPlausible_rad, kPlausible_rad),
+      declare::vector3("receiver_rad", {-100.0, 100.0, "rad"}, {0.0, 0.0, 0.0}, "Likewise the receiver's coils.")
+          .plausibly(-kPlausible_rad, kPlausible_rad)};
   effect.make = make;
   effect.fits = fits;
   return effect;

@@ -57,14 +57,8 @@ Effect correlatedSamplesEffect() {
   effect.id = "correlated_samples";
   effect.label = "Filtered readings";
   effect.source = "First-order autoregression: Box, Jenkins, Reinsel 1994, Time Series Analysis, section 3.2";
-  effect.parameters = {{.name = "correlation",
-                        .shape = "scalar",
-                        .default_value = 0.8,
-                        .min = 0.0,
-                        .max = 0.999,
-                        .help = "Between the noise of successive readings.",
-                        .plausible_min = 0.0,
-                        .plausible_max = 0.98}};
+  effect.parameters = {declare::number("correlation", {0.0, 0.999}, 0.8, "Between the noise of successive readings.")
+                           .plausibly(0.0, 0.98)};
   effect.make = make;
   effect.detect = detect;
   return effect;

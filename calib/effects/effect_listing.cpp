@@ -47,13 +47,14 @@ std::string rangeText(double low, double high) {
   return text;
 }
 
-std::string parameterText(const EffectParameter& parameter) {
-  std::string text = "    " + parameter.name + "  " + parameter.shape;
+std::string parameterText(const Setting& parameter) {
+  std::string text = "    " + parameter.key + "  " + shapeOf(parameter);
   if (!parameter.unit.empty()) text += " [" + parameter.unit + "]";
   for (std::size_t i = 0; i < parameter.choices.size(); ++i) text += (i == 0 ? ", " : " or ") + parameter.choices[i];
-  text += parameter.default_value.is_null() ? ", may be left out" : ", default " + parameter.default_value.dump();
-  if (parameter.min != 0.0 || parameter.max != 0.0) text += ", " + rangeText(parameter.min, parameter.max);
-  if (parameter.plausible_min != 0.0 || parameter.plausible_max != 0.0) {
+  const nlohmann::json usual = fieldtrue::toJson(parameter.default_value);
+  text += usual.is_null() ? ", may be left out" : ", default " + usual.dump();
+  if (parameter.isBounded()) text += ", " + rangeText(parameter.min, parameter.max);
+  if (parameter.hasPlausibleRange()) {
     text += ", plausible " + rangeText(parameter.plausible_min, parameter.plausible_max);
   }
   return text + "\n        " + parameter.help + "\n";
@@ -106,7 +107,7 @@ std::string effectListingText() {
   std::string text;
   for (const Effect& effect : effects()) {
     text += effect.id + "  " + effect.label + "  [" + effect.source + "]\n";
-    for (const EffectParameter& parameter : effect.parameters) text += parameterText(parameter);
+    for (const Setting& parameter : effect.parameters) text += parameterText(parameter);
     if (effect.fits == nullptr) text += "    not fitted: found in the readings themselves\n";
     for (const ListedWay& way : waysToFit(effect)) text += wayText(way);
   }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/core/declare.h"
 #include "calib/core/error.h"
 #include "calib/effects/effect_body.h"
 #include "calib/effects/effect_fit.h"
@@ -14,26 +15,12 @@
 
 namespace fieldtrue::effects {
 
-/// One parameter of an effect, as data.
-struct EffectParameter {
-  std::string name;  ///< With its unit: `center_m`.
-  std::string unit = {};
-  std::string shape;                       ///< "scalar", "vector3", "matrix3" (row-major, symmetric), "text", "list".
-  nlohmann::json default_value = nullptr;  ///< Null = not given; null is then also accepted in a file.
-  double min = 0.0;                        ///< Of each component; 0 and 0 = not bounded.
-  double max = 0.0;
-  std::string help;
-  std::vector<std::string> choices = {};  ///< Of a text; empty = any.
-  double plausible_min = 0.0;             ///< Of each component: what is met in practice; 0 and 0 = not told.
-  double plausible_max = 0.0;
-};
-
 /// One row of the effect registry.
 struct Effect {
   std::string id;
   std::string label;
   std::string source;
-  std::vector<EffectParameter> parameters;
+  std::vector<Setting> parameters;  ///< A key ends in its unit: `center_m`.
   /// Builds the effect from resolved parameters. @error kBadInput for parameters that make no sense together
   Result<std::unique_ptr<field::PhysicalEffect>> (*make)(const nlohmann::json& parameters,
                                                          const field::Excitation& excitation) = nullptr;

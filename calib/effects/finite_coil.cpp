@@ -159,35 +159,19 @@ Effect finiteCoilEffect() {
   effect.label = "Coils of real size";
   effect.source = "Jackson 1999, Classical Electrodynamics, section 5.5 (field of a current ring), expanded in a/r";
   effect.parameters = {
-      {.name = "coil",
-       .shape = "text",
-       .default_value = "transmitter",
-       .help = "Whose coils have size, the `transmitter`'s or the `receiver`'s.",
-       .choices = {"transmitter", "receiver"}},
-      {.name = "radius_m",
-       .unit = "m",
-       .shape = "vector3",
-       .default_value = {0.05, 0.05, 0.05},
-       .min = 1e-4,
-       .max = 1.0,
-       .help = "Of the coil about x, y and z: radius of a ring, or half the side of a square.",
-       .plausible_min = 0.003,
-       .plausible_max = 0.15},
-      {.name = "shape",
-       .shape = "text",
-       .default_value = "ring",
-       .help = "Form of the coils, `ring` or `square`; a square acts as the ring of the same second moment of area.",
-       .choices = {"ring", "square"}},
-      {.name = "radius_squared_m2",
-       .unit = "m^2",
-       .shape = "scalar",
-       .min = -1.0,
-       .max = 1.0,
-       .help = "Mean square radius of three coils alike, to leading order in radius over range; when given, radius and "
-               "shape "
-               "are not used. Below 0 stands for coils wound to cancel more than their own size.",
-       .plausible_min = 0.0,
-       .plausible_max = 0.0225}};
+      declare::choice("coil", {"transmitter", "receiver"}, "transmitter",
+                      "Whose coils have size, the `transmitter`'s or the `receiver`'s."),
+      declare::vector3("radius_m", {1e-4, 1.0, "m"}, {0.05, 0.05, 0.05},
+                       "Of the coil about x, y and z: radius of a ring, or half the side of a square.")
+          .plausibly(0.003, 0.15),
+      declare::choice(
+          "shape", {"ring", "square"}, "ring",
+          "Form of the coils, `ring` or `square`; a square acts as the ring of the same second moment of area."),
+      declare::number(
+          "radius_squared_m2", {-1.0, 1.0, "m^2"}, nullptr,
+          "Mean square radius of three coils alike, to leading order in radius over range; when given, radius and "
+          "shape are not used. Below 0 stands for coils wound to cancel more than their own size.")
+          .plausibly(0.0, 0.0225)};
   effect.make = make;
   effect.fits = fits;
   return effect;

@@ -336,54 +336,21 @@ Effect finitePlateEffect() {
       "Wait 1962, Electromagnetic Waves in Stratified Media";
   effect.parameters = {
       centerParameter("Middle of the plate, tracker frame."),
-      {.name = "normal",
-       .shape = "vector3",
-       .default_value = {0.0, 0.0, 1.0},
-       .help = "At right angles to the plate, tracker frame; any length."},
-      {.name = "side",
-       .shape = "vector3",
-       .default_value = {1.0, 0.0, 0.0},
-       .help = "Along the plate's length, tracker frame; any length."},
-      {.name = "length_m",
-       .unit = "m",
-       .shape = "scalar",
-       .default_value = 0.6,
-       .min = 0.01,
-       .max = 20.0,
-       .help = "Along `side`.",
-       .plausible_min = 0.1,
-       .plausible_max = 4.0},
-      {.name = "width_m",
-       .unit = "m",
-       .shape = "scalar",
-       .default_value = 0.6,
-       .min = 0.01,
-       .max = 20.0,
-       .help = "Across it.",
-       .plausible_min = 0.1,
-       .plausible_max = 4.0},
+      declare::vector3("normal", {}, {0.0, 0.0, 1.0}, "At right angles to the plate, tracker frame; any length."),
+      declare::vector3("side", {}, {1.0, 0.0, 0.0}, "Along the plate's length, tracker frame; any length."),
+      declare::number("length_m", {0.01, 20.0, "m"}, 0.6, "Along `side`.").plausibly(0.1, 4.0),
+      declare::number("width_m", {0.01, 20.0, "m"}, 0.6, "Across it.").plausibly(0.1, 4.0),
       materialParameter(),
       permeabilityParameter(),
       conductivityParameter(
           "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6; needs thickness_m. When given, the tracker's "
           "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal."),
-      {.name = "thickness_m",
-       .unit = "m",
-       .shape = "scalar",
-       .min = 1e-6,
-       .max = 0.1,
-       .help = "Of the plate; null is thick enough not to matter.",
-       .plausible_min = 2e-5,
-       .plausible_max = 0.02},
-      {.name = "strength",
-       .shape = "scalar",
-       .default_value = 1.0,
-       .min = -100.0,
-       .max = 100.0,
-       .help =
-           "Share of such a plate's answer; below 1 for holes and gaps. No real plate has more than 1 or less than 0.",
-       .plausible_min = 0.0,
-       .plausible_max = 1.0}};
+      declare::number("thickness_m", {1e-6, 0.1, "m"}, nullptr, "Of the plate; null is thick enough not to matter.")
+          .plausibly(2e-5, 0.02),
+      declare::number(
+          "strength", {-100.0, 100.0}, 1.0,
+          "Share of such a plate's answer; below 1 for holes and gaps. No real plate has more than 1 or less than 0.")
+          .plausibly(0.0, 1.0)};
   effect.make = make;
   effect.fits = fits;
   effect.body = plateOf;

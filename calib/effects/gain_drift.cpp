@@ -146,56 +146,17 @@ Effect gainDriftEffect() {
   effect.id = "gain_drift";
   effect.label = "Gain that drifts with time";
   effect.source = "Newton's law of cooling: Carslaw and Jaeger 1959, Conduction of Heat in Solids, section 1.9";
-  effect.parameters = {{.name = "gain",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = -1e3,
-                        .max = 1e3,
-                        .help = "Relative error of every coupling that stays.",
-                        .plausible_min = -kPlausibleGain,
-                        .plausible_max = kPlausibleGain},
-                       {.name = "amplitude",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = -1e3,
-                        .max = 1e3,
-                        .help = "Relative error at the start that fades exponentially.",
-                        .plausible_min = -kPlausibleDrift,
-                        .plausible_max = kPlausibleDrift},
-                       {.name = "time_constant_s",
-                        .unit = "s",
-                        .shape = "scalar",
-                        .default_value = 1200.0,
-                        .min = 1e-6,
-                        .max = 1e9,
-                        .help = "Of the fading.",
-                        .plausible_min = 60.0,
-                        .plausible_max = 7200.0},
-                       {.name = "slope_per_s",
-                        .unit = "1/s",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = -1e6,
-                        .max = 1e6,
-                        .help = "Change of the relative error with time.",
-                        .plausible_min = -1e-4,
-                        .plausible_max = 1e-4},
-                       {.name = "curvature_per_s2",
-                        .unit = "1/s^2",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = -1e6,
-                        .max = 1e6,
-                        .help = "Of the relative error, times the squared time.",
-                        .plausible_min = -1e-7,
-                        .plausible_max = 1e-7},
-                       {.name = "start_s",
-                        .unit = "s",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = -1e12,
-                        .max = 1e12,
-                        .help = "When the fading starts, on the session's clock."}};
+  effect.parameters = {
+      declare::number("gain", {-1e3, 1e3}, 0.0, "Relative error of every coupling that stays.")
+          .plausibly(-kPlausibleGain, kPlausibleGain),
+      declare::number("amplitude", {-1e3, 1e3}, 0.0, "Relative error at the start that fades exponentially.")
+          .plausibly(-kPlausibleDrift, kPlausibleDrift),
+      declare::number("time_constant_s", {1e-6, 1e9, "s"}, 1200.0, "Of the fading.").plausibly(60.0, 7200.0),
+      declare::number("slope_per_s", {-1e6, 1e6, "1/s"}, 0.0, "Change of the relative error with time.")
+          .plausibly(-1e-4, 1e-4),
+      declare::number("curvature_per_s2", {-1e6, 1e6, "1/s^2"}, 0.0, "Of the relative error, times the squared time.")
+          .plausibly(-1e-7, 1e-7),
+      declare::number("start_s", {-1e12, 1e12, "s"}, 0.0, "When the fading starts, on the session's clock.")};
   effect.make = make;
   effect.fits = fits;
   effect.acts_in_time = true;

@@ -38,14 +38,9 @@ Effect globalGainEffect() {
   effect.label = "Gain of the whole tracker";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709";
   effect.parameters = {
-      {.name = "gain",
-       .shape = "scalar",
-       .default_value = 0.0,
-       .min = -0.999,
-       .max = 1e3,
-       .help = "Relative error of every coupling; 0.03 brings every reading 1 % nearer to the transmitter.",
-       .plausible_min = -kPlausible,
-       .plausible_max = kPlausible}};
+      declare::number("gain", {-0.999, 1e3}, 0.0,
+                      "Relative error of every coupling; 0.03 brings every reading 1 % nearer to the transmitter.")
+          .plausibly(-kPlausible, kPlausible)};
   effect.make = make;
   effect.fits = fits;
   return effect;

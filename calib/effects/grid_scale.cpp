@@ -51,14 +51,9 @@ Effect gridScaleEffect() {
   effect.id = "grid_scale";
   effect.label = "Scale of the rig";
   effect.source = "Geometry";
-  effect.parameters = {{.name = "scale",
-                        .shape = "vector3",
-                        .default_value = {0.0, 0.0, 0.0},
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "How much longer the rig is than it says along its own x, y, z: 0.01 is 1 %.",
-                        .plausible_min = -kPlausible,
-                        .plausible_max = kPlausible}};
+  effect.parameters = {declare::vector3("scale", {-100.0, 100.0}, {0.0, 0.0, 0.0},
+                                        "How much longer the rig is than it says along its own x, y, z: 0.01 is 1 %.")
+                           .plausibly(-kPlausible, kPlausible)};
   effect.make = make;
   effect.fits = fits;
   return effect;

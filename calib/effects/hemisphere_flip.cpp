@@ -33,14 +33,8 @@ Effect hemisphereFlipEffect() {
   effect.id = "hemisphere_flip";
   effect.label = "Lost hemisphere";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709";
-  effect.parameters = {{.name = "probability",
-                        .shape = "scalar",
-                        .default_value = 0.02,
-                        .min = 0.0,
-                        .max = 1.0,
-                        .help = "That a visit is reported on the other side.",
-                        .plausible_min = 0.0,
-                        .plausible_max = 0.2}};
+  effect.parameters = {declare::number("probability", {0.0, 1.0}, 0.02, "That a visit is reported on the other side.")
+                           .plausibly(0.0, 0.2)};
   effect.make = make;
   return effect;
 }

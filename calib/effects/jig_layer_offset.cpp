@@ -173,27 +173,14 @@ Effect jigLayerOffsetEffect() {
   effect.id = "jig_layer_offset";
   effect.label = "Layers of the rig at a wrong height";
   effect.source = "Geometry";
-  effect.parameters = {{.name = "axis",
-                        .shape = "text",
-                        .default_value = "z",
-                        .help = "Axis of the rig across which the layers lie and along which they are displaced.",
-                        .choices = {"x", "y", "z"}},
-                       {.name = "heights_m",
-                        .unit = "m",
-                        .shape = "list",
-                        .default_value = {-0.4572, -0.1524, 0.1524, 0.4572},
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "Where the rig says the layers are along that axis, rig's frame."},
-                       {.name = "offsets_m",
-                        .unit = "m",
-                        .shape = "list",
-                        .default_value = {0.0, 0.0, 0.0, 0.0},
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "How far each layer really is beyond that.",
-                        .plausible_min = -kPlausible_m,
-                        .plausible_max = kPlausible_m}};
+  effect.parameters = {
+      declare::choice("axis", {"x", "y", "z"}, "z",
+                      "Axis of the rig across which the layers lie and along which they are displaced."),
+      declare::numbers("heights_m", {-100.0, 100.0, "m"}, {-0.4572, -0.1524, 0.1524, 0.4572},
+                       "Where the rig says the layers are along that axis, rig's frame."),
+      declare::numbers("offsets_m", {-100.0, 100.0, "m"}, {0.0, 0.0, 0.0, 0.0},
+                       "How far each layer really is beyond that.")
+          .plausibly(-kPlausible_m, kPlausible_m)};
   effect.make = make;
   effect.fits = fits;
   return effect;

@@ -65,23 +65,12 @@ Effect jigTiltEffect() {
   effect.label = "Leaning rig";
   effect.source = "Geometry";
   effect.parameters = {
-      {.name = "shear_rad",
-       .unit = "rad",
-       .shape = "vector3",
-       .default_value = {0.0, 0.0, 0.0},
-       .min = -100.0,
-       .max = 100.0,
-       .help = "Shears xz, yz, xy of the rig in its own frame: x shifts with height z, y with z, x with y.",
-       .plausible_min = -kPlausible_rad,
-       .plausible_max = kPlausible_rad},
-      {.name = "turns_sensor",
-       .shape = "scalar",
-       .default_value = 0.0,
-       .min = 0.0,
-       .max = 1.0,
-       .help = "1 where the sensor leans with the pipe it is fixed to, 0 where it stays level.",
-       .plausible_min = 0.0,
-       .plausible_max = 1.0}};
+      declare::vector3("shear_rad", {-100.0, 100.0, "rad"}, {0.0, 0.0, 0.0},
+                       "Shears xz, yz, xy of the rig in its own frame: x shifts with height z, y with z, x with y.")
+          .plausibly(-kPlausible_rad, kPlausible_rad),
+      declare::number("turns_sensor", {0.0, 1.0}, 0.0,
+                      "1 where the sensor leans with the pipe it is fixed to, 0 where it stays level.")
+          .plausibly(0.0, 1.0)};
   effect.make = make;
   effect.fits = fits;
   return effect;

@@ -101,35 +101,15 @@ Effect mainsInterferenceEffect() {
   effect.id = "mains_interference";
   effect.label = "Mains or monitor";
   effect.source = "Aliasing: Oppenheim and Schafer 1989, Discrete-Time Signal Processing, section 3.2";
-  effect.parameters = {{.name = "line_hz",
-                        .unit = "Hz",
-                        .shape = "list",
-                        .default_value = {50.0, 150.0},
-                        .min = 0.0,
-                        .max = 1e6,
-                        .help = "Frequencies of the lines, harmonics each for itself.",
-                        .plausible_min = 15.0,
-                        .plausible_max = 1000.0},
-                       {.name = "amplitude_per_m3",
-                        .unit = "1/m^3",
-                        .shape = "list",
-                        .default_value = {4.0e-4, 2.0e-4},
-                        .min = 0.0,
-                        .max = 1e6,
-                        .help = "Of each line in the couplings, where the transmitter's are (3uu^T - 1)/r^3.",
-                        .plausible_min = 0.0,
-                        .plausible_max = 0.01},
-                       {.name = "direction",
-                        .shape = "vector3",
-                        .default_value = {1.0, 1.0, 1.0},
-                        .help = "How strongly each coil of the receiver picks the lines up; any length."},
-                       {.name = "phase_rad",
-                        .unit = "rad",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "Of every line at time 0."}};
+  effect.parameters = {declare::numbers("line_hz", {0.0, 1e6, "Hz"}, {50.0, 150.0},
+                                        "Frequencies of the lines, harmonics each for itself.")
+                           .plausibly(15.0, 1000.0),
+                       declare::numbers("amplitude_per_m3", {0.0, 1e6, "1/m^3"}, {4.0e-4, 2.0e-4},
+                                        "Of each line in the couplings, where the transmitter's are (3uu^T - 1)/r^3.")
+                           .plausibly(0.0, 0.01),
+                       declare::vector3("direction", {}, {1.0, 1.0, 1.0},
+                                        "How strongly each coil of the receiver picks the lines up; any length."),
+                       declare::number("phase_rad", {-100.0, 100.0, "rad"}, 0.0, "Of every line at time 0.")};
   effect.make = make;
   effect.detect = detect;
   return effect;

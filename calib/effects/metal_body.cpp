@@ -78,33 +78,19 @@ Eigen::Matrix3d MetalBody::fieldChange_per_m3(const Eigen::Vector3d& p_sensor_m)
          field::dipoleField(center_m, 1.0 / kFourPi);
 }
 
-std::vector<EffectParameter> bodyParameters() {
-  return {
-      centerParameter("Middle of the body, tracker frame."),
-      {.name = "radius_m",
-       .unit = "m",
-       .shape = "scalar",
-       .default_value = 0.1,
-       .min = 0.001,
-       .max = 10.0,
-       .help = "Radius of a sphere that answers as the body does.",
-       .plausible_min = 0.02,
-       .plausible_max = 0.5},
-      materialParameter(),
-      permeabilityParameter(),
-      conductivityParameter(
-          "Of a solid sphere: aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's "
-          "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal."),
-      {.name = "polarizability_m3",
-       .unit = "m^3",
-       .shape = "matrix3",
-       .min = -1e4,
-       .max = 1e4,
-       .help =
-           "Induced moment per field, tracker axes; when given, radius, material, permeability and conductivity are "
-           "not used.",
-       .plausible_min = -0.8,
-       .plausible_max = 1.6}};
+std::vector<Setting> bodyParameters() {
+  return {centerParameter("Middle of the body, tracker frame."),
+          declare::number("radius_m", {0.001, 10.0, "m"}, 0.1, "Radius of a sphere that answers as the body does.")
+              .plausibly(0.02, 0.5),
+          materialParameter(),
+          permeabilityParameter(),
+          conductivityParameter(
+              "Of a solid sphere: aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's "
+              "carrier or sampling delay decides how much is left of the ideal answer; null is an ideal metal."),
+          declare::matrix3("polarizability_m3", {-1e4, 1e4, "m^3"},
+                           "Induced moment per field, tracker axes; when given, radius, material, permeability and "
+                           "conductivity are not used.")
+              .plausibly(-0.8, 1.6)};
 }
 
 Result<MetalBody> bodyOf(const nlohmann::json& parameters, const field::Excitation& excitation,

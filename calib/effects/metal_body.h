@@ -23,7 +23,7 @@ struct MetalBody {
 };
 
 /// center_m, radius_m, material, relative_permeability, conductivity_s_per_m, polarizability_m3.
-std::vector<EffectParameter> bodyParameters();
+std::vector<Setting> bodyParameters();
 
 /// @param effect_id stands in the message
 /// @error kBadInput when the transmitter would be inside the body

@@ -157,21 +157,12 @@ Effect metalMovedEffect() {
   effect.label = "Metal that came or went";
   effect.source = "Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; sphere: Wait 1951, Geophysics 16 666";
   effect.parameters = bodyParameters();
-  effect.parameters.push_back({.name = "change_s",
-                               .unit = "s",
-                               .shape = "scalar",
-                               .default_value = 0.0,
-                               .min = 0.0,
-                               .max = 1e6,
-                               .help = "When it came or went, from the start of the session.",
-                               .plausible_min = 0.0,
-                               .plausible_max = 36000.0});
   effect.parameters.push_back(
-      {.name = "present",
-       .shape = "text",
-       .default_value = "after",
-       .help = "Whether it stands there `after` the change, having come, or `before` it, having gone.",
-       .choices = {"after", "before"}});
+      declare::number("change_s", {0.0, 1e6, "s"}, 0.0, "When it came or went, from the start of the session.")
+          .plausibly(0.0, 36000.0));
+  effect.parameters.push_back(
+      declare::choice("present", {"after", "before"}, "after",
+                      "Whether it stands there `after` the change, having come, or `before` it, having gone."));
   effect.make = make;
   effect.fits = fits;
   effect.body = ballOf;

@@ -170,41 +170,21 @@ Effect metalPlaneEffect() {
   effect.label = "Metal floor, wall or ceiling";
   effect.source = "Jackson 1999, Classical Electrodynamics, problem 5.17 (method of images)";
   effect.parameters = {
-      {.name = "toward",
-       .shape = "vector3",
-       .default_value = {0.0, 0.0, -1.0},
-       .help = "Direction from the transmitter straight to the plane, tracker frame; any length."},
-      {.name = "distance_m",
-       .unit = "m",
-       .shape = "scalar",
-       .default_value = 1.5,
-       .min = 0.05,
-       .max = 100.0,
-       .help = "From the transmitter to the plane.",
-       .plausible_min = 0.3,
-       .plausible_max = 5.0},
+      declare::vector3("toward", {}, {0.0, 0.0, -1.0},
+                       "Direction from the transmitter straight to the plane, tracker frame; any length."),
+      declare::number("distance_m", {0.05, 100.0, "m"}, 1.5, "From the transmitter to the plane.").plausibly(0.3, 5.0),
       materialParameter(),
       permeabilityParameter(),
       conductivityParameter(
           "Aluminium 3.5e7, copper 5.8e7, steel 6e6, stainless 1.4e6. When given, the tracker's carrier "
           "or sampling delay decides how the plane reflects; null is an ideal metal."),
-      {.name = "thickness_m",
-       .unit = "m",
-       .shape = "scalar",
-       .min = 1e-6,
-       .max = 10.0,
-       .help = "Of a sheet of that conductivity; null is a solid metal without end.",
-       .plausible_min = 1e-5,
-       .plausible_max = 0.05},
-      {.name = "strength",
-       .shape = "scalar",
-       .default_value = 1.0,
-       .min = 0.0,
-       .max = 100.0,
-       .help = "Share of such a plane's image; below 1 for mesh, reinforcement or panels with gaps. No real "
-               "plane has more than 1.",
-       .plausible_min = 0.0,
-       .plausible_max = 1.0}};
+      declare::number("thickness_m", {1e-6, 10.0, "m"}, nullptr,
+                      "Of a sheet of that conductivity; null is a solid metal without end.")
+          .plausibly(1e-5, 0.05),
+      declare::number("strength", {0.0, 100.0}, 1.0,
+                      "Share of such a plane's image; below 1 for mesh, reinforcement or panels with gaps. No real "
+                      "plane has more than 1.")
+          .plausibly(0.0, 1.0)};
   effect.make = make;
   effect.fits = fits;
   effect.body = planeOf;

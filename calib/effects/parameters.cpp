@@ -4,49 +4,24 @@
 
 namespace fieldtrue::effects {
 
-EffectParameter materialParameter() {
-  return {
-      .name = "material",
-      .shape = "text",
-      .default_value = "conductive",
-      .help =
-          "How the metal answers the field: `conductive` keeps it out (any solid metal at an AC tracker's carrier), "
-          "`ferromagnetic` draws it in (steel seen by a pulsed DC tracker).",
-      .choices = {"conductive", "ferromagnetic"}};
+Setting materialParameter() {
+  return declare::choice("material", {"conductive", "ferromagnetic"}, "conductive",
+                         "How the metal answers the field: `conductive` keeps it out (any solid metal at an AC "
+                         "tracker's carrier), `ferromagnetic` draws it in (steel seen by a pulsed DC tracker).");
 }
 
-EffectParameter permeabilityParameter() {
-  return {.name = "relative_permeability",
-          .shape = "scalar",
-          .default_value = 100.0,
-          .min = 1.0,
-          .max = 1e6,
-          .help = "Permeability over that of air; used only where `material` is `ferromagnetic`.",
-          .plausible_min = 20.0,
-          .plausible_max = 5000.0};
+Setting permeabilityParameter() {
+  return declare::number("relative_permeability", {1.0, 1e6}, 100.0,
+                         "Permeability over that of air; used only where `material` is `ferromagnetic`.")
+      .plausibly(20.0, 5000.0);
 }
 
-EffectParameter centerParameter(std::string help) {
-  return {.name = "center_m",
-          .unit = "m",
-          .shape = "vector3",
-          .default_value = {1.0, 0.0, -1.0},
-          .min = -100.0,
-          .max = 100.0,
-          .help = std::move(help),
-          .plausible_min = -10.0,
-          .plausible_max = 10.0};
+Setting centerParameter(std::string help) {
+  return declare::vector3("center_m", {-100.0, 100.0, "m"}, {1.0, 0.0, -1.0}, std::move(help)).plausibly(-10.0, 10.0);
 }
 
-EffectParameter conductivityParameter(std::string help) {
-  return {.name = "conductivity_s_per_m",
-          .unit = "S/m",
-          .shape = "scalar",
-          .min = 1.0,
-          .max = 1e8,
-          .help = std::move(help),
-          .plausible_min = 1e6,
-          .plausible_max = 6e7};
+Setting conductivityParameter(std::string help) {
+  return declare::number("conductivity_s_per_m", {1.0, 1e8, "S/m"}, nullptr, std::move(help)).plausibly(1e6, 6e7);
 }
 
 double scalarOf(const nlohmann::json& parameters, const std::string& name) { return parameters.at(name).get<double>(); }

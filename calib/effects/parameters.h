@@ -10,14 +10,14 @@
 namespace fieldtrue::effects {
 
 /// What metal does to a quasi-static field: as a conductor it keeps the field out, as a ferromagnet it draws it in.
-EffectParameter materialParameter();
+Setting materialParameter();
 /// Used only where the material is ferromagnetic.
-EffectParameter permeabilityParameter();
+Setting permeabilityParameter();
 
 /// Where a body in the room stands. @param help a sentence
-EffectParameter centerParameter(std::string help);
+Setting centerParameter(std::string help);
 /// Null is an ideal metal. @param help a sentence
-EffectParameter conductivityParameter(std::string help);
+Setting conductivityParameter(std::string help);
 
 /// Typed access to resolved parameters.
 double scalarOf(const nlohmann::json& parameters, const std::string& name);

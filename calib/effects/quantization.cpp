@@ -62,24 +62,11 @@ Effect quantizationEffect() {
   effect.id = "quantization";
   effect.label = "Coarse steps";
   effect.source = "Widrow and Kollar 2008, Quantization Noise";
-  effect.parameters = {{.name = "quantum_m",
-                        .unit = "m",
-                        .shape = "scalar",
-                        .default_value = 0.00127,
-                        .min = 0.0,
-                        .max = 1.0,
-                        .help = "Step of reported positions; 0 = none.",
-                        .plausible_min = 0.0,
-                        .plausible_max = 0.01},
-                       {.name = "quantum_rad",
-                        .unit = "rad",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = 0.0,
-                        .max = 1.0,
-                        .help = "Step of reported rotation vectors; 0 = none.",
-                        .plausible_min = 0.0,
-                        .plausible_max = 0.02}};
+  effect.parameters = {
+      declare::number("quantum_m", {0.0, 1.0, "m"}, 0.00127, "Step of reported positions; 0 = none.")
+          .plausibly(0.0, 0.01),
+      declare::number("quantum_rad", {0.0, 1.0, "rad"}, 0.0, "Step of reported rotation vectors; 0 = none.")
+          .plausibly(0.0, 0.02)};
   effect.make = make;
   effect.detect = detect;
   return effect;

@@ -91,22 +91,10 @@ Effect rangeNoiseEffect() {
   effect.id = "range_noise";
   effect.label = "Noise beyond the law of range";
   effect.source = "Error propagation through nine couplings of equal SD: position r^4, orientation r^3";
-  effect.parameters = {{.name = "factor",
-                        .shape = "scalar",
-                        .default_value = 1.0,
-                        .min = 0.0,
-                        .max = 1e3,
-                        .help = "Of the SD of every coupling at 1 m.",
-                        .plausible_min = 0.3,
-                        .plausible_max = 10.0},
-                       {.name = "power",
-                        .shape = "scalar",
-                        .default_value = 0.0,
-                        .min = -6.0,
-                        .max = 6.0,
-                        .help = "The SD of every coupling further grows as (range / 1 m)^power.",
-                        .plausible_min = -2.0,
-                        .plausible_max = 3.0}};
+  effect.parameters = {
+      declare::number("factor", {0.0, 1e3}, 1.0, "Of the SD of every coupling at 1 m.").plausibly(0.3, 10.0),
+      declare::number("power", {-6.0, 6.0}, 0.0, "The SD of every coupling further grows as (range / 1 m)^power.")
+          .plausibly(-2.0, 3.0)};
   effect.make = make;
   effect.detect = detect;
   return effect;

@@ -31,22 +31,6 @@ namespace fieldtrue::effects {
 
 namespace {
 
-bool isBounded(const EffectParameter& parameter) { return parameter.min != 0.0 || parameter.max != 0.0; }
-
-/// Numbers of a list.
-constexpr std::size_t kLongestList = 64;
-
-bool isComponent(const EffectParameter& parameter, const nlohmann::json& value) {
-  if (!value.is_number() || !std::isfinite(value.get<double>())) return false;
-  const double number = value.get<double>();
-  return !isBounded(parameter) || (number >= parameter.min && number <= parameter.max);
-}
-
-bool areComponents(const EffectParameter& parameter, const nlohmann::json& value, std::size_t count) {
-  return value.is_array() && value.size() == count &&
-         std::all_of(value.begin(), value.end(), [&](const nlohmann::json& x) { return isComponent(parameter, x); });
-}
-
 /// Three rows of three written one after the other; anything else as it is.
 nlohmann::json flattened(const nlohmann::json& value) {
   const bool has_rows =
@@ -58,56 +42,22 @@ nlohmann::json flattened(const nlohmann::json& value) {
   return flat;
 }
 
-/// Reciprocity makes every polarizability symmetric; figures rounded to six digits still pass.
-bool isSymmetric(const nlohmann::json& flat) {
-  double largest = 0.0;
-  for (const nlohmann::json& x : flat) largest = std::max(largest, std::abs(x.get<double>()));
-  const auto differs = [&](std::size_t a, std::size_t b) {
-    return std::abs(flat[a].get<double>() - flat[b].get<double>()) > 1e-6 * largest;
-  };
-  return !differs(1, 3) && !differs(2, 6) && !differs(5, 7);
-}
-
-bool hasShape(const EffectParameter& parameter, const nlohmann::json& value) {
-  if (value.is_null()) return parameter.default_value.is_null();
-  if (parameter.shape == "scalar") return isComponent(parameter, value);
-  if (parameter.shape == "vector3") return areComponents(parameter, value, 3);
-  if (parameter.shape == "matrix3") return areComponents(parameter, value, 9) && isSymmetric(value);
-  if (parameter.shape == "list") {
-    return !value.empty() && value.size() <= kLongestList && areComponents(parameter, value, value.size());
-  }
-  FT_CHECK(parameter.shape == "text");
-  if (!value.is_string()) return false;
-  const auto& choices = parameter.choices;
-  return choices.empty() || std::find(choices.begin(), choices.end(), value.get<std::string>()) != choices.end();
-}
-
-std::string needed(const EffectParameter& parameter) {
-  std::string text;
-  if (parameter.shape == "text") {
-    for (const std::string& choice : parameter.choices) text += (text.empty() ? "\"" : " or \"") + choice + "\"";
-    return text.empty() ? "a text" : text;
-  }
-  text = "a number";
-  if (parameter.shape == "vector3") text = "three numbers";
-  if (parameter.shape == "matrix3") text = "nine numbers of a symmetric matrix, row by row,";
-  if (parameter.shape == "list") text = "a list of 1 to " + std::to_string(kLongestList) + " numbers";
-  if (isBounded(parameter)) text += " from " + formatNumber(parameter.min) + " to " + formatNumber(parameter.max);
-  if (!parameter.unit.empty()) text += " [" + parameter.unit + "]";
-  return text;
-}
-
-nlohmann::json toJson(const EffectParameter& parameter) {
-  nlohmann::json json{{"name", parameter.name},   {"unit", parameter.unit},
-                      {"shape", parameter.shape}, {"default", parameter.default_value},
-                      {"min", nullptr},           {"max", nullptr},
-                      {"plausible_min", nullptr}, {"plausible_max", nullptr},
-                      {"help", parameter.help},   {"choices", parameter.choices}};
-  if (isBounded(parameter)) {
+nlohmann::json toJson(const Setting& parameter) {
+  nlohmann::json json{{"name", parameter.key},
+                      {"unit", parameter.unit},
+                      {"shape", shapeOf(parameter)},
+                      {"default", fieldtrue::toJson(parameter.default_value)},
+                      {"min", nullptr},
+                      {"max", nullptr},
+                      {"plausible_min", nullptr},
+                      {"plausible_max", nullptr},
+                      {"help", parameter.help},
+                      {"choices", parameter.choices}};
+  if (parameter.isBounded()) {
     json["min"] = parameter.min;
     json["max"] = parameter.max;
   }
-  if (parameter.plausible_min != 0.0 || parameter.plausible_max != 0.0) {
+  if (parameter.hasPlausibleRange()) {
     json["plausible_min"] = parameter.plausible_min;
     json["plausible_max"] = parameter.plausible_max;
   }
@@ -115,6 +65,21 @@ nlohmann::json toJson(const EffectParameter& parameter) {
 }
 
 }  // namespace
+
+const char* shapeOf(const Setting& parameter) {
+  switch (parameter.type) {
+    case SettingType::kChoice:
+      return "text";
+    case SettingType::kVector3:
+      return "vector3";
+    case SettingType::kMatrix3:
+      return "matrix3";
+    case SettingType::kNumbers:
+      return "list";
+    default:
+      return "scalar";
+  }
+}
 
 std::span<const Effect> effects() {
   static const std::array kEffects{compactMetalEffect(),   metalPlaneEffect(),
@@ -152,16 +117,16 @@ Result<nlohmann::json> resolveEffectParameters(const Effect& effect, const nlohm
   }
   std::vector<std::string> known;
   nlohmann::json resolved = nlohmann::json::object();
-  for (const EffectParameter& parameter : effect.parameters) {
-    known.push_back(parameter.name);
-    const auto found = given.find(parameter.name);
-    const nlohmann::json& seen = found == given.end() ? parameter.default_value : *found;
-    nlohmann::json value = parameter.shape == "matrix3" ? flattened(seen) : seen;
-    if (!hasShape(parameter, value)) {
-      return fail(ErrorCode::kBadInput, effect.id + ": " + parameter.name + " is " + seenValue(seen) + "; it must be " +
-                                            needed(parameter) + ".");
+  for (const Setting& parameter : effect.parameters) {
+    known.push_back(parameter.key);
+    const auto found = given.find(parameter.key);
+    const nlohmann::json seen = found == given.end() ? fieldtrue::toJson(parameter.default_value) : *found;
+    nlohmann::json value = parameter.type == SettingType::kMatrix3 ? flattened(seen) : seen;
+    if (!accepts(parameter, value)) {
+      return fail(ErrorCode::kBadInput, effect.id + ": " + parameter.key + " is " + seenValue(seen) + "; it must be " +
+                                            neededFor(parameter) + ".");
     }
-    resolved[parameter.name] = std::move(value);
+    resolved[parameter.key] = std::move(value);
   }
   for (const auto& [key, unused] : given.items()) {
     if (key != "comment" && std::find(known.begin(), known.end(), key) == known.end()) {
@@ -184,7 +149,7 @@ nlohmann::json toJson(std::span<const Effect> rows) {
   nlohmann::json list = nlohmann::json::array();
   for (const Effect& effect : rows) {
     nlohmann::json parameters = nlohmann::json::array();
-    for (const EffectParameter& parameter : effect.parameters) parameters.push_back(toJson(parameter));
+    for (const Setting& parameter : effect.parameters) parameters.push_back(toJson(parameter));
     list.push_back({{"id", effect.id}, {"label", effect.label}, {"source", effect.source}, {"parameters", parameters}});
   }
   return list;

@@ -20,6 +20,8 @@ std::span<const Effect> effects();
 Result<const Effect*> findEffect(std::string_view id);
 /// "Metal floor, wall or ceiling" for `metal_plane`; the id itself where there is no such row.
 std::string labelOf(const std::string& id);
+/// "scalar", "vector3", "matrix3" (row-major, symmetric), "text" or "list": a parameter's type as listings name it.
+const char* shapeOf(const Setting& parameter);
 /// Fills defaults (null = all of them) and checks names, shapes and ranges. The key `comment` is dropped; a matrix3 may
 /// also be given as three rows of three.
 /// @error kBadInput naming the effect, the parameter, what was seen and what is needed

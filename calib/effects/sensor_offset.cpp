@@ -67,24 +67,12 @@ Effect sensorOffsetEffect() {
   effect.id = "sensor_offset";
   effect.label = "Sensor off its mark";
   effect.source = "Tsai and Lenz 1989, IEEE Trans. RA-5 345";
-  effect.parameters = {{.name = "offset_m",
-                        .unit = "m",
-                        .shape = "vector3",
-                        .default_value = {0.0, 0.0, 0.0},
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "From the point the rig states to the sensor's magnetic centre, sensor frame.",
-                        .plausible_min = -kPlausible_m,
-                        .plausible_max = kPlausible_m},
-                       {.name = "turn_rad",
-                        .unit = "rad",
-                        .shape = "vector3",
-                        .default_value = {0.0, 0.0, 0.0},
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "Rotation vector from the stated mounting to the real one, sensor frame.",
-                        .plausible_min = -kPlausible_rad,
-                        .plausible_max = kPlausible_rad}};
+  effect.parameters = {declare::vector3("offset_m", {-100.0, 100.0, "m"}, {0.0, 0.0, 0.0},
+                                        "From the point the rig states to the sensor's magnetic centre, sensor frame.")
+                           .plausibly(-kPlausible_m, kPlausible_m),
+                       declare::vector3("turn_rad", {-100.0, 100.0, "rad"}, {0.0, 0.0, 0.0},
+                                        "Rotation vector from the stated mounting to the real one, sensor frame.")
+                           .plausibly(-kPlausible_rad, kPlausible_rad)};
   effect.make = make;
   effect.fits = fits;
   return effect;

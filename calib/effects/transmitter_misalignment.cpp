@@ -50,24 +50,13 @@ Effect transmitterMisalignmentEffect() {
   effect.id = "transmitter_misalignment";
   effect.label = "Transmitter out of place";
   effect.source = "Horn 1987, J. Opt. Soc. Am. A 4 629";
-  effect.parameters = {{.name = "shift_m",
-                        .unit = "m",
-                        .shape = "vector3",
-                        .default_value = {0.0, 0.0, 0.0},
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "From where the rig says to where it stands, frame of the transmitter as stated.",
-                        .plausible_min = -kPlausible_m,
-                        .plausible_max = kPlausible_m},
-                       {.name = "turn_rad",
-                        .unit = "rad",
-                        .shape = "vector3",
-                        .default_value = {0.0, 0.0, 0.0},
-                        .min = -100.0,
-                        .max = 100.0,
-                        .help = "Small rotation vector from the stated orientation to the real one, same frame.",
-                        .plausible_min = -kPlausible_rad,
-                        .plausible_max = kPlausible_rad}};
+  effect.parameters = {
+      declare::vector3("shift_m", {-100.0, 100.0, "m"}, {0.0, 0.0, 0.0},
+                       "From where the rig says to where it stands, frame of the transmitter as stated.")
+          .plausibly(-kPlausible_m, kPlausible_m),
+      declare::vector3("turn_rad", {-100.0, 100.0, "rad"}, {0.0, 0.0, 0.0},
+                       "Small rotation vector from the stated orientation to the real one, same frame.")
+          .plausibly(-kPlausible_rad, kPlausible_rad)};
   effect.make = make;
   effect.fits = fits;
   return effect;

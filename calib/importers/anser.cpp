@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 
+#include "calib/core/declare.h"
 #include "calib/core/file_io.h"
 #include "calib/importers/rows.h"
 #include "calib/tables/csv_reader.h"
@@ -80,18 +81,14 @@ Result<Import> importAnser(const std::filesystem::path& path, const std::optiona
 
 /// The table of Anser EMT's Duplo-board recordings: one condition of it as a node table, positions only.
 Importer anserImporter() {
-  Setting condition;
-  condition.key = "condition";
-  condition.label = "Condition";
-  condition.type = SettingType::kChoice;
-  condition.default_value = std::string("standard_data_grid");
-  condition.choices = {"standard_data_grid", "interpolate_data_grid", "interpolate_data_grid_probe_calibrate",
-                       "finer_mesh_points",  "finer_mesh_3axis",      "steel_shield"};
-  condition.help = "Which of the table's recordings to take";
   return {.id = "anser",
           .label = "Anser EMT Duplo-board table (.csv)",
           .source = "Jaeger, O'Donoghue, Matlab-Anser, mapping/data_out",
-          .settings = {condition},
+          .settings = {declare::choice(
+              "condition", "Condition",
+              {"standard_data_grid", "interpolate_data_grid", "interpolate_data_grid_probe_calibrate",
+               "finer_mesh_points", "finer_mesh_3axis", "steel_shield"},
+              "standard_data_grid", "Which of the table's recordings to take")},
           .read = importAnser};
 }
 

@@ -3,6 +3,7 @@
 #include <set>
 #include <tuple>
 
+#include "calib/core/declare.h"
 #include "calib/core/file_io.h"
 #include "calib/importers/averaging.h"
 #include "calib/importers/rows.h"
@@ -250,16 +251,9 @@ Result<Import> importColumns(const std::filesystem::path& path, const std::optio
   return assemble(*rows, *layout, truth_path, settings);
 }
 
-Setting textSetting(std::string key, std::string label, std::string default_value, std::string help,
+Setting textSetting(std::string key, std::string label, std::string usual, std::string help,
                     std::vector<std::string> choices = {}) {
-  Setting setting;
-  setting.key = std::move(key);
-  setting.label = std::move(label);
-  setting.type = SettingType::kChoice;
-  setting.default_value = std::move(default_value);
-  setting.choices = std::move(choices);
-  setting.help = std::move(help);
-  return setting;
+  return declare::choice(std::move(key), std::move(label), std::move(choices), std::move(usual), std::move(help));
 }
 
 }  // namespace
@@ -292,13 +286,8 @@ Importer columnsImporter() {
                                  {"comma", "semicolon", "tab", "space"}));
   settings.push_back(textSetting("frame", "Frame of the truth", "jig", "What the true positions are measured against",
                                  {"tracker", "jig", "room"}));
-  Setting average;
-  average.key = "average";
-  average.label = "Rows are samples";
-  average.type = SettingType::kBool;
-  average.default_value = false;
-  average.help = "Average the rows of each node and visit instead of taking each as a mean";
-  settings.push_back(average);
+  settings.push_back(declare::flag("average", "Rows are samples", false,
+                                   "Average the rows of each node and visit instead of taking each as a mean"));
   return {.id = "columns",
           .label = "Table with named columns (.csv)",
           .source = "any program that writes a header row",

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <map>
 
+#include "calib/core/declare.h"
 #include "calib/core/file_io.h"
 #include "calib/core/quantum.h"
 #include "calib/core/statistics.h"
@@ -148,24 +149,15 @@ Result<Import> importPlus(const std::filesystem::path& path, const std::optional
 
 /// The sample table of fCal (PLUS) recordings: a stylus pivoting on the landmarks of a phantom.
 Importer plusImporter() {
-  Setting body;
-  body.key = "body";
-  body.label = "Tracked point";
-  body.type = SettingType::kChoice;
-  body.default_value = std::string("tip");
-  body.choices = {"tip", "stylus", "reference"};
-  body.help = "Whose pose to take: the stylus tip, or the sensor in the stylus or at the phantom";
-  Setting reject;
-  reject.key = "reject";
-  reject.label = "Reject outliers";
-  reject.type = SettingType::kBool;
-  reject.default_value = true;
-  reject.help = "Leave samples far from the median of their landmark out of its mean";
-  return {.id = "plus",
-          .label = "PLUS fCal stylus recording (.csv)",
-          .source = "PlusToolkit, PlusLibData, fCal phantom",
-          .settings = {body, reject},
-          .read = importPlus};
+  return {
+      .id = "plus",
+      .label = "PLUS fCal stylus recording (.csv)",
+      .source = "PlusToolkit, PlusLibData, fCal phantom",
+      .settings = {declare::choice("body", "Tracked point", {"tip", "stylus", "reference"}, "tip",
+                                   "Whose pose to take: the stylus tip, or the sensor in the stylus or at the phantom"),
+                   declare::flag("reject", "Reject outliers", true,
+                                 "Leave samples far from the median of their landmark out of its mean")},
+      .read = importPlus};
 }
 
 }  // namespace fieldtrue::importers

@@ -1,6 +1,7 @@
 #include <array>
 #include <string>
 
+#include "calib/core/declare.h"
 #include "calib/core/file_io.h"
 #include "calib/importers/rows.h"
 #include "calib/tables/csv_reader.h"
@@ -92,19 +93,11 @@ Result<Import> importTraj(const std::filesystem::path& path, const std::optional
 
 /// Trajectories as 4x4 matrices separated by blank lines: samples without truth.
 Importer trajImporter() {
-  Setting rate;
-  rate.key = "rate_hz";
-  rate.label = "Rate";
-  rate.type = SettingType::kNumber;
-  rate.unit = "Hz";
-  rate.min = 0.001;
-  rate.max = 100000.0;
-  rate.default_value = 100.0;
-  rate.help = "Rows in a second; the file itself has no times";
   return {.id = "traj",
           .label = "Trajectory of 4x4 matrices in metres (.traj)",
           .source = "RMonica, hand-polhemus-dataset",
-          .settings = {rate},
+          .settings = {declare::number("rate_hz", "Rate", {0.001, 100000.0, "Hz"}, 100.0,
+                                       "Rows in a second; the file itself has no times")},
           .read = importTraj};
 }
 

@@ -70,10 +70,13 @@ SettingValue readEditor(const Setting& setting, QWidget* editor) {
       return numberOf(box);
     }
     case SettingType::kChoice:
-      if (auto* combo = qobject_cast<QComboBox*>(editor)) return combo->currentText().toStdString();
-      return static_cast<QLineEdit*>(editor)->text().toStdString();
+    case SettingType::kVector3:
+    case SettingType::kMatrix3:
+    case SettingType::kNumbers:
+      break;
   }
-  return setting.default_value;
+  if (auto* combo = qobject_cast<QComboBox*>(editor)) return combo->currentText().toStdString();
+  return valueOf(setting, static_cast<QLineEdit*>(editor)->text().toStdString()).value_or(setting.default_value);
 }
 
 }  // namespace
@@ -128,9 +131,12 @@ QWidget* SettingsForm::makeEditor(const Setting& setting, const SettingValue& va
       return box;
     }
     case SettingType::kChoice:
+    case SettingType::kVector3:
+    case SettingType::kMatrix3:
+    case SettingType::kNumbers:
       break;
   }
-  const QString text = QString::fromStdString(std::get<std::string>(value));
+  const QString text = QString::fromStdString(textOf(value));
   if (setting.choices.empty()) {
     auto* edit = new QLineEdit(text);
     connect(edit, &QLineEdit::editingFinished, this, &SettingsForm::changed);

@@ -34,19 +34,7 @@ QString changedSettings(std::span<const Setting> declared, const Settings& value
   for (const Setting& setting : declared) {
     const SettingValue& value = values.at(setting.key);
     if (value == setting.default_value) continue;
-    const std::string text = std::visit(
-        [](const auto& v) -> std::string {
-          using T = std::decay_t<decltype(v)>;
-          if constexpr (std::is_same_v<T, std::string>) {
-            return v;
-          } else if constexpr (std::is_same_v<T, bool>) {
-            return v ? "true" : "false";
-          } else {
-            return QString::number(v).toStdString();
-          }
-        },
-        value);
-    parts << QString::fromStdString(setting.key + "=" + text);
+    parts << QString::fromStdString(setting.key + "=" + textOf(value));
   }
   return parts.join(QLatin1Char(','));
 }

@@ -1,5 +1,6 @@
 #include "calib/correctors/base/error_rotation.h"
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
@@ -39,15 +40,9 @@ ErrorFrame errorFrameFrom(const JsonReader& parameters) {
 }
 
 Setting errorFrameSetting() {
-  return {.key = "error_frame",
-          .label = "Error frame",
-          .type = SettingType::kChoice,
-          .unit = "",
-          .min = 0.0,
-          .max = 0.0,
-          .default_value = std::string("tracker"),
-          .choices = {"tracker", "sensor"},
-          .help = "Where the error rotation is taken to be the same for every orientation of the sensor at a place."};
+  return declare::choice(
+      "error_frame", "Error frame", {"tracker", "sensor"}, "tracker",
+      "Where the error rotation is taken to be the same for every orientation of the sensor at a place.");
 }
 
 }  // namespace fieldtrue::correctors

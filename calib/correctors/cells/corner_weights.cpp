@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 
 namespace fieldtrue::correctors {
@@ -144,29 +145,14 @@ std::array<double, 8> cornerWeights(const WeightRule& rule, const CellLengths& l
 }
 
 Setting lengthUnitSetting() {
-  return {.key = "length_unit_m",
-          .label = "Length unit of e^-d",
-          .type = SettingType::kNumber,
-          .unit = "m",
-          .min = 0.001,
-          .max = 10.0,
-          .default_value = 0.3048,
-          .choices = {},
-          .help = "Unit of d in Bryson's bump, who states none; the default is the foot at which he measured."};
+  return declare::number("length_unit_m", "Length unit of e^-d", {0.001, 10.0, "m"}, 0.3048,
+                         "Unit of d in Bryson's bump, who states none; the default is the foot at which he measured.");
 }
 
 Setting bumpEndSetting() {
-  return {.key = "d_max_m",
-          .label = "End of the bump",
-          .type = SettingType::kAutoNumber,
-          .unit = "m",
-          .min = 0.001,
-          .max = 10.0,
-          .default_value = std::string("auto"),
-          .choices = {},
-          .help =
-              "Distance at which a corner's weight in Bryson's bump ends; auto is the smallest distance between two "
-              "corners of the cell, the largest he allows."};
+  return declare::autoNumber("d_max_m", "End of the bump", {0.001, 10.0, "m"}, "auto",
+                             "Distance at which a corner's weight in Bryson's bump ends; auto is the smallest distance "
+                             "between two corners of the cell, the largest he allows.");
 }
 
 WeightKind weightKind(const std::string& name) {

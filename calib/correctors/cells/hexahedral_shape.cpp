@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "calib/core/declare.h"
 #include "calib/correctors/base/fit_names.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
@@ -142,18 +143,6 @@ std::unique_ptr<PositionModel> loadHexahedralShape(const JsonReader& parameters)
   return std::make_unique<HexahedralShapePosition>(std::move(cells), std::move(v_m), choice, parameters["note"].text());
 }
 
-Setting choiceOf(std::string key, std::string label, std::vector<std::string> choices, std::string help) {
-  return {.key = std::move(key),
-          .label = std::move(label),
-          .type = SettingType::kChoice,
-          .unit = "",
-          .min = 0.0,
-          .max = 0.0,
-          .default_value = choices.front(),
-          .choices = choices,
-          .help = std::move(help)};
-}
-
 }  // namespace
 
 PositionMethod hexahedralShapePosition() {
@@ -162,12 +151,13 @@ PositionMethod hexahedralShapePosition() {
       .label = "Hexahedral shape functions",
       .source = "Zachmann 2000; survey by Kindratenko, section 3.2, eq. 3-4",
       .settings =
-          {choiceOf("map", "Map", {"shape", "isoparametric"},
-                    "Shape functions of the position, as published, or of the natural coordinates, which is continuous "
-                    "between cells."),
-           choiceOf("axes", "Axes", {"cell", "tracker"},
-                    "Axes of the shape functions; tracker is as published and singular for a cube turned by 45 "
-                    "degrees.")},
+          {declare::choice(
+               "map", "Map", {"shape", "isoparametric"}, "shape",
+               "Shape functions of the position, as published, or of the natural coordinates, which is continuous "
+               "between cells."),
+           declare::choice("axes", "Axes", {"cell", "tracker"}, "cell",
+                           "Axes of the shape functions; tracker is as published and singular for a cube turned by 45 "
+                           "degrees.")},
       .fit = fitHexahedralShape,
       .read = loadHexahedralShape,
       .origin = MethodOrigin::kSurvey,

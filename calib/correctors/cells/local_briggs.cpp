@@ -1,3 +1,4 @@
+#include "calib/core/declare.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
@@ -19,17 +20,9 @@ Result<std::unique_ptr<PositionModel>> fitLocalBriggs(const FitData& data, const
 
 std::vector<Setting> briggsSettings() {
   std::vector<Setting> settings = resampleSettings();
-  settings.push_back({.key = "as_published",
-                      .label = "Weights as published",
-                      .type = SettingType::kBool,
-                      .unit = "",
-                      .min = 0.0,
-                      .max = 0.0,
-                      .default_value = false,
-                      .choices = {},
-                      .help =
-                          "Uses the published normalisation, which is wrong, to show what it does; the weights then "
-                          "do not add up to 1."});
+  settings.push_back(declare::flag(
+      "as_published", "Weights as published", false,
+      "Uses the published normalisation, which is wrong, to show what it does; the weights then do not add up to 1."));
   return settings;
 }
 

@@ -1,3 +1,4 @@
+#include "calib/core/declare.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
@@ -12,15 +13,8 @@ Result<std::unique_ptr<PositionModel>> fitLocalKindratenko(const FitData& data, 
 }
 
 Setting weightSetting() {
-  return {.key = "weight",
-          .label = "Weights",
-          .type = SettingType::kChoice,
-          .unit = "",
-          .min = 0.0,
-          .max = 0.0,
-          .default_value = std::string("linear"),
-          .choices = {"linear", "quadratic", "log"},
-          .help = "How a corner's weight falls to 0 at half the longest diagonal of the cell."};
+  return declare::choice("weight", "Weights", {"linear", "quadratic", "log"}, "linear",
+                         "How a corner's weight falls to 0 at half the longest diagonal of the cell.");
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include "calib/core/declare.h"
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/place_rotations.h"
@@ -71,15 +72,8 @@ std::unique_ptr<OrientationModel> loadLocalQuaternion(const JsonReader& paramete
 }
 
 Setting weightSetting() {
-  return {.key = "weight",
-          .label = "Weights",
-          .type = SettingType::kChoice,
-          .unit = "",
-          .min = 0.0,
-          .max = 0.0,
-          .default_value = std::string("linear"),
-          .choices = {"linear", "quadratic", "log", "bryson_linear", "bryson_bump", "briggs"},
-          .help = "How the corners of the cell share: linear, quadratic and log are Kindratenko's."};
+  return declare::choice("weight", "Weights", {"linear", "quadratic", "log", "bryson_linear", "bryson_bump", "briggs"},
+                         "linear", "How the corners of the cell share: linear, quadratic and log are Kindratenko's.");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "calib/core/declare.h"
 #include "calib/correctors/base/fit_names.h"
 #include "calib/correctors/cells/place_grid.h"
 #include "calib/correctors/numerics/delaunay.h"
@@ -72,17 +73,9 @@ std::string foldNote(const Tetrahedra& tetrahedra) {
 }  // namespace
 
 Setting splitSetting() {
-  return {.key = "split",
-          .label = "Tetrahedra",
-          .type = SettingType::kChoice,
-          .unit = "",
-          .min = 0.0,
-          .max = 0.0,
-          .default_value = std::string("auto"),
-          .choices = {"auto", "5", "6", "delaunay"},
-          .help =
-              "Tetrahedra for each cell of the grid, or Delaunay; auto is 5 on a grid and Delaunay for scattered "
-              "places."};
+  return declare::choice(
+      "split", "Tetrahedra", {"auto", "5", "6", "delaunay"}, "auto",
+      "Tetrahedra for each cell of the grid, or Delaunay; auto is 5 on a grid and Delaunay for scattered places.");
 }
 
 std::vector<std::size_t> invertedTetrahedra(const Tetrahedra& tetrahedra) {

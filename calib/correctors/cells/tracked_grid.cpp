@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "calib/core/declare.h"
 #include "calib/core/geometry.h"
 #include "calib/core/grid_index.h"
 #include "calib/correctors/base/fit_names.h"
@@ -225,25 +226,12 @@ Result<TrackedGrid> resampledGrid(const Places& places, RegridMethod regrid, con
 }  // namespace
 
 std::vector<Setting> resampleSettings() {
-  return {{.key = "resample",
-           .label = "Resampling",
-           .type = SettingType::kChoice,
-           .unit = "",
-           .min = 0.0,
-           .max = 0.0,
-           .default_value = std::string("none"),
-           .choices = {"none", "briggs", "livingston", "czernuszenko"},
-           .help = "How error vectors of places that form no grid in tracked space are brought to one; none asks for "
-                   "such a grid."},
-          {.key = "width_pitches",
-           .label = "Width of Livingston's kernel",
-           .type = SettingType::kNumber,
-           .unit = "pitches",
-           .min = 0.1,
-           .max = 3.0,
-           .default_value = 1.0,
-           .choices = {},
-           .help = "SD of the Gaussian kernel of resample=livingston; its width is not published, one pitch is ours."}};
+  return {declare::choice("resample", "Resampling", {"none", "briggs", "livingston", "czernuszenko"}, "none",
+                          "How error vectors of places that form no grid in tracked space are brought to one; none "
+                          "asks for such a grid."),
+          declare::number(
+              "width_pitches", "Width of Livingston's kernel", {0.1, 3.0, "pitches"}, 1.0,
+              "SD of the Gaussian kernel of resample=livingston; its width is not published, one pitch is ours.")};
 }
 
 Result<TrackedGrid> trackedGrid(const FitData& data, const Settings& settings, const std::string& method) {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <mutex>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
@@ -243,34 +244,13 @@ std::unique_ptr<PositionModel> loadGaussianProcess(const JsonReader& parameters)
 }
 
 std::vector<Setting> gaussianProcessSettings() {
-  return {
-      {.key = "nu",
-       .label = "Smoothness",
-       .type = SettingType::kChoice,
-       .unit = "",
-       .min = 0.0,
-       .max = 0.0,
-       .default_value = std::string("2.5"),
-       .choices = {"1.5", "2.5"},
-       .help = "Of the Matern kernel: fields with nu = 2.5 have two derivatives, with 1.5 one."},
-      {.key = "restarts",
-       .label = "Starts",
-       .type = SettingType::kInteger,
-       .unit = "",
-       .min = 1,
-       .max = 20,
-       .default_value = std::int64_t{3},
-       .choices = {},
-       .help = "Starting points from which the scales are sought; the most likely end is kept."},
-      {.key = "tuning_places",
-       .label = "Places for the scales",
-       .type = SettingType::kInteger,
-       .unit = "",
-       .min = 50,
-       .max = 3000,
-       .default_value = std::int64_t{700},
-       .choices = {},
-       .help = "With more places than these, the scales are found on a well-spread part of them; the fit takes all."}};
+  return {declare::choice("nu", "Smoothness", {"1.5", "2.5"}, "2.5",
+                          "Of the Matern kernel: fields with nu = 2.5 have two derivatives, with 1.5 one."),
+          declare::integer("restarts", "Starts", {1, 20}, 3,
+                           "Starting points from which the scales are sought; the most likely end is kept."),
+          declare::integer(
+              "tuning_places", "Places for the scales", {50, 3000}, 700,
+              "With more places than these, the scales are found on a well-spread part of them; the fit takes all.")};
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/memory_limit.h"
 #include "calib/correctors/base/fit_checks.h"
@@ -167,26 +168,12 @@ std::unique_ptr<PositionModel> loadHarmonic(const JsonReader& parameters) {
 /// @source Jackson 1999, Classical Electrodynamics, sections 5.4 and 1.8 (harmonic potentials from exterior sources);
 /// Raab, Blood, Steiner, Jones 1979 (dipole tracker, induced dipoles); Tipping and Faul 2003 (choice of the sources)
 PositionMethod harmonicFieldPosition() {
-  const Setting least_gain{.key = "least_gain",
-                           .label = "Evidence a source must add",
-                           .type = SettingType::kNumber,
-                           .unit = "nats",
-                           .min = 0.5,
-                           .max = 50.0,
-                           .default_value = 6.0,
-                           .choices = {},
-                           .help =
-                               "A further source of disturbance is believed in when it raises the logarithm of the "
-                               "marginal likelihood by this; larger is smoother."};
-  const Setting most_sources{.key = "most_sources",
-                             .label = "Most sources",
-                             .type = SettingType::kInteger,
-                             .unit = "",
-                             .min = 0,
-                             .max = 80,
-                             .default_value = std::int64_t{40},
-                             .choices = {},
-                             .help = "No more sources of disturbance than this are placed outside the region."};
+  const Setting least_gain = declare::number("least_gain", "Evidence a source must add", {0.5, 50.0, "nats"}, 6.0,
+                                             "A further source of disturbance is believed in when it raises the "
+                                             "logarithm of the marginal likelihood by this; larger is smoother.");
+  const Setting most_sources =
+      declare::integer("most_sources", "Most sources", {0, 80}, 40,
+                       "No more sources of disturbance than this are placed outside the region.");
   PositionMethod method;
   method.id = "harmonic_field";
   method.label = "Harmonic field";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
@@ -19,16 +20,9 @@ constexpr std::size_t kPrecisionProbes = 20000;
 constexpr double kPrecisionMargin = 1.25;
 
 Setting precisionSetting() {
-  return {
-      .key = "precision",
-      .label = "Precision",
-      .type = SettingType::kChoice,
-      .unit = "",
-      .min = 0.0,
-      .max = 0.0,
-      .default_value = std::string("double"),
-      .choices = {"double", "single"},
-      .help = "Numbers of the evaluation: single is about twice as fast, and its deviation is measured and stated."};
+  return declare::choice(
+      "precision", "Precision", {"double", "single"}, "double",
+      "Numbers of the evaluation: single is about twice as fast, and its deviation is measured and stated.");
 }
 
 std::string textInMm(double rms_m) {

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "calib/core/declare.h"
 #include "calib/core/file_io.h"
 #include "calib/correctors/multiquadric/hmq_system.h"
 
@@ -146,17 +147,9 @@ double multiquadricMatrices(std::size_t n_places) {
 }
 
 Setting r2Setting() {
-  return {.key = "r2_cm2",
-          .label = "R squared",
-          .type = SettingType::kAutoNumber,
-          .unit = "cm2",
-          .min = 10.0,
-          .max = 1000.0,
-          .default_value = 100.0,
-          .choices = {},
-          .help =
-              "Smoothness of the multiquadric: larger is smoother; auto takes what predicts left-out places best. The "
-              "survey gives 10 to 1000 without a unit; read as cm2."};
+  return declare::autoNumber("r2_cm2", "R squared", {10.0, 1000.0, "cm2"}, 100.0,
+                             "Smoothness of the multiquadric: larger is smoother; auto takes what predicts left-out "
+                             "places best. The survey gives 10 to 1000 without a unit; read as cm2.");
 }
 
 }  // namespace fieldtrue::correctors

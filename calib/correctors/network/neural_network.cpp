@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
@@ -142,56 +143,30 @@ std::unique_ptr<PositionModel> loadNeuralNetwork(const JsonReader& parameters) {
                                                  Scaling::fromJson(parameters["true"]), parameters["note"].text());
 }
 
-Setting number(const char* key, const char* label, const char* unit, double min, double max, double value,
-               const char* help) {
-  return {.key = key,
-          .label = label,
-          .type = SettingType::kNumber,
-          .unit = unit,
-          .min = min,
-          .max = max,
-          .default_value = value,
-          .choices = {},
-          .help = help};
-}
-
-Setting integer(const char* key, const char* label, double min, double max, std::int64_t value, const char* help) {
-  return {.key = key,
-          .label = label,
-          .type = SettingType::kInteger,
-          .unit = "",
-          .min = min,
-          .max = max,
-          .default_value = value,
-          .choices = {},
-          .help = help};
-}
-
 std::vector<Setting> neuralNetworkSettings() {
-  Setting training;
-  training.key = "training";
-  training.label = "Training";
-  training.type = SettingType::kChoice;
-  training.default_value = std::string("levenberg_marquardt");
-  training.choices = {"levenberg_marquardt", "back_propagation"};
-  training.help = "Least squares from several starts, or the published back-propagation of one pair at a time.";
   return {
-      integer("hidden", "First hidden layer", 2, 16, 8, "Nodes of the first hidden layer; 7 or 8 are published."),
-      training,
-      integer("starts", "Starts", 1, 20, 4, "Random starts of levenberg_marquardt; the best one is kept."),
-      integer("max_iterations", "Most iterations", 1, 2000, 150,
-              "levenberg_marquardt ends after so many at the latest."),
-      number("weight_penalty", "Weight penalty", "", 0.0, 1.0, 1e-7,
-             "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "
-             "keeps weights from running away and is too light to smooth; 0 = none."),
-      number("learning_rate", "Learning rate", "", 0.001, 1.0, 0.05, "Of back_propagation; 0.01 to 0.1 are published."),
-      number("momentum", "Momentum", "", 0.0, 0.99, 0.5, "Of back_propagation: share of the last change in the next."),
-      number("stop_error_m", "Stop at", "m", 1e-5, 1.0, 0.01,
-             "back_propagation ends when the average output error falls below it; 0.01 is published without a unit, "
-             "read as metres."),
-      integer("max_epochs", "Most epochs", 1, 1000000, 3000,
-              "back_propagation ends after so many passes at the latest."),
-      integer("seed", "Seed", 0, 1000000, 1, "Of the random starts; the same seed gives the same network.")};
+      declare::integer("hidden", "First hidden layer", {2, 16}, 8,
+                       "Nodes of the first hidden layer; 7 or 8 are published."),
+      declare::choice("training", "Training", {"levenberg_marquardt", "back_propagation"}, "levenberg_marquardt",
+                      "Least squares from several starts, or the published back-propagation of one pair at a time."),
+      declare::integer("starts", "Starts", {1, 20}, 4, "Random starts of levenberg_marquardt; the best one is kept."),
+      declare::integer("max_iterations", "Most iterations", {1, 2000}, 150,
+                       "levenberg_marquardt ends after so many at the latest."),
+      declare::number(
+          "weight_penalty", "Weight penalty", {0.0, 1.0}, 1e-7,
+          "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "
+          "keeps weights from running away and is too light to smooth; 0 = none."),
+      declare::number("learning_rate", "Learning rate", {0.001, 1.0}, 0.05,
+                      "Of back_propagation; 0.01 to 0.1 are published."),
+      declare::number("momentum", "Momentum", {0.0, 0.99}, 0.5,
+                      "Of back_propagation: share of the last change in the next."),
+      declare::number(
+          "stop_error_m", "Stop at", {1e-5, 1.0, "m"}, 0.01,
+          "back_propagation ends when the average output error falls below it; 0.01 is published without a unit, "
+          "read as metres."),
+      declare::integer("max_epochs", "Most epochs", {1, 1000000}, 3000,
+                       "back_propagation ends after so many passes at the latest."),
+      declare::integer("seed", "Seed", {0, 1000000}, 1, "Of the random starts; the same seed gives the same network.")};
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <map>
 #include <numbers>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_rows.h"
@@ -262,18 +263,6 @@ std::unique_ptr<PositionModel> loadPhysicsResidual(const JsonReader& parameters)
                                            parameters["note"].text());
 }
 
-Setting integerOf(std::string key, std::string label, double min, double max, std::int64_t usual, std::string help) {
-  return {.key = std::move(key),
-          .label = std::move(label),
-          .type = SettingType::kInteger,
-          .unit = "",
-          .min = min,
-          .max = max,
-          .default_value = usual,
-          .choices = {},
-          .help = std::move(help)};
-}
-
 }  // namespace
 
 /// The scene that a diagnosis finds behind the data, undone by inverting what a tracker reports in it, and a Gaussian
@@ -286,12 +275,13 @@ PositionMethod physicsResidualPosition() {
       "Model plus discrepancy: Kennedy and O'Hagan 2001, J. R. Statist. Soc. B 63 425, eq. 4; effects and Gaussian "
       "process as they stand in this program";
   method.settings = gaussianProcessPosition().settings;
+  method.settings.push_back(declare::integer(
+      kMostEffects, "Most effects", {1, 4}, 2,
+      "No more effects than this are sought behind the data, and no more than one for every 60 places."));
   method.settings.push_back(
-      integerOf(kMostEffects, "Most effects", 1, 4, 2,
-                "No more effects than this are sought behind the data, and no more than one for every 60 places."));
-  method.settings.push_back(integerOf(kSearchPlaces, "Places for the scene", 50, 3000, 120,
-                                      "With more places than these, the scene is sought on a well-spread part of them; "
-                                      "the Gaussian process takes all."));
+      declare::integer(kSearchPlaces, "Places for the scene", {50, 3000}, 120,
+                       "With more places than these, the scene is sought on a well-spread part of them; "
+                       "the Gaussian process takes all."));
   method.fit = fitPhysicsResidual;
   method.read = loadPhysicsResidual;
   method.most_folds = 5;

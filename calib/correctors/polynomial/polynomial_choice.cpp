@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/polynomial/polynomial_position.h"
@@ -107,18 +108,9 @@ ChosenPolynomial ChosenPolynomial::fromJson(const JsonReader& json) {
 }
 
 Setting degreeSetting() {
-  return {.key = "degree",
-          .label = "Degree",
-          .type = SettingType::kAutoNumber,
-          .unit = "",
-          .min = 1,
-          .max = PolynomialField::kMaxDegree,
-          .default_value = 3.0,
-          .choices = {},
-          .help =
-              "Highest total power of x, y and z; each axis needs one level of places more than the degree. auto: "
-              "the lowest degree that predicts left-out places as well as the best one.",
-          .whole = true};
+  return declare::autoInteger("degree", "Degree", {1, PolynomialField::kMaxDegree}, 3.0,
+                              "Highest total power of x, y and z; each axis needs one level of places more than the "
+                              "degree. auto: the lowest degree that predicts left-out places as well as the best one.");
 }
 
 }  // namespace fieldtrue::correctors

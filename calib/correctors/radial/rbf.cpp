@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
@@ -174,36 +175,16 @@ std::unique_ptr<PositionModel> loadRbf(const JsonReader& parameters) {
 }
 
 std::vector<Setting> rbfSettings() {
-  return {{.key = "kernel",
-           .label = "Kernel",
-           .type = SettingType::kChoice,
-           .unit = "",
-           .min = 0.0,
-           .max = 0.0,
-           .default_value = std::string("multiquadric"),
-           .choices = {"multiquadric", "inverse_multiquadric", "cubic", "thin_plate"},
-           .help = "The function of distance that is summed; cubic and thin plate have no shape."},
-          {.key = "shape_mm",
-           .label = "Shape",
-           .type = SettingType::kAutoNumber,
-           .unit = "mm",
-           .min = 1.0,
-           .max = 100000.0,
-           .default_value = std::string("auto"),
-           .choices = {},
-           .help = "Distance over which a multiquadric is rounded off: larger is smoother; auto chooses by "
-                   "leave-one-out."},
-          {.key = "smoothing",
-           .label = "Smoothing",
-           .type = SettingType::kAutoNumber,
-           .unit = "",
-           .min = 0.0,
-           .max = 1e6,
-           .default_value = std::string("auto"),
-           .choices = {},
-           .help = "Added to the kernel matrix's diagonal in proportion to each place's noise, lengths in root mean "
-                   "squared distances of the places from their centre; 0 passes through every place, auto chooses by "
-                   "leave-one-out."}};
+  return {
+      declare::choice("kernel", "Kernel", {"multiquadric", "inverse_multiquadric", "cubic", "thin_plate"},
+                      "multiquadric", "The function of distance that is summed; cubic and thin plate have no shape."),
+      declare::autoNumber(
+          "shape_mm", "Shape", {1.0, 100000.0, "mm"}, "auto",
+          "Distance over which a multiquadric is rounded off: larger is smoother; auto chooses by leave-one-out."),
+      declare::autoNumber(
+          "smoothing", "Smoothing", {0.0, 1e6}, "auto",
+          "Added to the kernel matrix's diagonal in proportion to each place's noise, lengths in root mean squared "
+          "distances of the places from their centre; 0 passes through every place, auto chooses by leave-one-out.")};
 }
 
 }  // namespace

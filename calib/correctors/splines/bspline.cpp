@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/core/declare.h"
 #include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/method.h"
@@ -149,25 +150,12 @@ std::unique_ptr<PositionModel> loadBspline(const JsonReader& parameters) {
 }
 
 std::vector<Setting> bsplineSettings() {
-  return {{.key = "spans",
-           .label = "Spans along the longest axis",
-           .type = SettingType::kAutoNumber,
-           .unit = "",
-           .min = 1.0,
-           .max = 40.0,
-           .default_value = std::string("auto"),
-           .choices = {},
-           .help = "Knots of the lattice less one; the other axes get spans of the same length. Auto makes a span a "
-                   "little longer than the places stand apart."},
-          {.key = "smoothing",
-           .label = "Smoothing",
-           .type = SettingType::kAutoNumber,
-           .unit = "",
-           .min = 1e-8,
-           .max = 1e8,
-           .default_value = std::string("auto"),
-           .choices = {},
-           .help = "Weight of the bending penalty beside the data; auto chooses by generalised cross-validation."}};
+  return {declare::autoNumber("spans", "Spans along the longest axis", {1.0, 40.0}, "auto",
+                              "Knots of the lattice less one; the other axes get spans of the same length. Auto makes "
+                              "a span a little longer than the places stand apart."),
+          declare::autoNumber(
+              "smoothing", "Smoothing", {1e-8, 1e8}, "auto",
+              "Weight of the bending penalty beside the data; auto chooses by generalised cross-validation.")};
 }
 
 }  // namespace

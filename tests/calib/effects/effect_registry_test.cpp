@@ -88,16 +88,16 @@ void EffectRegistryTest::describesEveryParameter() {
   const nlohmann::json json = toJson(std::span<const Effect>(effect, 1)).at(0);
   QCOMPARE(json.at("parameters").size(), effect->parameters.size());
   for (std::size_t i = 0; i < effect->parameters.size(); ++i) {
-    const EffectParameter& parameter = effect->parameters[i];
-    QVERIFY2(shapes.contains(parameter.shape), parameter.name.c_str());
-    QVERIFY2(parameter.help.ends_with("."), parameter.name.c_str());
-    QVERIFY2(parameter.unit != "m" || parameter.name.ends_with("_m"), parameter.name.c_str());
-    QVERIFY2(parameter.unit != "m^3" || parameter.name.ends_with("_m3"), parameter.name.c_str());
-    QVERIFY2(parameter.unit != "rad" || parameter.name.ends_with("_rad"), parameter.name.c_str());
-    QVERIFY2(parameter.unit != "s" || parameter.name.ends_with("_s"), parameter.name.c_str());
-    if (parameter.plausible_min != 0.0 || parameter.plausible_max != 0.0) {
+    const Setting& parameter = effect->parameters[i];
+    QVERIFY2(shapes.contains(json.at("parameters")[i].at("shape").get<std::string>()), parameter.key.c_str());
+    QVERIFY2(parameter.help.ends_with("."), parameter.key.c_str());
+    QVERIFY2(parameter.unit != "m" || parameter.key.ends_with("_m"), parameter.key.c_str());
+    QVERIFY2(parameter.unit != "m^3" || parameter.key.ends_with("_m3"), parameter.key.c_str());
+    QVERIFY2(parameter.unit != "rad" || parameter.key.ends_with("_rad"), parameter.key.c_str());
+    QVERIFY2(parameter.unit != "s" || parameter.key.ends_with("_s"), parameter.key.c_str());
+    if (parameter.hasPlausibleRange()) {
       QVERIFY2(parameter.plausible_min >= parameter.min && parameter.plausible_max <= parameter.max,
-               parameter.name.c_str());
+               parameter.key.c_str());
     }
     for (const char* key :
          {"name", "unit", "shape", "default", "min", "max", "plausible_min", "plausible_max", "help", "choices"}) {
@@ -165,32 +165,32 @@ void EffectRegistryTest::makesAFieldWithoutSourcesInTheRoom() {
 
 void EffectRegistryTest::refusesEveryParameterOfAnotherShape() {
   QFETCH(const Effect*, effect);
-  for (const EffectParameter& parameter : effect->parameters) {
-    const nlohmann::json wrong = parameter.shape == "text" ? nlohmann::json(3) : nlohmann::json("long");
+  for (const Setting& parameter : effect->parameters) {
+    const nlohmann::json wrong = parameter.type == SettingType::kChoice ? nlohmann::json(3) : nlohmann::json("long");
     for (const nlohmann::json& value : {wrong, nlohmann::json::array({1.0, 2.0}), nlohmann::json(true)}) {
-      if (parameter.shape == "list" && value.is_array()) continue;
-      const auto resolved = resolveEffectParameters(*effect, {{parameter.name, value}});
-      QVERIFY2(!resolved.has_value(), parameter.name.c_str());
+      if (parameter.type == SettingType::kNumbers && value.is_array()) continue;
+      const auto resolved = resolveEffectParameters(*effect, {{parameter.key, value}});
+      QVERIFY2(!resolved.has_value(), parameter.key.c_str());
       QCOMPARE(resolved.error().code, ErrorCode::kBadInput);
-      FT_VERIFY_MATCH(holdsAll(resolved.error().message, {effect->id.c_str(), parameter.name.c_str(), "must be"}));
+      FT_VERIFY_MATCH(holdsAll(resolved.error().message, {effect->id.c_str(), parameter.key.c_str(), "must be"}));
     }
   }
 }
 
 void EffectRegistryTest::refusesEveryParameterOutOfRange() {
   QFETCH(const Effect*, effect);
-  for (const EffectParameter& parameter : effect->parameters) {
+  for (const Setting& parameter : effect->parameters) {
     std::vector<nlohmann::json> wrong;
-    if (parameter.shape == "text") wrong.emplace_back("wood");
-    if (parameter.shape == "scalar") wrong = {parameter.min - 1.0, parameter.max * 2.0 + 1.0};
-    if (parameter.shape == "vector3") wrong.push_back({0.0, 0.0, std::numeric_limits<double>::infinity()});
-    if (parameter.shape == "list")
+    if (parameter.type == SettingType::kChoice) wrong.emplace_back("wood");
+    if (parameter.type == SettingType::kNumber) wrong = {parameter.min - 1.0, parameter.max * 2.0 + 1.0};
+    if (parameter.type == SettingType::kVector3) wrong.push_back({0.0, 0.0, std::numeric_limits<double>::infinity()});
+    if (parameter.type == SettingType::kNumbers)
       wrong = {nlohmann::json::array(), nlohmann::json::array({2.0 * parameter.max + 1.0})};
-    if (parameter.shape == "matrix3") wrong.push_back({1, 0.5, 0, 0, 1, 0, 0, 0, 1});
+    if (parameter.type == SettingType::kMatrix3) wrong.push_back({1, 0.5, 0, 0, 1, 0, 0, 0, 1});
     for (const nlohmann::json& value : wrong) {
-      const auto resolved = resolveEffectParameters(*effect, {{parameter.name, value}});
-      QVERIFY2(!resolved.has_value(), parameter.name.c_str());
-      FT_VERIFY_MATCH(holdsAll(resolved.error().message, {effect->id.c_str(), parameter.name.c_str(), "must be"}));
+      const auto resolved = resolveEffectParameters(*effect, {{parameter.key, value}});
+      QVERIFY2(!resolved.has_value(), parameter.key.c_str());
+      FT_VERIFY_MATCH(holdsAll(resolved.error().message, {effect->id.c_str(), parameter.key.c_str(), "must be"}));
     }
   }
 }
@@ -214,7 +214,7 @@ void EffectRegistryTest::listsHowEachIsFound() {
   }
   const std::string text = effectListingText();
   QVERIFY(text.find(effect->id + "  " + effect->label) != std::string::npos);
-  for (const EffectParameter& parameter : effect->parameters) QVERIFY(text.find(parameter.help) != std::string::npos);
+  for (const Setting& parameter : effect->parameters) QVERIFY(text.find(parameter.help) != std::string::npos);
 }
 
 void EffectRegistryTest::namesWhatIsKnown() {
