@@ -75,15 +75,13 @@ struct SimulateOptions {
 };
 
 Outcome runSimulate(const SimulateOptions& options, const CommonOptions& common) {
-  const auto plan = readPlanArgument(options.plan);
-  if (!plan) return tl::unexpected(plan.error());
-  const auto scene = readSceneArgument(options.scene);
-  if (!scene) return tl::unexpected(scene.error());
+  FT_TRY(const auto plan, readPlanArgument(options.plan));
+  FT_TRY(const auto scene, readSceneArgument(options.scene));
   simulation::SimulationOptions simulation_options;
   simulation_options.seed = options.seed;
   simulation_options.samples_per_node = options.samples_per_node;
   const auto simulation =
-      simulation::simulate(*scene, places(*plan), simulation_options, runControl(common, "simulating"));
+      simulation::simulate(scene, places(plan), simulation_options, runControl(common, "simulating"));
   if (!simulation) return notPossible(simulation.error());
   return writeTables(options.out, &simulation->table, &simulation->samples, {});
 }
@@ -156,9 +154,8 @@ Read<std::pair<const importers::Importer*, Settings>> readFormat(const std::stri
 }
 
 Outcome runImport(const ImportOptions& options, const CommonOptions&) {
-  const auto format = readFormat(options.format);
-  if (!format) return tl::unexpected(format.error());
-  const auto& [importer, settings] = *format;
+  FT_TRY(const auto format, readFormat(options.format));
+  const auto& [importer, settings] = format;
   if (importer->needs_truth && options.truth.empty()) {
     return wrongUsage("format " + importer->id + " holds no true positions; name the file that does with --truth");
   }

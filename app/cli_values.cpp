@@ -16,8 +16,7 @@ namespace {
 template <class Row>
 Result<MethodText> readMethod(const MethodText& text, Result<const Row*> row) {
   if (!row) return tl::unexpected(row.error());
-  auto settings = resolveSettings(text.id, (*row)->settings, text.given);
-  if (!settings) return tl::unexpected(settings.error());
+  FT_TRY_VOID(resolveSettings(text.id, (*row)->settings, text.given));
   return text;
 }
 
@@ -146,8 +145,7 @@ Read<evaluation::ComparisonOptions> readComparisonArguments(const ComparisonArgu
   }
   if (arguments.methods == "all") return options;
   for (const std::string& text : splitMethods(arguments.methods)) {
-    const auto added = addMethod(text, options);
-    if (!added) return tl::unexpected(added.error());
+    FT_TRY_VOID(addMethod(text, options));
   }
   // An empty list means all methods to compareMethods; whoever names only the other kind wants none of this one.
   if (options.position_methods.empty()) options.position_methods.push_back({"none", {}});

@@ -18,17 +18,14 @@ namespace {
 
 Result<Settings> readSettings(const std::string& owner, const std::vector<Setting>& declared, const std::string& text) {
   if (text.empty()) return resolveSettings(owner, declared, {});
-  auto parsed = parseMethodText(owner + ":" + text);
-  if (!parsed) return tl::unexpected(parsed.error());
-  return resolveSettings(owner, declared, parsed->given);
+  FT_TRY(auto parsed, parseMethodText(owner + ":" + text));
+  return resolveSettings(owner, declared, parsed.given);
 }
 
 Result<std::unique_ptr<TrackerDevice>> makeSimulated(const std::string& address, const simulation::Scene& scene) {
-  auto settings = readSettings("simulated", simulatedSettings(), address);
-  if (!settings) return tl::unexpected(settings.error());
-  auto setup = simulatedSetup(*settings);
-  if (!setup) return tl::unexpected(setup.error());
-  return SimulatedDevice::make(scene, *setup);
+  FT_TRY(auto settings, readSettings("simulated", simulatedSettings(), address));
+  FT_TRY(auto setup, simulatedSetup(settings));
+  return SimulatedDevice::make(scene, setup);
 }
 
 int baudOf(const std::string& line) {
@@ -41,15 +38,15 @@ int baudOf(const std::string& line) {
 Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const simulation::Scene&) {
   const std::size_t comma = std::min(address.find(','), address.size());
   const std::string line = address.substr(0, comma);
-  auto settings = readSettings("fastrak", fastrakSettings(), address.substr(std::min(comma + 1, address.size())));
-  if (!settings) return tl::unexpected(settings.error());
+  FT_TRY(auto settings,
+         readSettings("fastrak", fastrakSettings(), address.substr(std::min(comma + 1, address.size()))));
   // Made once now, so that an address that cannot be read is refused here and not when the device is started.
-  if (auto readable = makeTransport(line); !readable) return tl::unexpected(readable.error());
+  FT_TRY_VOID(makeTransport(line));
   FastrakSetup setup;
   setup.where = line;
   setup.device_text = "fastrak:" + line.substr(0, line.rfind('@'));
   setup.baud = baudOf(line);
-  applyFastrakSettings(*settings, setup);
+  applyFastrakSettings(settings, setup);
   return std::make_unique<FastrakDevice>(std::move(setup), [line] { return makeTransport(line); });
 }
 
@@ -93,14 +90,13 @@ Result<DeviceAddress> parseDevice(const std::string& text) {
 }
 
 Result<std::unique_ptr<TrackerDevice>> makeDevice(const std::string& text, const simulation::Scene& scene) {
-  auto device = parseDevice(text);
-  if (!device) return tl::unexpected(device.error());
+  FT_TRY(auto device, parseDevice(text));
   std::string known;
   for (const auto& kind : deviceKinds()) {
-    if (kind.id == device->kind) return kind.make(device->address, scene);
+    if (kind.id == device.kind) return kind.make(device.address, scene);
     known += (known.empty() ? "" : ", ") + kind.id;
   }
-  return fail(ErrorCode::kBadInput, "\"" + device->kind + "\" is not a known device; known are " + known);
+  return fail(ErrorCode::kBadInput, "\"" + device.kind + "\" is not a known device; known are " + known);
 }
 
 std::vector<SerialLine> serialLines() {

@@ -61,8 +61,7 @@ Result<SimulatedSetup> simulatedSetup(const Settings& settings) {
 
 Result<std::unique_ptr<SimulatedDevice>> SimulatedDevice::make(const simulation::Scene& scene,
                                                                const SimulatedSetup& setup) {
-  if (auto usable = simulation::TrackerSimulator::make(scene, setup.seed); !usable)
-    return tl::unexpected(usable.error());
+  FT_TRY_VOID(simulation::TrackerSimulator::make(scene, setup.seed));
   return std::unique_ptr<SimulatedDevice>(
       new SimulatedDevice(scene, setup, driverSetup(setup.speed, scene.tracker.rate_hz)));
 }
@@ -77,9 +76,8 @@ Result<std::unique_ptr<Transport>> SimulatedDevice::plugIn() {
   delete emulator_;
   emulator_ = nullptr;
   jig_ = nullptr;
-  auto simulator = simulation::TrackerSimulator::make(scene_, simulated_.seed);
-  if (!simulator) return tl::unexpected(simulator.error());
-  auto jig = std::make_unique<SimulatedJig>(std::move(*simulator), simulated_.habits, simulated_.seed);
+  FT_TRY(auto simulator, simulation::TrackerSimulator::make(scene_, simulated_.seed));
+  auto jig = std::make_unique<SimulatedJig>(std::move(simulator), simulated_.habits, simulated_.seed);
   jig_ = jig.get();
   auto [host_end, device_end] = LoopbackTransport::pair();
   FastrakEmulatorOptions options;
@@ -88,7 +86,7 @@ Result<std::unique_ptr<Transport>> SimulatedDevice::plugIn() {
   options.identity = "simulated: " + scene_.name;
   auto emulator = makeFastrakEmulator(std::move(jig), std::move(device_end), options, simulated_.speed);
   emulator->setParent(this);
-  if (auto started = emulator->start(); !started) return tl::unexpected(started.error());
+  FT_TRY_VOID(emulator->start());
   emulator_ = emulator.release();
   if (asked_) jig_->guideTo(*asked_, 0.0);
   return std::move(host_end);

@@ -71,9 +71,7 @@ Result<EmulatorFaults> parseFaults(const std::string& list) {
   EmulatorFaults faults;
   for (std::size_t start = 0; start < list.size();) {
     const std::size_t comma = std::min(list.find(',', start), list.size());
-    if (auto applied = applyFault(list.substr(start, comma - start), faults); !applied) {
-      return tl::unexpected(applied.error());
-    }
+    FT_TRY_VOID(applyFault(list.substr(start, comma - start), faults));
     start = comma + 1;
   }
   return faults;

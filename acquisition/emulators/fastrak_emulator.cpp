@@ -29,9 +29,8 @@ Result<std::unique_ptr<PoseSource>> makeSource(const Emulation& emulation) {
     return std::make_unique<ReplaySource>(*emulation.replay);
   }
   constexpr double kStand_s = 3.0;
-  auto simulator = simulation::TrackerSimulator::make(emulation.scene, emulation.seed);
-  if (!simulator) return tl::unexpected(simulator.error());
-  auto jig = std::make_unique<SimulatedJig>(std::move(*simulator), OperatorHabits{}, emulation.seed);
+  FT_TRY(auto simulator, simulation::TrackerSimulator::make(emulation.scene, emulation.seed));
+  auto jig = std::make_unique<SimulatedJig>(std::move(simulator), OperatorHabits{}, emulation.seed);
   jig->wander(walk(emulation.scene), kStand_s);
   return jig;
 }
@@ -42,8 +41,7 @@ Result<std::unique_ptr<EmulatorRunner>> makeFastrakEmulator(const Emulation& emu
   if (emulation.pty_link.empty() == !emulation.tcp_port.has_value()) {
     return fail(ErrorCode::kBadInput, "An emulator needs one line: --pty LINK or --listen PORT");
   }
-  auto source = makeSource(emulation);
-  if (!source) return tl::unexpected(source.error());
+  FT_TRY(auto source, makeSource(emulation));
   FastrakEmulatorOptions options;
   options.faults = emulation.faults;
   options.seed = emulation.seed;
@@ -53,7 +51,7 @@ Result<std::unique_ptr<EmulatorRunner>> makeFastrakEmulator(const Emulation& emu
   } else {
     endpoint = std::make_unique<PtyEndpoint>(QString::fromStdString(emulation.pty_link));
   }
-  return std::make_unique<EmulatorRunner>(std::make_unique<FastrakEmulatorCore>(std::move(*source), options),
+  return std::make_unique<EmulatorRunner>(std::make_unique<FastrakEmulatorCore>(std::move(source), options),
                                           std::move(endpoint), emulation.faults, emulation.speed);
 }
 

@@ -115,7 +115,7 @@ Plan planFrom(const JsonReader& file) {
 
 Result<Plan> planFromJson(const nlohmann::json& object, const std::string& name) {
   return readJson<Plan>(object, name, planFrom).and_then([&](const Plan& plan) -> Result<Plan> {
-    if (auto size = checkPlanSize(plan, name); !size) return tl::unexpected(size.error());
+    FT_TRY_VOID(checkPlanSize(plan, name));
     return plan;
   });
 }

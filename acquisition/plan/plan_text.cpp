@@ -133,7 +133,7 @@ Result<Plan> planFromText(const std::string& text) {
   Plan plan;
   std::vector<Part> parts = Part{text, text}.split(':');
   parts.erase(parts.begin());
-  if (auto grid = readGrid(parts[0], plan); !grid) return tl::unexpected(grid.error());
+  FT_TRY_VOID(readGrid(parts[0], plan));
   std::set<std::string_view> given;
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::size_t equals = parts[i].text.find('=');
@@ -144,9 +144,9 @@ Result<Plan> planFromText(const std::string& text) {
     }
     if (!given.insert(key).second) return parts[i].expected(std::string(key) + "= only once");
     const Part value{parts[i].text.substr(equals + 1), text};
-    if (auto read = option->read(value, plan); !read) return tl::unexpected(read.error());
+    FT_TRY_VOID(option->read(value, plan));
   }
-  if (auto size = checkPlanSize(plan, text); !size) return tl::unexpected(size.error());
+  FT_TRY_VOID(checkPlanSize(plan, text));
   return plan;
 }
 
@@ -174,11 +174,9 @@ Result<Plan> readPlan(const std::string& text_or_path) {
   if (!text_or_path.ends_with(".json")) {
     return fail(ErrorCode::kBadInput, text_or_path + ": expected grid:NXxNYxNZ@PX... or the path of a *.plan.json");
   }
-  const Result<std::string> content = readFile(text_or_path);
-  if (!content) return tl::unexpected(content.error());
-  const Result<nlohmann::json> object = parseJson(*content, text_or_path);
-  if (!object) return tl::unexpected(object.error());
-  return planFromJson(*object, text_or_path);
+  FT_TRY(const std::string content, readFile(text_or_path));
+  FT_TRY(const nlohmann::json object, parseJson(content, text_or_path));
+  return planFromJson(object, text_or_path);
 }
 
 }  // namespace fieldtrue::acquisition

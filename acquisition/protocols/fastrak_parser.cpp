@@ -15,9 +15,8 @@ Result<FastrakParser> FastrakParser::make(const FastrakStreamSettings& settings)
   bool any = false;
   for (std::size_t i = 0; i < settings.items.size(); ++i) {
     if (settings.items[i].empty()) continue;
-    auto layout = fastrakLayout(settings.items[i], settings.format);
-    if (!layout) return tl::unexpected(layout.error());
-    parser.layouts_[i] = std::move(*layout);
+    FT_TRY(auto layout, fastrakLayout(settings.items[i], settings.format));
+    parser.layouts_[i] = std::move(layout);
     parser.active_[i] = any = true;
   }
   if (!any) return fail(ErrorCode::kBadInput, "No Fastrak station is switched on; at least one of 1 to 4 is needed");

@@ -169,8 +169,7 @@ Result<std::unique_ptr<SessionFile>> SessionFile::open(const QString& path) {
   if (!info.isFile()) return fail(ErrorCode::kIo, path.toStdString() + ": is not a file");
   std::unique_ptr<SessionFile> file(new SessionFile(path));
   const bool has_wal = QFileInfo::exists(walOf(path));
-  Result<void> opened = canWriteInPlace(path) ? file->openWhereItIs() : file->openCopy();
-  if (!opened) return tl::unexpected(opened.error());
+  FT_TRY_VOID(canWriteInPlace(path) ? file->openWhereItIs() : file->openCopy());
   if (file->lacks_wal_ && !has_wal) {
     file->remarks_.push_back(
         path.toStdString() + ": this file was copied while its session was open, or after a crash, without the file " +
@@ -188,9 +187,8 @@ Result<void> SessionFile::openWhereItIs() {
   if (opened) opened = hold();
   if (!opened) return opened;
   held_ = true;
-  const Result<bool> was_open = saysItIsOpen();
-  if (!was_open) return tl::unexpected(was_open.error());
-  lacks_wal_ = *was_open;
+  FT_TRY(const bool was_open, saysItIsOpen());
+  lacks_wal_ = was_open;
   opened = addWhatIsNew();
   if (opened) opened = sayWhetherOpen(true);
   return opened;
@@ -212,7 +210,7 @@ Result<void> SessionFile::openCopy() {
   remarks_.push_back(path_.toStdString() +
                      ": the file or its folder cannot be written to, so a private copy was opened and nothing will be "
                      "stored; to go on recording, copy it to a folder that can be written to");
-  if (auto closed = run(QStringLiteral("PRAGMA query_only=ON")); !closed) return tl::unexpected(closed.error());
+  FT_TRY_VOID(run(QStringLiteral("PRAGMA query_only=ON")));
   return {};
 }
 
@@ -228,15 +226,13 @@ Result<void> SessionFile::connect() {
 }
 
 Result<void> SessionFile::checkIdentity() const {
-  const Result<int> id = readPragma(*this, "application_id");
-  if (!id) return tl::unexpected(id.error());
-  if (*id != kApplicationId) return fail(ErrorCode::kBadInput, path_.toStdString() + ": is not a Fieldtrue session");
-  const Result<int> version = readPragma(*this, "user_version");
-  if (!version) return tl::unexpected(version.error());
-  if (*version > kFormatVersion) {
+  FT_TRY(const int id, readPragma(*this, "application_id"));
+  if (id != kApplicationId) return fail(ErrorCode::kBadInput, path_.toStdString() + ": is not a Fieldtrue session");
+  FT_TRY(const int version, readPragma(*this, "user_version"));
+  if (version > kFormatVersion) {
     return fail(ErrorCode::kNewerVersion,
                 path_.toStdString() + ": was written by a newer version of Fieldtrue (session format " +
-                    std::to_string(*version) + ", this version reads up to " + std::to_string(kFormatVersion) + ")");
+                    std::to_string(version) + ", this version reads up to " + std::to_string(kFormatVersion) + ")");
   }
   QString verdict;
   const auto checked = read(QStringLiteral("PRAGMA quick_check(1)"), {},
@@ -251,7 +247,7 @@ Result<void> SessionFile::checkIdentity() const {
 Result<void> SessionFile::hold() {
   for (const char* statement : {"PRAGMA locking_mode=EXCLUSIVE", "PRAGMA journal_mode=WAL", "PRAGMA synchronous=FULL",
                                 "PRAGMA foreign_keys=ON", "BEGIN IMMEDIATE", "COMMIT"}) {
-    if (auto done = run(QLatin1String(statement)); !done) return tl::unexpected(done.error());
+    FT_TRY_VOID(run(QLatin1String(statement)));
   }
   return {};
 }
@@ -259,11 +255,11 @@ Result<void> SessionFile::hold() {
 Result<void> SessionFile::createTables() {
   return transaction([this]() -> Result<void> {
     for (const char* statement : kTables) {
-      if (auto done = run(QLatin1String(statement)); !done) return tl::unexpected(done.error());
+      FT_TRY_VOID(run(QLatin1String(statement)));
     }
     for (const QString& pragma : {QStringLiteral("PRAGMA application_id=%1").arg(kApplicationId),
                                   QStringLiteral("PRAGMA user_version=%1").arg(kFormatVersion)}) {
-      if (auto done = run(pragma); !done) return tl::unexpected(done.error());
+      FT_TRY_VOID(run(pragma));
     }
     return {};
   });
@@ -272,7 +268,7 @@ Result<void> SessionFile::createTables() {
 Result<void> SessionFile::addWhatIsNew() {
   return transaction([this]() -> Result<void> {
     for (const char* statement : kLaterTables) {
-      if (auto done = run(QLatin1String(statement)); !done) return tl::unexpected(done.error());
+      FT_TRY_VOID(run(QLatin1String(statement)));
     }
     return {};
   });
@@ -287,14 +283,11 @@ Result<bool> SessionFile::saysItIsOpen() const {
 }
 
 Result<void> SessionFile::sayWhetherOpen(bool open) const {
-  const auto said = run(QStringLiteral("INSERT INTO meta(key, value) VALUES(?, ?)"
-                                       " ON CONFLICT(key) DO UPDATE SET value = excluded.value"),
-                        {QLatin1String(kOpenKey), open ? QStringLiteral("yes") : QStringLiteral("no")});
-  if (!said) return tl::unexpected(said.error());
+  FT_TRY_VOID(run(QStringLiteral("INSERT INTO meta(key, value) VALUES(?, ?)"
+                                 " ON CONFLICT(key) DO UPDATE SET value = excluded.value"),
+                  {QLatin1String(kOpenKey), open ? QStringLiteral("yes") : QStringLiteral("no")}));
   // Into the file itself: only there does a copy without its journal find it. What a crash left is made whole with it.
-  if (auto whole = run(QStringLiteral("PRAGMA wal_checkpoint(TRUNCATE)")); !whole) {
-    return tl::unexpected(whole.error());
-  }
+  FT_TRY_VOID(run(QStringLiteral("PRAGMA wal_checkpoint(TRUNCATE)")));
   return {};
 }
 
@@ -320,15 +313,14 @@ Result<void> SessionFile::runForAll(const QString& sql, const std::vector<QVaria
 
 Result<void> SessionFile::read(const QString& sql, const QVariantList& values,
                                const std::function<void(const QSqlQuery&)>& row) const {
-  auto query = run(sql, values);
-  if (!query) return tl::unexpected(query.error());
-  while (query->next()) row(*query);
-  if (query->lastError().isValid()) return tl::unexpected(explain(query->lastError()));
+  FT_TRY(auto query, run(sql, values));
+  while (query.next()) row(query);
+  if (query.lastError().isValid()) return tl::unexpected(explain(query.lastError()));
   return {};
 }
 
 Result<void> SessionFile::transaction(const std::function<Result<void>()>& body) {
-  if (auto begun = run(QStringLiteral("BEGIN IMMEDIATE")); !begun) return tl::unexpected(begun.error());
+  FT_TRY_VOID(run(QStringLiteral("BEGIN IMMEDIATE")));
   Result<void> done = body();
   if (done) {
     if (auto committed = run(QStringLiteral("COMMIT")); !committed) done = tl::unexpected(committed.error());

@@ -74,10 +74,9 @@ struct SessionStore::Impl {
   }
 
   Result<QString> meta(const QString& key) const {
-    const auto found = value(QStringLiteral("SELECT value FROM meta WHERE key = ?"), {key});
-    if (!found) return tl::unexpected(found.error());
-    if (!*found) return damaged("has no " + key.toStdString());
-    return (*found)->toString();
+    FT_TRY(const auto found, value(QStringLiteral("SELECT value FROM meta WHERE key = ?"), {key}));
+    if (!found) return damaged("has no " + key.toStdString());
+    return found->toString();
   }
 
   tl::unexpected<Error> damaged(const std::string& what) const {
@@ -121,16 +120,12 @@ struct SessionStore::Impl {
       if (!*part) return tl::unexpected(part->error());
     }
     const std::string name = file->path().toStdString();
-    const auto plan_json = parseJson(plan_text->toStdString(), name + ": plan");
-    if (!plan_json) return tl::unexpected(plan_json.error());
-    auto read_plan = planFromJson(*plan_json, name + ": plan");
-    if (!read_plan) return tl::unexpected(read_plan.error());
-    plan = *std::move(read_plan);
-    const auto metadata_json = parseJson(metadata_text->toStdString(), name + ": metadata");
-    if (!metadata_json) return tl::unexpected(metadata_json.error());
-    auto read_metadata = readJson<TableMetadata>(*metadata_json, name + ": metadata", metadataFrom);
-    if (!read_metadata) return tl::unexpected(read_metadata.error());
-    metadata = *std::move(read_metadata);
+    FT_TRY(const auto plan_json, parseJson(plan_text->toStdString(), name + ": plan"));
+    FT_TRY(auto read_plan, planFromJson(plan_json, name + ": plan"));
+    plan = std::move(read_plan);
+    FT_TRY(const auto metadata_json, parseJson(metadata_text->toStdString(), name + ": metadata"));
+    FT_TRY(auto read_metadata, readJson<TableMetadata>(metadata_json, name + ": metadata", metadataFrom));
+    metadata = std::move(read_metadata);
     created = QDateTime::fromString(*created_text, Qt::ISODateWithMs);
     return readPlaces();
   }
@@ -145,13 +140,12 @@ struct SessionStore::Impl {
 
   /// Adds an action that stands; what had been taken back can no longer be brought back.
   Result<qlonglong> addAction(std::size_t place, const char* kind, const std::string& reason) const {
-    auto overtaken = file->run(QStringLiteral("UPDATE actions SET undone = 2 WHERE undone = 1"));
-    if (!overtaken) return tl::unexpected(overtaken.error());
-    auto added = file->run(QStringLiteral("INSERT INTO actions(place, kind, reason, time_utc) VALUES(?, ?, ?, ?)"),
-                           {static_cast<qlonglong>(place), QLatin1String(kind), text(reason), now()});
-    if (!added) return tl::unexpected(added.error());
+    FT_TRY_VOID(file->run(QStringLiteral("UPDATE actions SET undone = 2 WHERE undone = 1")));
+    FT_TRY(auto added,
+           file->run(QStringLiteral("INSERT INTO actions(place, kind, reason, time_utc) VALUES(?, ?, ?, ?)"),
+                     {static_cast<qlonglong>(place), QLatin1String(kind), text(reason), now()}));
     file->goOnAsItIs();
-    return added->lastInsertId().toLongLong();
+    return added.lastInsertId().toLongLong();
   }
 
   Result<void> addSamples(qlonglong action, const std::vector<Sample>& samples,
@@ -204,9 +198,8 @@ struct SessionStore::Impl {
   }
 
   Result<bool> any(const QString& which) const {
-    const auto found = value(QStringLiteral("SELECT 1 FROM actions WHERE %1 LIMIT 1").arg(which));
-    if (!found) return tl::unexpected(found.error());
-    return found->has_value();
+    FT_TRY(const auto found, value(QStringLiteral("SELECT 1 FROM actions WHERE %1 LIMIT 1").arg(which)));
+    return found.has_value();
   }
 
   /// Live takes of every place, or of one.
@@ -325,7 +318,7 @@ Result<SessionStore> SessionStore::open(const QString& path) {
   if (!file) return tl::unexpected(file.error());
   auto impl = std::make_unique<Impl>();
   impl->file = *std::move(file);
-  if (auto read = impl->readHead(); !read) return tl::unexpected(read.error());
+  FT_TRY_VOID(impl->readHead());
   return SessionStore(std::move(impl));
 }
 
@@ -352,8 +345,7 @@ Result<std::vector<PlaceState>> SessionStore::states() const {
 
 Result<PlaceState> SessionStore::state(std::size_t place) const {
   std::vector<PlaceState> result(place + 1, PlaceState::kPlanned);
-  const auto read = impl_->readStates(kOnePlace, {static_cast<qlonglong>(place)}, result);
-  if (!read) return tl::unexpected(read.error());
+  FT_TRY_VOID(impl_->readStates(kOnePlace, {static_cast<qlonglong>(place)}, result));
   return result.back();
 }
 
@@ -361,23 +353,20 @@ Result<void> SessionStore::storeTake(std::size_t place, const std::vector<Sample
                                      const NodeStatistics& statistics, const std::string& suspicious) {
   FT_CHECK(place < places().size());
   return impl_->store([&]() -> Result<void> {
-    const auto action = impl_->addAction(place, "take", suspicious);
-    if (!action) return tl::unexpected(action.error());
+    FT_TRY(const auto action, impl_->addAction(place, "take", suspicious));
     QVariantList values = takeValues(samples, statistics);
-    values.prepend(*action);
-    auto take = impl_->file->run(
+    values.prepend(action);
+    FT_TRY_VOID(impl_->file->run(
         QStringLiteral("INSERT INTO takes(action, %1) VALUES(%2)").arg(kTakeColumns, placeholders(values.size())),
-        values);
-    if (!take) return tl::unexpected(take.error());
-    return impl_->addSamples(*action, samples, statistics);
+        values));
+    return impl_->addSamples(action, samples, statistics);
   });
 }
 
 Result<void> SessionStore::skip(std::size_t place, const std::string& reason) {
   FT_CHECK(place < places().size());
   return impl_->store([&]() -> Result<void> {
-    const auto action = impl_->addAction(place, "skip", reason);
-    if (!action) return tl::unexpected(action.error());
+    FT_TRY_VOID(impl_->addAction(place, "skip", reason));
     return {};
   });
 }
@@ -437,44 +426,38 @@ Result<void> SessionStore::setState(const std::string& key, const std::string& v
 }
 
 Result<std::string> SessionStore::state(const std::string& key) const {
-  const auto found = impl_->value(QStringLiteral("SELECT value FROM state WHERE key = ?"), {text(key)});
-  if (!found) return tl::unexpected(found.error());
-  return *found ? (*found)->toString().toStdString() : std::string();
+  FT_TRY(const auto found, impl_->value(QStringLiteral("SELECT value FROM state WHERE key = ?"), {text(key)}));
+  return found ? found->toString().toStdString() : std::string();
 }
 
 Result<CalibrationTable> SessionStore::nodeTable() const {
-  auto nodes = impl_->nodes();
-  if (!nodes) return tl::unexpected(nodes.error());
-  return CalibrationTable{metadata(), *std::move(nodes)};
+  FT_TRY(auto nodes, impl_->nodes());
+  return CalibrationTable{metadata(), std::move(nodes)};
 }
 
 Result<SampleTable> SessionStore::sampleTable() const {
-  auto rows = impl_->sampleRows();
-  if (!rows) return tl::unexpected(rows.error());
-  if (auto loose = impl_->appendLoose(*rows); !loose) return tl::unexpected(loose.error());
-  return SampleTable{metadata(), *std::move(rows)};
+  FT_TRY(auto rows, impl_->sampleRows());
+  FT_TRY_VOID(impl_->appendLoose(rows));
+  return SampleTable{metadata(), std::move(rows)};
 }
 
 Result<std::optional<Node>> SessionStore::node(std::size_t place) const {
-  auto found = impl_->nodes(place);
-  if (!found) return tl::unexpected(found.error());
-  return found->empty() ? std::optional<Node>() : std::optional(found->front());
+  FT_TRY(auto found, impl_->nodes(place));
+  return found.empty() ? std::optional<Node>() : std::optional(found.front());
 }
 
 Result<std::vector<Sample>> SessionStore::samples(std::size_t place) const {
-  auto rows = impl_->sampleRows(place);
-  if (!rows) return tl::unexpected(rows.error());
+  FT_TRY(auto rows, impl_->sampleRows(place));
   std::vector<Sample> result;
-  for (SampleRow& row : *rows) result.push_back(std::move(row.sample));
+  for (SampleRow& row : rows) result.push_back(std::move(row.sample));
   return result;
 }
 
 Result<std::optional<double>> SessionStore::newestSample_s() const {
   std::optional<double> newest_s;
   for (const char* sql : {"SELECT MAX(t_end_s) FROM takes", "SELECT t_s FROM loose_samples ORDER BY id DESC LIMIT 1"}) {
-    const auto found = impl_->value(QLatin1String(sql));
-    if (!found) return tl::unexpected(found.error());
-    if (*found) newest_s = std::max(newest_s.value_or((*found)->toDouble()), (*found)->toDouble());
+    FT_TRY(const auto found, impl_->value(QLatin1String(sql)));
+    if (found) newest_s = std::max(newest_s.value_or(found->toDouble()), found->toDouble());
   }
   for (const LooseSample& reading : impl_->loose) {
     newest_s = std::max(newest_s.value_or(reading.sample.time_s), reading.sample.time_s);
@@ -483,9 +466,8 @@ Result<std::optional<double>> SessionStore::newestSample_s() const {
 }
 
 Result<void> SessionStore::limitSize(std::int64_t bytes) {
-  const auto page_size = impl_->value(QStringLiteral("PRAGMA page_size"));
-  if (!page_size) return tl::unexpected(page_size.error());
-  const qint64 page_bytes = *page_size ? (*page_size)->toLongLong() : 4096;
+  FT_TRY(const auto page_size, impl_->value(QStringLiteral("PRAGMA page_size")));
+  const qint64 page_bytes = page_size ? page_size->toLongLong() : 4096;
   return withoutRows(
       impl_->file->run(QStringLiteral("PRAGMA max_page_count=%1").arg(std::max<qint64>(1, bytes / page_bytes))));
 }

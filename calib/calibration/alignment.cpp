@@ -103,7 +103,7 @@ AlignMode defaultAlignMode(const TableMetadata& metadata) {
 }
 
 Result<Alignment> fitAlignment(std::span<const Node> nodes) {
-  if (auto checked = checkRows(nodes); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkRows(nodes));
   std::vector<Eigen::Vector3d> p_tracked_m;
   std::vector<Eigen::Vector3d> p_true_m;
   for (const Node& node : nodes) {

@@ -57,44 +57,33 @@ FitReport reportOf(std::span<const Node> nodes, const Corrector& corrector) {
 }  // namespace
 
 Result<CorrectorChoice> parseCorrectorChoice(const std::string& position_text, const std::string& orientation_text) {
-  const auto position = parseMethodText(position_text);
-  if (!position) return tl::unexpected(position.error());
-  const auto orientation = parseMethodText(orientation_text);
-  if (!orientation) return tl::unexpected(orientation.error());
-  auto position_settings = resolveMethod(correctors::findPositionMethod(position->id), *position);
-  if (!position_settings) return tl::unexpected(position_settings.error());
-  auto orientation_settings = resolveMethod(correctors::findOrientationMethod(orientation->id), *orientation);
-  if (!orientation_settings) return tl::unexpected(orientation_settings.error());
-  return CorrectorChoice{position->id, *std::move(position_settings), orientation->id,
-                         *std::move(orientation_settings)};
+  FT_TRY(const auto position, parseMethodText(position_text));
+  FT_TRY(const auto orientation, parseMethodText(orientation_text));
+  FT_TRY(auto position_settings, resolveMethod(correctors::findPositionMethod(position.id), position));
+  FT_TRY(auto orientation_settings, resolveMethod(correctors::findOrientationMethod(orientation.id), orientation));
+  return CorrectorChoice{position.id, std::move(position_settings), orientation.id, std::move(orientation_settings)};
 }
 
 Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadata& metadata,
                                  const CorrectorChoice& choice, AlignMode align, const RunControl& control) {
-  const auto position_method = correctors::findPositionMethod(choice.position_id);
-  if (!position_method) return tl::unexpected(position_method.error());
-  const auto orientation_method = correctors::findOrientationMethod(choice.orientation_id);
-  if (!orientation_method) return tl::unexpected(orientation_method.error());
+  FT_TRY(const auto position_method, correctors::findPositionMethod(choice.position_id));
+  FT_TRY(const auto orientation_method, correctors::findOrientationMethod(choice.orientation_id));
 
   Corrector corrector;
   corrector.choice_ = choice;
   corrector.align_ = align;
   corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
   if (align == AlignMode::kRigid) {
-    auto alignment = fitAlignment(nodes);
-    if (!alignment) return tl::unexpected(alignment.error());
-    corrector.alignment_ = *alignment;
+    FT_TRY(auto alignment, fitAlignment(nodes));
+    corrector.alignment_ = alignment;
   }
   const correctors::FitData data = makeFitData(nodes, metadata, corrector.alignment_);
-  if (auto checked = correctors::checkPositions(data, "A calibration"); !checked)
-    return tl::unexpected(checked.error());
+  FT_TRY_VOID(correctors::checkPositions(data, "A calibration"));
 
-  auto position = (*position_method)->fit(data, choice.position_settings, control);
-  if (!position) return tl::unexpected(position.error());
-  auto orientation = (*orientation_method)->fit(data, choice.orientation_settings, control);
-  if (!orientation) return tl::unexpected(orientation.error());
-  corrector.position_ = *std::move(position);
-  corrector.orientation_ = *std::move(orientation);
+  FT_TRY(auto position, position_method->fit(data, choice.position_settings, control));
+  FT_TRY(auto orientation, orientation_method->fit(data, choice.orientation_settings, control));
+  corrector.position_ = std::move(position);
+  corrector.orientation_ = std::move(orientation);
   corrector.region_ = Region::around(data.p_tracked_m, data.dimension,
                                      kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
   corrector.report_ = reportOf(nodes, corrector);
@@ -114,11 +103,10 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
                 "This calibration is baked already; bake anew from the one that was fitted, or fit it again");
   std::vector<Eigen::Vector3d> places_m;
   for (const Node& node : table_.nodes) places_m.push_back(node.tracker_from_sensor.position_m);
-  auto lattice = correctors::bakeLattice(*position_, region_, places_m, max_deviation_m, control);
-  if (!lattice) return tl::unexpected(lattice.error());
+  FT_TRY(auto lattice, correctors::bakeLattice(*position_, region_, places_m, max_deviation_m, control));
   Corrector corrector = *this;
   corrector.is_baked_ = true;
-  corrector.position_ = *std::move(lattice);
+  corrector.position_ = std::move(lattice);
   corrector.report_ = reportOf(table_.nodes, corrector);
   corrector.report_.notes = report_.notes;
   corrector.report_.notes.push_back(corrector.position_->note());

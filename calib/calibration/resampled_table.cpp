@@ -116,15 +116,14 @@ Result<ResampledTable> resampleTable(const CalibrationTable& table, std::span<co
   std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(nodes),
                [](const Node& node) { return node.role == NodeRole::kFit; });
   if (nodes.empty()) return fail(ErrorCode::kTooFewNodes, "Resampling needs measured places of role fit, got none");
-  const auto alignment = align == AlignMode::kRigid ? fitAlignment(nodes) : Result<Alignment>(Alignment{});
-  if (!alignment) return tl::unexpected(alignment.error());
-  const correctors::FitData data = makeFitData(nodes, table.metadata, *alignment);
-  if (auto checked = correctors::checkPositions(data, "Resampling"); !checked) return tl::unexpected(checked.error());
+  FT_TRY(const auto alignment, align == AlignMode::kRigid ? fitAlignment(nodes) : Result<Alignment>(Alignment{}));
+  const correctors::FitData data = makeFitData(nodes, table.metadata, alignment);
+  FT_TRY_VOID(correctors::checkPositions(data, "Resampling"));
   if (auto room = checkMemory("Resampling to " + std::to_string(grid.size()) + " grid nodes",
                               static_cast<double>(grid.size() * sizeof(Node)));
       !room)
     return tl::unexpected(room.error());
-  const MeasuredErrors errors = measuredErrors(nodes, data, *alignment);
+  const MeasuredErrors errors = measuredErrors(nodes, data, alignment);
 
   const correctors::Regridder regridder(errors.places.p_tracked_m, options);
   ResampledTable resampled;

@@ -43,3 +43,19 @@ inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
 /// A programmer's mistake: throws std::logic_error. Never used for data or devices.
 #define FT_CHECK(condition) \
   ((condition) ? static_cast<void>(0) : ::fieldtrue::checkFailed(#condition, __FILE__, __LINE__))
+
+#define FT_JOIN_TEXT(a, b) a##b
+#define FT_JOIN(a, b) FT_JOIN_TEXT(a, b)
+
+/// Declares what a Result holds, or returns its error: FT_TRY(const auto table, readTable(path));
+#define FT_TRY(declaration, ...)                                                                 \
+  auto FT_JOIN(ft_result_, __LINE__) = __VA_ARGS__;                                              \
+  if (!FT_JOIN(ft_result_, __LINE__))                                                            \
+    return tl::unexpected<::fieldtrue::Error>(std::move(FT_JOIN(ft_result_, __LINE__)).error()); \
+  declaration = *std::move(FT_JOIN(ft_result_, __LINE__))
+
+/// Returns the error of a Result whose value, if any, is not wanted.
+#define FT_TRY_VOID(...)                                                                                             \
+  do {                                                                                                               \
+    if (auto ft_done = __VA_ARGS__; !ft_done) return tl::unexpected<::fieldtrue::Error>(std::move(ft_done).error()); \
+  } while (false)

@@ -131,8 +131,7 @@ Result<MemoryBooking> MemoryBooking::book(const std::string& what, double bytes,
   };
   if (!all.changed.wait(lock, std::move(stop), has_room))
     return fail(ErrorCode::kCancelled, "Stopped on request while waiting for memory");
-  if (const auto checked = checkWithin(what, bytes, all.available_bytes); !checked)
-    return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkWithin(what, bytes, all.available_bytes));
   all.booked_bytes += bytes;
   return MemoryBooking(bytes);
 }

@@ -95,34 +95,30 @@ CandidateSet candidateSetOf(const Settings& settings) {
 
 /// The data must span a plane at least, in tracked positions too.
 Result<void> checkSpread(const FitData& data) {
-  const auto places = smoothFitPlaces(data, kName);
-  if (!places) return tl::unexpected(places.error());
-  const FieldFrame frame = FieldFrame::around(places->p_tracked_m, data.dimension, rmsSpread_m(places->p_tracked_m));
-  if (!TailProjection::of(frame.tail(places->p_tracked_m)))
-    return tl::unexpected(degenerateTail(kName, places->size()));
+  FT_TRY(const auto places, smoothFitPlaces(data, kName));
+  const FieldFrame frame = FieldFrame::around(places.p_tracked_m, data.dimension, rmsSpread_m(places.p_tracked_m));
+  if (!TailProjection::of(frame.tail(places.p_tracked_m))) return tl::unexpected(degenerateTail(kName, places.size()));
   return {};
 }
 
 Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const Settings& settings,
                                                     const RunControl& control) {
-  if (auto checked = checkSpread(data); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkSpread(data));
   const std::vector<AutomaticCandidate> candidates = automaticCandidates(candidateSetOf(settings));
   const auto folds = innerFolds(data);
-  const auto scored = scoreCandidates(candidates, data, folds, control);
-  if (!scored) return tl::unexpected(scored.error());
-  const std::vector<InnerScore>& scores = *scored;
+  FT_TRY(const auto scored, scoreCandidates(candidates, data, folds, control));
+  const std::vector<InnerScore>& scores = scored;
   const std::size_t chosen = chooseCandidate(candidates, scores);
   const AutomaticCandidate& winner = candidates[chosen];
   RunControl inner = control;
   inner.progress = [](double) {};
-  auto model = winner.method->fit(data, winner.settings, inner);
-  if (!model) return tl::unexpected(model.error());
+  FT_TRY(auto model, winner.method->fit(data, winner.settings, inner));
   control.progress(1.0);
   nlohmann::json table = {{"method", winner.method->id},
                           {"settings", toJson(winner.settings)},
                           {"candidates", tableOf(candidates, scores)},
                           {"note", noteOf(data, candidates, scores, chosen, folds.size())}};
-  return std::make_unique<AutomaticModel>(*std::move(model), std::move(table));
+  return std::make_unique<AutomaticModel>(std::move(model), std::move(table));
 }
 
 std::unique_ptr<PositionModel> loadAutomatic(const JsonReader& parameters) {

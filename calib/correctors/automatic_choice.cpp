@@ -58,9 +58,8 @@ using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const s
 /// How a candidate's models without some rows are made: downdated from one fit, or fitted anew.
 Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData& data, const RunControl& control) {
   if (candidate.method->hold_out != nullptr) {
-    auto fits = candidate.method->hold_out(data, candidate.settings, control);
-    if (!fits) return tl::unexpected(fits.error());
-    return [shared = std::shared_ptr<const HoldOutFits<PositionModel>>(*std::move(fits))](
+    FT_TRY(auto fits, candidate.method->hold_out(data, candidate.settings, control));
+    return [shared = std::shared_ptr<const HoldOutFits<PositionModel>>(std::move(fits))](
                const std::vector<std::size_t>& held_out) { return shared->without(held_out, Pose{}); };
   }
   return [&candidate, &data, &control](const std::vector<std::size_t>& held_out) {
@@ -186,9 +185,8 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
   const InnerScore* best = nullptr;
   double n_done = 0.0;
   for (const std::size_t i : order) {
-    auto score = scoreCandidate(candidates[i], data, folds, best, inner);
-    if (!score) return tl::unexpected(score.error());
-    scores[i] = *std::move(score);
+    FT_TRY(auto score, scoreCandidate(candidates[i], data, folds, best, inner));
+    scores[i] = std::move(score);
     if (!scores[i].skipped && (best == nullptr || PairedDifference(scores[i], *best).mean < 0.0)) best = &scores[i];
     control.progress(++n_done / static_cast<double>(candidates.size() + 1));
   }

@@ -33,9 +33,8 @@ class CompactMetal final : public field::CouplingDistortion {
 
 Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
                                                     const field::Excitation& excitation) {
-  const Result<MetalBody> body = bodyOf(parameters, excitation, "compact_metal");
-  if (!body) return tl::unexpected<Error>(body.error());
-  return std::make_unique<CompactMetal>(*body);
+  FT_TRY(const MetalBody body, bodyOf(parameters, excitation, "compact_metal"));
+  return std::make_unique<CompactMetal>(body);
 }
 
 class CompactMetalFit final : public EffectFit {

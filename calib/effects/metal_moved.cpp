@@ -46,10 +46,9 @@ class MetalMoved final : public field::CouplingDistortion {
 
 Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parameters,
                                                     const field::Excitation& excitation) {
-  const Result<MetalBody> body = bodyOf(parameters, excitation, "metal_moved");
-  if (!body) return tl::unexpected<Error>(body.error());
+  FT_TRY(const MetalBody body, bodyOf(parameters, excitation, "metal_moved"));
   const Presence presence = parameters.at("present") == "after" ? Presence::kAfter : Presence::kBefore;
-  return std::make_unique<MetalMoved>(*body, scalarOf(parameters, "change_s"), presence);
+  return std::make_unique<MetalMoved>(body, scalarOf(parameters, "change_s"), presence);
 }
 
 class MetalMovedFit final : public EffectFit {

@@ -138,11 +138,9 @@ Result<nlohmann::json> resolveEffectParameters(const Effect& effect, const nlohm
 
 Result<std::unique_ptr<field::PhysicalEffect>> makeEffect(std::string_view id, const nlohmann::json& given,
                                                           const field::Excitation& excitation) {
-  const Result<const Effect*> effect = findEffect(id);
-  if (!effect) return tl::unexpected<Error>(effect.error());
-  const Result<nlohmann::json> parameters = resolveEffectParameters(**effect, given);
-  if (!parameters) return tl::unexpected<Error>(parameters.error());
-  return (*effect)->make(*parameters, excitation);
+  FT_TRY(const const Effect* effect, findEffect(id));
+  FT_TRY(const nlohmann::json parameters, resolveEffectParameters(*effect, given));
+  return effect->make(parameters, excitation);
 }
 
 nlohmann::json toJson(std::span<const Effect> rows) {

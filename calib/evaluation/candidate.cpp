@@ -108,11 +108,9 @@ Result<std::vector<Candidate>> makeCandidates(
     for (const correctors::CorrectionMethod<Model>& method : registry) wanted.push_back({method.id, {}});
   std::vector<Candidate> candidates;
   for (const MethodText& text : wanted) {
-    const auto method = find(text.id);
-    if (!method) return tl::unexpected(method.error());
-    auto settings = resolveSettings(text.id, (*method)->settings, text.given);
-    if (!settings) return tl::unexpected(settings.error());
-    candidates.push_back(makeCandidate(**method, *std::move(settings)));
+    FT_TRY(const auto method, find(text.id));
+    FT_TRY(auto settings, resolveSettings(text.id, method->settings, text.given));
+    candidates.push_back(makeCandidate(*method, std::move(settings)));
   }
   return candidates;
 }

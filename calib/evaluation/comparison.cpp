@@ -137,27 +137,23 @@ RunControl partOf(const RunControl& control, double from, double to) {
 
 Result<Comparison> compareMethods(const CalibrationTable& table, const ComparisonOptions& options,
                                   const RunControl& control) {
-  const auto job = makeJob(table, options);
-  if (!job) return tl::unexpected(job.error());
+  FT_TRY(const auto job, makeJob(table, options));
   const double scores_end = options.with_surroundings ? 0.9 : 1.0;
-  auto held_out = scoreHeldOut(*job, partOf(control, 0.0, scores_end));
-  if (!held_out) return tl::unexpected(held_out.error());
+  FT_TRY(auto held_out, scoreHeldOut(job, partOf(control, 0.0, scores_end)));
 
-  const std::vector<Node> scored = rowsOf(*job, job->scored);
-  Comparison comparison = begin(*job, scored);
-  if (held_out->dimension == 2)
+  const std::vector<Node> scored = rowsOf(job, job.scored);
+  Comparison comparison = begin(job, scored);
+  if (held_out.dimension == 2)
     comparison.notes.push_back("The places lie in one plane: methods are fitted in it, and nothing is claimed off it.");
-  scoreBefore(*job, *held_out, scored, comparison);
-  scoreMethods(*job, *held_out, scored, comparison, control);
+  scoreBefore(job, held_out, scored, comparison);
+  scoreMethods(job, held_out, scored, comparison, control);
   if (control.stop.stop_requested()) return stoppedError();
   scoreCommonPlaces(comparison.position, comparison.places.size());
   noteClosedForm(comparison);
   pickBest(comparison, options.seed, control);
-  judgePlaces(comparison, *job);
+  judgePlaces(comparison, job);
   if (control.stop.stop_requested()) return stoppedError();
-  if (options.with_surroundings)
-    if (auto added = addSurroundings(comparison, table, *job, partOf(control, scores_end, 1.0)); !added)
-      return tl::unexpected(added.error());
+  if (options.with_surroundings) FT_TRY_VOID(addSurroundings(comparison, table, job, partOf(control, scores_end, 1.0)));
   writeVerdictText(comparison);
   return comparison;
 }

@@ -148,7 +148,7 @@ Result<std::vector<Task>> makeTasks(Run& run, ProgressMeter& meter) {
     if (hasClosedForm(run.job, candidate)) {
       closed.push_back(i);
     } else if (isTooCostly(run.job, candidate)) {
-      if (auto added = addCostly(run, i, meter, tasks); !added) return tl::unexpected(added.error());
+      FT_TRY_VOID(addCostly(run, i, meter, tasks));
     } else {
       plain.push_back(i);
     }
@@ -225,10 +225,9 @@ void keepReasons(Run& run) {
 
 Result<void> runFolds(Run& run) {
   ProgressMeter meter(run.control.progress, kAligned, 1.0, totalCost_s(run));
-  const auto tasks = makeTasks(run, meter);
-  if (!tasks) return tl::unexpected(tasks.error());
-  run.control.parallel_for(tasks->size(), [&](std::size_t t) {
-    if (!run.stopped()) (*tasks)[t].work();
+  FT_TRY(const auto tasks, makeTasks(run, meter));
+  run.control.parallel_for(tasks.size(), [&](std::size_t t) {
+    if (!run.stopped()) tasks[t].work();
   });
   if (run.stopped()) return stoppedError();
   keepReasons(run);
@@ -246,9 +245,8 @@ Result<void> runFolds(Run& run) {
 Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& control) {
   HeldOutScores scores;
   const std::vector<Node> fitted = rowsOf(job, job.fitted);
-  const auto alignment = alignmentOf(job, fitted);
-  if (!alignment) return tl::unexpected(alignment.error());
-  Run run{job,    control, slotsOf(job), *alignment, calibration::makeFitData(fitted, job.metadata, *alignment), {},
+  FT_TRY(const auto alignment, alignmentOf(job, fitted));
+  Run run{job,    control, slotsOf(job), alignment, calibration::makeFitData(fitted, job.metadata, alignment), {},
           scores, {}};
   scores.dimension = run.all_data.dimension;
   scores.candidates.resize(job.candidates.size());
@@ -258,19 +256,19 @@ Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& cont
   const bool is_role = job.validation.kind == ValidationKind::kRole;
   control.parallel_for(job.candidates.size(), [&](std::size_t i) {
     if (run.stopped()) return;
-    scores.candidates[i] = fitInSample(job, job.candidates[i], run.all_data, *alignment, run.inner());
+    scores.candidates[i] = fitInSample(job, job.candidates[i], run.all_data, alignment, run.inner());
     run.why_not[i].resize(job.folds.size());
     if (!is_role) scores.candidates[i].held_out.resize(job.scored.size());
     meter.add(1.0);
   });
   if (run.stopped()) return stoppedError();
-  if (auto aligned = alignFolds(run); !aligned) return tl::unexpected(aligned.error());
+  FT_TRY_VOID(alignFolds(run));
   if (run.stopped()) return stoppedError();
   if (is_role) {
     control.progress(1.0);
     return scores;
   }
-  if (auto done = runFolds(run); !done) return tl::unexpected(done.error());
+  FT_TRY_VOID(runFolds(run));
   return scores;
 }
 

@@ -11,12 +11,10 @@ namespace fieldtrue::evaluation {
 namespace {
 
 Result<std::vector<Candidate>> candidatesOf(const ComparisonOptions& options) {
-  auto position = positionCandidates(options.position_methods);
-  if (!position) return tl::unexpected(position.error());
-  auto orientation = orientationCandidates(options.orientation_methods);
-  if (!orientation) return tl::unexpected(orientation.error());
-  std::vector<Candidate> candidates = *std::move(position);
-  std::move(orientation->begin(), orientation->end(), std::back_inserter(candidates));
+  FT_TRY(auto position, positionCandidates(options.position_methods));
+  FT_TRY(auto orientation, orientationCandidates(options.orientation_methods));
+  std::vector<Candidate> candidates = std::move(position);
+  std::move(orientation.begin(), orientation.end(), std::back_inserter(candidates));
   return candidates;
 }
 

@@ -111,22 +111,20 @@ Result<std::vector<LearningCurve>> learningCurves(const CalibrationTable& table,
                                                   const RunControl& control) {
   ComparisonOptions position_only = options;
   position_only.orientation_methods = {{"none", {}}};
-  auto job = makeJob(table, position_only);
-  if (!job) return tl::unexpected(job.error());
-  job->candidates.pop_back();
-  const HeldOutPlaces split = splitPlaces(*job);
+  FT_TRY(auto job, makeJob(table, position_only));
+  job.candidates.pop_back();
+  const HeldOutPlaces split = splitPlaces(job);
   const std::set<int> is_scored(split.scored.begin(), split.scored.end());
   std::vector<Node> scored;
-  for (const std::size_t row : job->scored)
-    if (is_scored.contains(job->nodes[row].node)) scored.push_back(job->nodes[row]);
-  const std::vector<Node> all = rowsOf(*job, job->fitted);
-  const auto alignment = alignmentOf(*job, all);
-  if (!alignment) return tl::unexpected(alignment.error());
-  const int dimension = calibration::makeFitData(all, job->metadata, *alignment).dimension;
+  for (const std::size_t row : job.scored)
+    if (is_scored.contains(job.nodes[row].node)) scored.push_back(job.nodes[row]);
+  const std::vector<Node> all = rowsOf(job, job.fitted);
+  FT_TRY(const auto alignment, alignmentOf(job, all));
+  const int dimension = calibration::makeFitData(all, job.metadata, alignment).dimension;
 
   std::vector<LearningPoint> points;
-  const std::vector<Draw> draws = drawParts(*job, split.pool, points);
-  const std::size_t n_candidates = job->candidates.size();
+  const std::vector<Draw> draws = drawParts(job, split.pool, points);
+  const std::size_t n_candidates = job.candidates.size();
   std::vector<std::vector<std::optional<double>>> rms(n_candidates, std::vector<std::optional<double>>(draws.size()));
   RunControl inner;
   inner.stop = control.stop;
@@ -135,16 +133,16 @@ Result<std::vector<LearningCurve>> learningCurves(const CalibrationTable& table,
   control.parallel_for(n_candidates * draws.size(), [&](std::size_t task) {
     const std::size_t d = draws.size() - 1 - task / n_candidates;
     const std::size_t i = task % n_candidates;
-    const Candidate& candidate = job->candidates[i];
+    const Candidate& candidate = job.candidates[i];
     const bool is_wanted =
         candidate.most_folds == 0 || draws[d].point + 1 == points.size() || d % kDraws < kCostlyDraws;
     if (is_wanted && !control.stop.stop_requested())
-      rms[i][d] = heldOutRms(*job, candidate, draws[d], scored, split.scored, dimension, inner);
+      rms[i][d] = heldOutRms(job, candidate, draws[d], scored, split.scored, dimension, inner);
     meter.add(1.0);
   });
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
   std::vector<LearningCurve> curves;
-  for (std::size_t i = 0; i < n_candidates; ++i) curves.push_back(curveOf(job->candidates[i], points, draws, rms[i]));
+  for (std::size_t i = 0; i < n_candidates; ++i) curves.push_back(curveOf(job.candidates[i], points, draws, rms[i]));
   return curves;
 }
 

@@ -61,28 +61,27 @@ std::string tooFewText(const OrientationRows& rows, int n_places) {
 
 Result<OrientationDependence> orientationDependence(const CalibrationTable& table, std::uint64_t seed,
                                                     const RunControl& control) {
-  const auto rows = orientationRows(table);
-  if (!rows) return tl::unexpected(rows.error());
+  FT_TRY(const auto rows, orientationRows(table));
   OrientationDependence dependence;
-  dependence.n_places = placesWithThreeOrientations(*rows);
+  dependence.n_places = placesWithThreeOrientations(rows);
   const bool has_visits = dependence.n_places >= kFewestPlaces;
   const bool has_neighbours =
-      rows->n_groups >= kFewestOrientations && rows->n_places >= static_cast<std::size_t>(kFewestPlaces);
+      rows.n_groups >= kFewestOrientations && rows.n_places >= static_cast<std::size_t>(kFewestPlaces);
   if (!has_visits && !has_neighbours) {
-    dependence.text = tooFewText(*rows, dependence.n_places);
+    dependence.text = tooFewText(rows, dependence.n_places);
     return dependence;
   }
   dependence.by_neighbours = !has_visits;
-  const bool hold_out_orientations = rows->n_groups >= kEnoughToHoldOut;
+  const bool hold_out_orientations = rows.n_groups >= kEnoughToHoldOut;
   const NestedErrors errors =
-      has_visits ? nestedModelErrors(*rows, hold_out_orientations, seed, control) : neighbourErrors(*rows, seed);
+      has_visits ? nestedModelErrors(rows, hold_out_orientations, seed, control) : neighbourErrors(rows, seed);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
   judge(errors, seed, dependence);
   dependence.text = answerText(dependence);
   if (dependence.by_neighbours)
     dependence.text += ", judged by neighbours in position and orientation, which is weaker than visits of one place";
   else if (!hold_out_orientations)
-    dependence.text += "; with " + countText(rows->n_groups, "orientation", "orientations") +
+    dependence.text += "; with " + countText(rows.n_groups, "orientation", "orientations") +
                        " only places were held out, and a fixture that holds one of them wrong would look the same";
   dependence.text += ".";
   return dependence;

@@ -47,9 +47,8 @@ Result<OrientationRows> orientationRows(const CalibrationTable& table) {
                     std::to_string(n_without) + " of " + std::to_string(nodes.size()) + " rows have none");
   calibration::Alignment alignment;
   if (calibration::defaultAlignMode(table.metadata) == calibration::AlignMode::kRigid) {
-    const auto fitted = calibration::fitAlignment(nodes);
-    if (!fitted) return tl::unexpected(fitted.error());
-    alignment = *fitted;
+    FT_TRY(const auto fitted, calibration::fitAlignment(nodes));
+    alignment = fitted;
   }
   correctors::FitData data = calibration::makeFitData(nodes, table.metadata, alignment);
   OrientationRows rows;

@@ -80,10 +80,9 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   if (auto going = unlessStopped(control, 0.6); !going) return going;
   comparison.resampling = resamplingErrors(comparison, job, quiet);
   if (auto going = unlessStopped(control, 0.8); !going) return going;
-  const auto with_half_mm = comparison.verdict.apply_position ? rmsWithHalf_mm(comparison, job, quiet)
-                                                              : Result<std::optional<double>>(std::nullopt);
-  if (!with_half_mm) return tl::unexpected(with_half_mm.error());
-  if (!comparison.verdict.is_inside_out) comparison.verdict.limited_by = limitedBy(comparison, job, *with_half_mm);
+  FT_TRY(const auto with_half_mm, comparison.verdict.apply_position ? rmsWithHalf_mm(comparison, job, quiet)
+                                                                    : Result<std::optional<double>>(std::nullopt));
+  if (!comparison.verdict.is_inside_out) comparison.verdict.limited_by = limitedBy(comparison, job, with_half_mm);
   return unlessStopped(control, 1.0);
 }
 

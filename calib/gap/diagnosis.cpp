@@ -30,9 +30,8 @@ Result<std::vector<std::unique_ptr<field::PhysicalEffect>>> believedEffects(cons
   std::vector<std::unique_ptr<field::PhysicalEffect>> effects;
   if (scene == nullptr) return effects;
   for (const simulation::EffectInstance& instance : scene->effects) {
-    auto effect = effects::makeEffect(instance.id, instance.parameters, excitation);
-    if (!effect) return tl::unexpected<Error>(effect.error());
-    effects.push_back(std::move(*effect));
+    FT_TRY(auto effect, effects::makeEffect(instance.id, instance.parameters, excitation));
+    effects.push_back(std::move(effect));
   }
   return effects;
 }
@@ -145,27 +144,25 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
                            const DiagnosisOptions& options, const RunControl& control) {
   GapReport report;
   recording::Cleaned cleaned = recording::cleanRows(table);
-  auto rows = identify::makeGapRows(cleaned.nodes, table.metadata);
-  if (!rows) return tl::unexpected<Error>(rows.error());
-  takeFromScene(scene, table.metadata, *rows);
-  auto believed = believedEffects(scene, rows->excitation);
-  if (!believed) return tl::unexpected<Error>(believed.error());
+  FT_TRY(auto rows, identify::makeGapRows(cleaned.nodes, table.metadata));
+  takeFromScene(scene, table.metadata, rows);
+  FT_TRY(auto believed, believedEffects(scene, rows.excitation));
   report.names = std::move(cleaned.names);
-  describeInput(*rows, samples, report);
+  describeInput(rows, samples, report);
   report.findings = std::move(cleaned.findings);
   for (recording::GapFinding& finding : identify::sampleFindings(samples, table, scene))
     report.findings.push_back(std::move(finding));
   control.progress(0.03);
 
-  const identify::GapSearch search(*rows, std::move(*believed));
+  const identify::GapSearch search(rows, std::move(believed));
   control.progress(0.1);
   identify::EffectSelectionOptions selecting;
-  const bool has_enough = rows->place_nodes.size() >= identify::kFewestPlacesForCauses;
+  const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
   selecting.most_effects = has_enough ? options.most_effects : 0;
   const identify::EffectSelection selection = identify::selectEffects(search, selecting, partOf(control, 0.1, 0.7));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.7);
-  const LeftOver left = leftBy(search, selection.model.model, *rows);
+  const LeftOver left = leftBy(search, selection.model.model, rows);
   const HeldOutGap held_out = holdOut(search, selection, left.structure, partOf(control, 0.7, 0.9));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.9);
@@ -178,7 +175,7 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   const double unit_mm = search.whitenedUnit_mm();
   report.candidates = describeCandidates(search, selection, held_out, unit_mm);
   report.selected = describeSelected(search, selection, held_out, report.candidates, unit_mm);
-  const Evidence evidence = weigh(search, selection, held_out, left, *rows, report);
+  const Evidence evidence = weigh(search, selection, held_out, left, rows, report);
   report.verdict = verdictOf(evidence);
   addTraces(left.traces, report);
   addBoundOfFloor(search, report);
@@ -259,16 +256,14 @@ Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const simulati
                               const RunControl& control) {
   simulation::Scene believed = scene != nullptr ? *scene : simulation::Scene{};
   if (scene == nullptr) believed.reference_from_tracker = defaultTransmitter(plan);
-  auto rows = plannedRows(plan, believed);
-  if (!rows) return tl::unexpected<Error>(rows.error());
-  if (rows->place_nodes.size() < identify::kFewestPlacesForCauses) {
+  FT_TRY(auto rows, plannedRows(plan, believed));
+  if (rows.place_nodes.size() < identify::kFewestPlacesForCauses) {
     return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " +
                                              std::to_string(identify::kFewestPlacesForCauses) +
-                                             " places; this one has " + std::to_string(rows->place_nodes.size()) + ".");
+                                             " places; this one has " + std::to_string(rows.place_nodes.size()) + ".");
   }
-  auto effects = believedEffects(&believed, rows->excitation);
-  if (!effects) return tl::unexpected<Error>(effects.error());
-  const identify::GapSearch search(*rows, std::move(*effects), identify::NoiseFrom::kStated);
+  FT_TRY(auto effects, believedEffects(&believed, rows.excitation));
+  const identify::GapSearch search(rows, std::move(effects), identify::NoiseFrom::kStated);
   Isolability isolability = isolabilityOf(search, 60, control);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The check of the plan was stopped.");
   return isolability;

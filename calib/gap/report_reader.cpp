@@ -201,12 +201,10 @@ Result<GapReport> readGapReport(const nlohmann::json& document, const std::strin
 }
 
 Result<GapReport> readGapReport(const std::filesystem::path& path) {
-  const Result<std::string> text = readFile(path);
-  if (!text) return tl::unexpected<Error>(text.error());
+  FT_TRY(const std::string text, readFile(path));
   const std::string name = path.filename().string();
-  const Result<nlohmann::json> document = parseJson(*text, name);
-  if (!document) return tl::unexpected<Error>(document.error());
-  return readGapReport(*document, name);
+  FT_TRY(const nlohmann::json document, parseJson(text, name));
+  return readGapReport(document, name);
 }
 
 }  // namespace fieldtrue::gap

@@ -20,9 +20,8 @@ ScenePositions::ScenePositions(PositionScene scene)
 Result<ScenePositions> ScenePositions::make(PositionScene scene) {
   ScenePositions positions(std::move(scene));
   for (const simulation::EffectInstance& instance : positions.scene_.effects) {
-    auto effect = effects::makeEffect(instance.id, instance.parameters);
-    if (!effect) return tl::unexpected<Error>(effect.error());
-    positions.effects_.push_back(*std::move(effect));
+    FT_TRY(auto effect, effects::makeEffect(instance.id, instance.parameters));
+    positions.effects_.push_back(std::move(effect));
   }
   for (const Eigen::Vector3d& p_m : positions.scene_.places_m) {
     const auto report_m = positions.trackedPosition_m(p_m, positions.scene_.tracker_from_reference * p_m);
@@ -186,9 +185,8 @@ Result<std::vector<ScenePositions>> refitted(const GapSearch& search, const GapM
   });
   std::vector<ScenePositions> scenes;
   for (const GapModel& one : models) {
-    auto scene = positionsOf(search.physics(), one, terms);
-    if (!scene) return tl::unexpected<Error>(scene.error());
-    scenes.push_back(*std::move(scene));
+    FT_TRY(auto scene, positionsOf(search.physics(), one, terms));
+    scenes.push_back(std::move(scene));
   }
   return scenes;
 }

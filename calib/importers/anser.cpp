@@ -38,34 +38,30 @@ std::string joined(const std::vector<std::string>& words) {
 
 Result<Import> importAnser(const std::filesystem::path& path, const std::optional<std::filesystem::path>&,
                            const Settings& settings) {
-  Result<std::ifstream> in = openForReading(path);
-  if (!in) return tl::unexpected(in.error());
-  Result<CsvReader> reader = CsvReader::open(*in, path.filename().string());
-  if (!reader) return tl::unexpected(reader.error());
-  const Result<std::vector<std::size_t>> columns = reader->require(kColumns);
-  if (!columns) return tl::unexpected(columns.error());
+  FT_TRY(std::ifstream in, openForReading(path));
+  FT_TRY(CsvReader reader, CsvReader::open(in, path.filename().string()));
+  FT_TRY(const std::vector<std::size_t> columns, reader.require(kColumns));
   const std::string& wanted = choiceSetting(settings, "condition");
   std::vector<std::string> found;
   CalibrationTable table;
   while (true) {
-    const Result<bool> more = reader->next();
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
-    const std::string condition(reader->field((*columns)[0]));
+    FT_TRY(const bool more, reader.next());
+    if (!more) break;
+    const std::string condition(reader.field(columns[0]));
     if (std::find(found.begin(), found.end(), condition) == found.end()) found.push_back(condition);
     if (condition != wanted) continue;
-    const Node node = readNode(*reader, *columns);
+    const Node node = readNode(reader, columns);
     const bool is_repeated =
         std::any_of(table.nodes.begin(), table.nodes.end(), [&](const Node& other) { return other.node == node.node; });
     if (is_repeated) {
-      reader->failAt((*columns)[1], "node " + std::to_string(node.node) + " comes twice in condition " + wanted);
+      reader.failAt(columns[1], "node " + std::to_string(node.node) + " comes twice in condition " + wanted);
     }
-    if (reader->error()) return tl::unexpected(*reader->error());
+    if (reader.error()) return tl::unexpected(*reader.error());
     table.nodes.push_back(node);
   }
   if (table.nodes.empty()) {
     return fail(ErrorCode::kBadInput,
-                reader->name() + " has no condition " + wanted + "; its conditions are " + joined(found));
+                reader.name() + " has no condition " + wanted + "; its conditions are " + joined(found));
   }
   table.metadata.tracker = "Anser EMT";
   table.metadata.rig = "LEGO Duplo board, 31.75 mm pitch";

@@ -53,9 +53,8 @@ Result<Group> findGroup(const CsvReader& reader, const Settings& settings, const
     return fail(ErrorCode::kBadInput, "columns: the settings " + keys.front() + " to " + keys.back() +
                                           " belong together, " + blank + " is missing");
   }
-  const Result<std::vector<std::size_t>> places = reader.require(names);
-  if (!places) return tl::unexpected(places.error());
-  return *places;
+  FT_TRY(const std::vector<std::size_t> places, reader.require(names));
+  return places;
 }
 
 Result<Layout> findLayout(const CsvReader& reader, const Settings& settings) {
@@ -66,9 +65,8 @@ Result<Layout> findLayout(const CsvReader& reader, const Settings& settings) {
        {{"x_true", "y_true", "z_true"}, &layout.true_position},
        {{"qw_true", "qx_true", "qy_true", "qz_true"}, &layout.true_rotation}}};
   for (const auto& [keys, group] : groups) {
-    const Result<Group> found = findGroup(reader, settings, keys);
-    if (!found) return tl::unexpected(found.error());
-    *group = *found;
+    FT_TRY(const Group found, findGroup(reader, settings, keys));
+    *group = found;
   }
   const std::array<std::pair<std::string, Column*>, 5> singles{{{"node", &layout.node},
                                                                 {"sensor", &layout.sensor},
@@ -76,9 +74,8 @@ Result<Layout> findLayout(const CsvReader& reader, const Settings& settings) {
                                                                 {"time", &layout.time},
                                                                 {"status", &layout.status}}};
   for (const auto& [key, column] : singles) {
-    const Result<Group> found = findGroup(reader, settings, {key});
-    if (!found) return tl::unexpected(found.error());
-    if (*found) *column = (**found)[0];
+    FT_TRY(const Group found, findGroup(reader, settings, {key}));
+    if (found) *column = (*found)[0];
   }
   if (!layout.position) return fail(ErrorCode::kBadInput, "columns: the settings x, y and z must name columns");
   return layout;
@@ -112,9 +109,8 @@ Row readRow(CsvReader& reader, const Layout& layout, double unit_m, int row_numb
 Result<std::vector<Row>> readRows(CsvReader& reader, const Layout& layout, double unit_m) {
   std::vector<Row> rows;
   while (true) {
-    const Result<bool> more = reader.next();
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
+    FT_TRY(const bool more, reader.next());
+    if (!more) break;
     rows.push_back(readRow(reader, layout, unit_m, static_cast<int>(rows.size())));
     if (reader.error()) return tl::unexpected(*reader.error());
   }
@@ -176,31 +172,28 @@ Result<void> setOwnTruth(const std::vector<Row>& rows, std::vector<Node>& nodes,
 /// Truth from another file, matched by node number or by order.
 Result<TableMetadata> setForeignTruth(const std::filesystem::path& path, bool has_numbers, std::vector<Node>& nodes,
                                       std::vector<std::string>& notes) {
-  const Result<Truth> truth = readTruth(path);
-  if (!truth) return tl::unexpected(truth.error());
+  FT_TRY(const Truth truth, readTruth(path));
   std::vector<std::string> labels;
   for (const Node& node : nodes) labels.push_back(has_numbers ? std::to_string(node.node) : "");
-  const Result<TruthMatch> match = matchTruth(*truth, labels);
-  if (!match) return tl::unexpected(match.error());
+  FT_TRY(const TruthMatch match, matchTruth(truth, labels));
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const Node& known = truth->points[match->truth[i]].node;
+    const Node& known = truth.points[match.truth[i]].node;
     nodes[i].reference_from_sensor = known.reference_from_sensor;
     nodes[i].index = known.index;
     nodes[i].role = known.role;
   }
-  notes.insert(notes.end(), truth->notes.begin(), truth->notes.end());
-  notes.push_back(match->note);
-  return truth->metadata;
+  notes.insert(notes.end(), truth.notes.begin(), truth.notes.end());
+  notes.push_back(match.note);
+  return truth.metadata;
 }
 
 Result<std::vector<Node>> makeNodes(const std::vector<Row>& rows, const std::vector<SampleRow>& samples,
                                     const Layout& layout, bool average, std::vector<std::string>& notes) {
   if (!average) return nodesOf(rows, layout);
   if (!layout.node) return fail(ErrorCode::kBadInput, "columns: average=true needs node= to name the column of places");
-  Result<AveragedNodes> averaged = averageRows(samples, {}, layout.rotation.has_value(), "Node");
-  if (!averaged) return tl::unexpected(averaged.error());
-  notes.insert(notes.end(), averaged->notes.begin(), averaged->notes.end());
-  return std::move(averaged->nodes);
+  FT_TRY(AveragedNodes averaged, averageRows(samples, {}, layout.rotation.has_value(), "Node"));
+  notes.insert(notes.end(), averaged.notes.begin(), averaged.notes.end());
+  return std::move(averaged.nodes);
 }
 
 Result<Import> assemble(const std::vector<Row>& rows, const Layout& layout,
@@ -212,17 +205,14 @@ Result<Import> assemble(const std::vector<Row>& rows, const Layout& layout,
   for (const Row& row : rows) samples.push_back(row.tracked);
   Import import;
   if (layout.true_position || truth_path) {
-    Result<std::vector<Node>> nodes = makeNodes(rows, samples, layout, average, import.notes);
-    if (!nodes) return tl::unexpected(nodes.error());
+    FT_TRY(std::vector<Node> nodes, makeNodes(rows, samples, layout, average, import.notes));
     if (layout.true_position) {
-      const Result<void> set = setOwnTruth(rows, *nodes, average);
-      if (!set) return tl::unexpected(set.error());
+      FT_TRY_VOID(setOwnTruth(rows, nodes, average));
     } else {
-      const Result<TableMetadata> found = setForeignTruth(*truth_path, layout.node.has_value(), *nodes, import.notes);
-      if (!found) return tl::unexpected(found.error());
-      metadata = *found;
+      FT_TRY(const TableMetadata found, setForeignTruth(*truth_path, layout.node.has_value(), nodes, import.notes));
+      metadata = found;
     }
-    import.table = CalibrationTable{metadata, std::move(*nodes)};
+    import.table = CalibrationTable{metadata, std::move(nodes)};
   } else {
     import.notes.push_back("The table has no true positions: samples only");
   }
@@ -232,23 +222,19 @@ Result<Import> assemble(const std::vector<Row>& rows, const Layout& layout,
 
 Result<Import> importColumns(const std::filesystem::path& path, const std::optional<std::filesystem::path>& truth_path,
                              const Settings& settings) {
-  Result<std::ifstream> in = openForReading(path);
-  if (!in) return tl::unexpected(in.error());
-  Result<CsvReader> reader =
-      CsvReader::open(*in, path.filename().string(), separatorOf(choiceSetting(settings, "separator")));
-  if (!reader) return tl::unexpected(reader.error());
-  const Result<Layout> layout = findLayout(*reader, settings);
-  if (!layout) return tl::unexpected(layout.error());
-  if (layout->true_position && truth_path) {
+  FT_TRY(std::ifstream in, openForReading(path));
+  FT_TRY(CsvReader reader,
+         CsvReader::open(in, path.filename().string(), separatorOf(choiceSetting(settings, "separator"))));
+  FT_TRY(const Layout layout, findLayout(reader, settings));
+  if (layout.true_position && truth_path) {
     return fail(ErrorCode::kBadInput,
                 "columns: the truth is given twice, by x_true, y_true, z_true and by a truth file");
   }
-  if (layout->true_rotation && !layout->true_position) {
+  if (layout.true_rotation && !layout.true_position) {
     return fail(ErrorCode::kBadInput, "columns: qw_true to qz_true need x_true, y_true and z_true");
   }
-  const Result<std::vector<Row>> rows = readRows(*reader, *layout, unitOf_m(choiceSetting(settings, "unit")));
-  if (!rows) return tl::unexpected(rows.error());
-  return assemble(*rows, *layout, truth_path, settings);
+  FT_TRY(const std::vector<Row> rows, readRows(reader, layout, unitOf_m(choiceSetting(settings, "unit"))));
+  return assemble(rows, layout, truth_path, settings);
 }
 
 Setting textSetting(std::string key, std::string label, std::string usual, std::string help,

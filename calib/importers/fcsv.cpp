@@ -36,23 +36,20 @@ Result<Import> importFcsv(const std::filesystem::path& in, const std::optional<s
     return fail(ErrorCode::kBadInput,
                 in.filename().string() + " holds tracked points only; name the file of true positions too");
   }
-  const Result<FcsvPoints> fcsv = readFcsv(in);
-  if (!fcsv) return tl::unexpected(fcsv.error());
-  const Result<Truth> truth = readTruth(*truth_path);
-  if (!truth) return tl::unexpected(truth.error());
+  FT_TRY(const FcsvPoints fcsv, readFcsv(in));
+  FT_TRY(const Truth truth, readTruth(*truth_path));
   std::vector<std::string> labels;
-  for (const FcsvPoint& point : fcsv->points) labels.push_back(point.label);
-  const Result<TruthMatch> match = matchTruth(*truth, labels);
-  if (!match) return tl::unexpected(match.error());
+  for (const FcsvPoint& point : fcsv.points) labels.push_back(point.label);
+  FT_TRY(const TruthMatch match, matchTruth(truth, labels));
   Import import;
-  import.notes = fcsv->notes;
-  import.notes.insert(import.notes.end(), truth->notes.begin(), truth->notes.end());
-  import.notes.push_back(match->note);
+  import.notes = fcsv.notes;
+  import.notes.insert(import.notes.end(), truth.notes.begin(), truth.notes.end());
+  import.notes.push_back(match.note);
   CalibrationTable table;
-  table.metadata = truth->metadata;
-  for (std::size_t i = 0; i < fcsv->points.size(); ++i) {
-    Node node = truth->points[match->truth[i]].node;
-    node.tracker_from_sensor.position_m = fcsv->points[i].position_m;
+  table.metadata = truth.metadata;
+  for (std::size_t i = 0; i < fcsv.points.size(); ++i) {
+    Node node = truth.points[match.truth[i]].node;
+    node.tracker_from_sensor.position_m = fcsv.points[i].position_m;
     node.has_orientation = false;
     table.nodes.push_back(node);
   }
@@ -63,27 +60,21 @@ Result<Import> importFcsv(const std::filesystem::path& in, const std::optional<s
 }  // namespace
 
 Result<FcsvPoints> readFcsv(const std::filesystem::path& path) {
-  Result<std::ifstream> in = openForReading(path);
-  if (!in) return tl::unexpected(in.error());
-  Result<CsvReader> reader = CsvReader::open(*in, path.filename().string(), ',', true);
-  if (!reader) return tl::unexpected(reader.error());
+  FT_TRY(std::ifstream in, openForReading(path));
+  FT_TRY(CsvReader reader, CsvReader::open(in, path.filename().string(), ',', true));
   constexpr std::array<std::string_view, 3> kPosition{"x", "y", "z"};
-  const Result<std::vector<std::size_t>> columns = reader->require(kPosition);
-  if (!columns) return tl::unexpected(columns.error());
+  FT_TRY(const std::vector<std::size_t> columns, reader.require(kPosition));
   FcsvPoints fcsv;
-  const Result<Eigen::Vector3d> signs = signsToRas(*reader, fcsv.notes);
-  if (!signs) return tl::unexpected(signs.error());
-  const std::optional<std::size_t> label = reader->find("label");
+  FT_TRY(const Eigen::Vector3d signs, signsToRas(reader, fcsv.notes));
+  const std::optional<std::size_t> label = reader.find("label");
   while (true) {
-    const Result<bool> more = reader->next();
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
-    const Eigen::Vector3d position_mm(reader->number((*columns)[0]), reader->number((*columns)[1]),
-                                      reader->number((*columns)[2]));
-    if (reader->error()) return tl::unexpected(*reader->error());
-    fcsv.points.push_back({label ? std::string(reader->field(*label)) : "", kMm_m * signs->cwiseProduct(position_mm)});
+    FT_TRY(const bool more, reader.next());
+    if (!more) break;
+    const Eigen::Vector3d position_mm(reader.number(columns[0]), reader.number(columns[1]), reader.number(columns[2]));
+    if (reader.error()) return tl::unexpected(*reader.error());
+    fcsv.points.push_back({label ? std::string(reader.field(*label)) : "", kMm_m * signs.cwiseProduct(position_mm)});
   }
-  if (fcsv.points.empty()) return fail(ErrorCode::kBadInput, reader->name() + " has a header but no points");
+  if (fcsv.points.empty()) return fail(ErrorCode::kBadInput, reader.name() + " has a header but no points");
   return fcsv;
 }
 

@@ -77,29 +77,23 @@ void readRow(CsvReader& reader, const std::vector<std::size_t>& place, const std
 }
 
 Result<Recording> readRecording(const std::filesystem::path& path, const Body& body) {
-  Result<std::ifstream> in = openForReading(path);
-  if (!in) return tl::unexpected(in.error());
-  Result<CsvReader> reader = CsvReader::open(*in, path.filename().string());
-  if (!reader) return tl::unexpected(reader.error());
-  const Result<std::vector<std::size_t>> place = reader->require(kPlaceColumns);
-  if (!place) return tl::unexpected(place.error());
-  const Result<std::vector<std::size_t>> position = reader->require(body.position);
-  if (!position) return tl::unexpected(position.error());
+  FT_TRY(std::ifstream in, openForReading(path));
+  FT_TRY(CsvReader reader, CsvReader::open(in, path.filename().string()));
+  FT_TRY(const std::vector<std::size_t> place, reader.require(kPlaceColumns));
+  FT_TRY(const std::vector<std::size_t> position, reader.require(body.position));
   std::optional<std::vector<std::size_t>> rotation;
   if (!body.rotation.empty()) {
-    const Result<std::vector<std::size_t>> found = reader->require(body.rotation);
-    if (!found) return tl::unexpected(found.error());
-    rotation = *found;
+    FT_TRY(const std::vector<std::size_t> found, reader.require(body.rotation));
+    rotation = found;
   }
   Recording recording;
   while (true) {
-    const Result<bool> more = reader->next();
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
-    readRow(*reader, *place, *position, rotation, recording);
-    if (reader->error()) return tl::unexpected(*reader->error());
+    FT_TRY(const bool more, reader.next());
+    if (!more) break;
+    readRow(reader, place, position, rotation, recording);
+    if (reader.error()) return tl::unexpected(*reader.error());
   }
-  if (recording.samples.rows.empty()) return fail(ErrorCode::kBadInput, reader->name() + " has a header but no rows");
+  if (recording.samples.rows.empty()) return fail(ErrorCode::kBadInput, reader.name() + " has a header but no rows");
   return recording;
 }
 
@@ -126,22 +120,20 @@ void describe(const Body& body, Recording& recording, std::vector<std::string>& 
 Result<Import> importPlus(const std::filesystem::path& path, const std::optional<std::filesystem::path>&,
                           const Settings& settings) {
   const Body& body = bodyNamed(choiceSetting(settings, "body"));
-  Result<Recording> recording = readRecording(path, body);
-  if (!recording) return tl::unexpected(recording.error());
+  FT_TRY(Recording recording, readRecording(path, body));
   Import import;
-  describe(body, *recording, import.notes);
-  if (body.has_truth && !recording->true_m.empty()) {
+  describe(body, recording, import.notes);
+  if (body.has_truth && !recording.true_m.empty()) {
     AveragingOptions options;
     options.reject_outliers = boolSetting(settings, "reject");
-    Result<AveragedNodes> averaged = averageRows(recording->samples.rows, options, !body.rotation.empty(), "Landmark");
-    if (!averaged) return tl::unexpected(averaged.error());
-    for (Node& node : averaged->nodes) node.reference_from_sensor.position_m = recording->true_m.at(node.node);
-    import.notes.insert(import.notes.end(), averaged->notes.begin(), averaged->notes.end());
-    import.table = CalibrationTable{recording->samples.metadata, std::move(averaged->nodes)};
+    FT_TRY(AveragedNodes averaged, averageRows(recording.samples.rows, options, !body.rotation.empty(), "Landmark"));
+    for (Node& node : averaged.nodes) node.reference_from_sensor.position_m = recording.true_m.at(node.node);
+    import.notes.insert(import.notes.end(), averaged.notes.begin(), averaged.notes.end());
+    import.table = CalibrationTable{recording.samples.metadata, std::move(averaged.nodes)};
   } else {
     import.notes.push_back("The table has no true positions of the " + std::string(body.name) + ": samples only");
   }
-  import.samples = std::move(recording->samples);
+  import.samples = std::move(recording.samples);
   return import;
 }
 

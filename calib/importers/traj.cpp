@@ -45,9 +45,8 @@ Result<std::vector<SampleRow>> readMatrices(std::istream& in, const std::string&
     return fail(ErrorCode::kBadInput, name + ", line " + std::to_string(lines.number()) + ": " + what);
   };
   for (std::string line;;) {
-    const Result<bool> more = lines.next(line);
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
+    FT_TRY(const bool more, lines.next(line));
+    if (!more) break;
     if (trimBlanks(line).empty()) {
       if (next_row != 0) return bad("a matrix has " + std::to_string(next_row) + " rows, it needs 4");
       continue;
@@ -73,10 +72,9 @@ Result<std::vector<SampleRow>> readMatrices(std::istream& in, const std::string&
 
 Result<Import> importTraj(const std::filesystem::path& path, const std::optional<std::filesystem::path>&,
                           const Settings& settings) {
-  Result<std::ifstream> in = openForReading(path);
-  if (!in) return tl::unexpected(in.error());
+  FT_TRY(std::ifstream in, openForReading(path));
   const double rate_hz = numberSetting(settings, "rate_hz");
-  Result<std::vector<SampleRow>> rows = readMatrices(*in, path.filename().string(), rate_hz);
+  Result<std::vector<SampleRow>> rows = readMatrices(in, path.filename().string(), rate_hz);
   if (!rows) return tl::unexpected(rows.error());
   Import import;
   import.samples.emplace();

@@ -29,12 +29,11 @@ TruthPoint pointAt(const Eigen::Vector3d& position_m, std::string label, std::si
 }
 
 Result<Truth> truthOfNodeTable(const std::filesystem::path& path) {
-  Result<TableReading<CalibrationTable>> reading = readNodeTable(path);
-  if (!reading) return tl::unexpected(reading.error());
+  FT_TRY(TableReading<CalibrationTable> reading, readNodeTable(path));
   Truth truth;
-  truth.metadata = reading->table.metadata;
-  truth.notes = reading->notes;
-  for (const Node& row : reading->table.nodes) {
+  truth.metadata = reading.table.metadata;
+  truth.notes = reading.notes;
+  for (const Node& row : reading.table.nodes) {
     Node node;
     node.node = row.node;
     node.sensor = row.sensor;
@@ -48,11 +47,10 @@ Result<Truth> truthOfNodeTable(const std::filesystem::path& path) {
 }
 
 Result<Truth> truthOfFcsv(const std::filesystem::path& path) {
-  const Result<FcsvPoints> fcsv = readFcsv(path);
-  if (!fcsv) return tl::unexpected(fcsv.error());
+  FT_TRY(const FcsvPoints fcsv, readFcsv(path));
   Truth truth;
-  truth.notes = fcsv->notes;
-  for (const FcsvPoint& point : fcsv->points) {
+  truth.notes = fcsv.notes;
+  for (const FcsvPoint& point : fcsv.points) {
     truth.points.push_back(pointAt(point.position_m, point.label, truth.points.size()));
   }
   return truth;
@@ -65,9 +63,8 @@ Result<Truth> truthOfColumns(CsvReader& reader) {
     const std::optional<std::size_t> label = reader.find("label");
     Truth truth;
     while (true) {
-      const Result<bool> more = reader.next();
-      if (!more) return tl::unexpected(more.error());
-      if (!*more) return truth;
+      FT_TRY(const bool more, reader.next());
+      if (!more) return truth;
       const Eigen::Vector3d position(reader.number((*columns)[0]), reader.number((*columns)[1]),
                                      reader.number((*columns)[2]));
       if (reader.error()) return tl::unexpected(*reader.error());
@@ -84,13 +81,11 @@ Result<Truth> truthOfColumns(CsvReader& reader) {
 
 Result<Truth> readTruth(const std::filesystem::path& path) {
   if (path.extension() == ".fcsv") return truthOfFcsv(path);
-  Result<std::ifstream> in = openForReading(path);
-  if (!in) return tl::unexpected(in.error());
-  Result<CsvReader> reader = CsvReader::open(*in, path.filename().string());
-  if (!reader) return tl::unexpected(reader.error());
-  const bool is_node_table = reader->find("x_true_m") && reader->find("x_m") && reader->find("node");
-  Result<Truth> truth = is_node_table ? truthOfNodeTable(path) : truthOfColumns(*reader);
-  if (truth && truth->points.empty()) return fail(ErrorCode::kBadInput, reader->name() + " has a header but no points");
+  FT_TRY(std::ifstream in, openForReading(path));
+  FT_TRY(CsvReader reader, CsvReader::open(in, path.filename().string()));
+  const bool is_node_table = reader.find("x_true_m") && reader.find("x_m") && reader.find("node");
+  Result<Truth> truth = is_node_table ? truthOfNodeTable(path) : truthOfColumns(reader);
+  if (truth && truth->points.empty()) return fail(ErrorCode::kBadInput, reader.name() + " has a header but no points");
   return truth;
 }
 

@@ -162,16 +162,15 @@ Node nodeOf(const Stop& stop, const NodeStatistics& statistics) {
 
 Result<Simulation> simulate(const Scene& scene, std::span<const PlannedPlace> plan, const SimulationOptions& options,
                             const RunControl& control) {
-  if (const Result<void> good = check(plan, options); !good) return tl::unexpected<Error>(good.error());
-  const Result<TrackerPhysics> physics = TrackerPhysics::make(scene, options.seed);
-  if (!physics) return tl::unexpected<Error>(physics.error());
+  FT_TRY_VOID(check(plan, options));
+  FT_TRY(const TrackerPhysics physics, TrackerPhysics::make(scene, options.seed));
 
-  const std::vector<Stop> stops = drawStops(*physics, plan, options);
+  const std::vector<Stop> stops = drawStops(physics, plan, options);
   std::vector<Reading> readings(stops.size());
   std::atomic<std::size_t> n_done = 0;
   control.parallel_for(stops.size(), [&](std::size_t i) {
     if (control.stop.stop_requested()) return;
-    readings[i] = readStop(*physics, stops[i]);
+    readings[i] = readStop(physics, stops[i]);
     control.progress(static_cast<double>(++n_done) / static_cast<double>(stops.size()));
   });
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The simulation was stopped.");
@@ -179,7 +178,7 @@ Result<Simulation> simulate(const Scene& scene, std::span<const PlannedPlace> pl
   Simulation simulation;
   simulation.table.metadata = simulation.samples.metadata = metadataOf(scene, options.seed);
   for (std::size_t i = 0; i < stops.size(); ++i) {
-    if (!readings[i].statistics) return tl::unexpected<Error>(noPoseError(*physics, stops[i]));
+    if (!readings[i].statistics) return tl::unexpected<Error>(noPoseError(physics, stops[i]));
     simulation.table.nodes.push_back(nodeOf(stops[i], *readings[i].statistics));
     for (Sample& sample : readings[i].samples) {
       simulation.samples.rows.push_back({stops[i].place->node, stops[i].place->visit, std::move(sample)});

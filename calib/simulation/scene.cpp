@@ -116,12 +116,10 @@ Result<Scene> sceneFromJson(const nlohmann::json& json, const std::string& name)
 }
 
 Result<Scene> readScene(const std::filesystem::path& path) {
-  const Result<std::string> text = readFile(path);
-  if (!text) return tl::unexpected<Error>(text.error());
+  FT_TRY(const std::string text, readFile(path));
   const std::string name = path.filename().string();
-  const Result<nlohmann::json> json = parseJson(*text, name, JsonComments::kSkipped);
-  if (!json) return tl::unexpected<Error>(json.error());
-  return sceneFromJson(*json, name);
+  FT_TRY(const nlohmann::json json, parseJson(text, name, JsonComments::kSkipped));
+  return sceneFromJson(json, name);
 }
 
 nlohmann::json toJson(const Scene& scene) {

@@ -49,9 +49,8 @@ TrackerSimulator& TrackerSimulator::operator=(TrackerSimulator&&) noexcept = def
 TrackerSimulator::~TrackerSimulator() = default;
 
 Result<TrackerSimulator> TrackerSimulator::make(const Scene& scene, std::uint64_t seed) {
-  Result<TrackerPhysics> physics = TrackerPhysics::make(scene, seed);
-  if (!physics) return tl::unexpected<Error>(physics.error());
-  return TrackerSimulator(std::unique_ptr<State>(new State{std::move(*physics), seed, {}}));
+  FT_TRY(TrackerPhysics physics, TrackerPhysics::make(scene, seed));
+  return TrackerSimulator(std::unique_ptr<State>(new State{std::move(physics), seed, {}}));
 }
 
 Sample TrackerSimulator::measure(const Pose& reference_from_sensor, double time_s, int sensor) {

@@ -47,8 +47,7 @@ std::optional<double> parseFinite(std::string_view text) {
 
 Result<CsvReader> CsvReader::open(std::istream& in, std::string name, char separator, bool is_comment_header) {
   CsvReader reader(in, std::move(name), separator);
-  const Result<void> header = reader.readHeader(is_comment_header);
-  if (!header) return tl::unexpected(header.error());
+  FT_TRY_VOID(reader.readHeader(is_comment_header));
   return reader;
 }
 
@@ -74,9 +73,8 @@ std::optional<CsvReader::MetadataLine> CsvReader::metadataLine(char mark) const 
 
 Result<void> CsvReader::readHeader(bool is_comment_header) {
   while (true) {
-    const Result<bool> more = lines_.next(line_);
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) {
+    FT_TRY(const bool more, lines_.next(line_));
+    if (!more) {
       return fail(ErrorCode::kBadInput,
                   name() + (line() == 0 ? " is empty" : " has no header row") + "; it needs a row of column names");
     }

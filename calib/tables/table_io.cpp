@@ -45,9 +45,8 @@ Result<NodeColumns> findNodeColumns(const CsvReader& reader) {
                                                                {&kSd, &columns.sd},
                                                                {&kCovariance, &columns.covariance}}};
   for (const auto& [names, group] : groups) {
-    const Result<Group> found = reader.group(*names);
-    if (!found) return tl::unexpected(found.error());
-    *group = *found;
+    FT_TRY(const Group found, reader.group(*names));
+    *group = found;
   }
   if (columns.covariance && !columns.sd) {
     return fail(ErrorCode::kBadInput, reader.name() + ", line " + std::to_string(reader.line()) +
@@ -221,11 +220,9 @@ struct SampleColumns {
 };
 
 Result<SampleColumns> findSampleColumns(const CsvReader& reader) {
-  const Result<std::vector<std::size_t>> required = reader.require(kSampleRequired);
-  if (!required) return tl::unexpected(required.error());
-  const Result<Group> rotation = reader.group(kRotation);
-  if (!rotation) return tl::unexpected(rotation.error());
-  return SampleColumns{*required, *rotation, reader.find("sensor"), reader.find("visit"), reader.find("status")};
+  FT_TRY(const std::vector<std::size_t> required, reader.require(kSampleRequired));
+  FT_TRY(const Group rotation, reader.group(kRotation));
+  return SampleColumns{required, rotation, reader.find("sensor"), reader.find("visit"), reader.find("status")};
 }
 
 /// Whether a field holds nothing usable although it is no mistake: blank, "nan" or a mark.
@@ -295,9 +292,8 @@ template <class Add>
 Result<TableMetadata> readRows(CsvReader& reader, const Add& add) {
   bool is_empty = true;
   while (true) {
-    const Result<bool> more = reader.next();
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
+    FT_TRY(const bool more, reader.next());
+    if (!more) break;
     is_empty = false;
     add();
     if (reader.error()) return tl::unexpected(*reader.error());
@@ -311,43 +307,38 @@ using Read = Result<TableReading<Table>> (*)(std::istream&, const std::string&);
 
 template <class Table>
 Result<TableReading<Table>> readPath(const std::filesystem::path& path, Read<Table> read) {
-  Result<std::ifstream> in = openForReading(path);
-  if (!in) return tl::unexpected(in.error());
-  return read(*in, path.filename().string());
+  FT_TRY(std::ifstream in, openForReading(path));
+  return read(in, path.filename().string());
 }
 
 }  // namespace
 
 Result<TableReading<CalibrationTable>> readNodeTable(std::istream& in, const std::string& name) {
-  Result<CsvReader> reader = CsvReader::open(in, name);
-  if (!reader) return tl::unexpected(reader.error());
-  const Result<NodeColumns> columns = findNodeColumns(*reader);
-  if (!columns) return tl::unexpected(columns.error());
+  FT_TRY(CsvReader reader, CsvReader::open(in, name));
+  FT_TRY(const NodeColumns columns, findNodeColumns(reader));
   TableReading<CalibrationTable> reading;
   NodeKeys keys;
-  const Result<TableMetadata> metadata = readRows(*reader, [&] {
-    Node node = readNode(*reader, *columns);
-    if (reader->error()) return;
-    keys.add(*reader, *columns, node);
+  const Result<TableMetadata> metadata = readRows(reader, [&] {
+    Node node = readNode(reader, columns);
+    if (reader.error()) return;
+    keys.add(reader, columns, node);
     reading.table.nodes.push_back(std::move(node));
   });
   if (!metadata) return tl::unexpected(metadata.error());
   reading.table.metadata = *metadata;
-  reading.notes = notesOn(*reader, nodeColumnNames(), columns->rotation.has_value());
+  reading.notes = notesOn(reader, nodeColumnNames(), columns.rotation.has_value());
   return reading;
 }
 
 Result<TableReading<SampleTable>> readSampleTable(std::istream& in, const std::string& name) {
-  Result<CsvReader> reader = CsvReader::open(in, name);
-  if (!reader) return tl::unexpected(reader.error());
-  const Result<SampleColumns> columns = findSampleColumns(*reader);
-  if (!columns) return tl::unexpected(columns.error());
+  FT_TRY(CsvReader reader, CsvReader::open(in, name));
+  FT_TRY(const SampleColumns columns, findSampleColumns(reader));
   TableReading<SampleTable> reading;
   const Result<TableMetadata> metadata =
-      readRows(*reader, [&] { reading.table.rows.push_back(readSampleRow(*reader, *columns)); });
+      readRows(reader, [&] { reading.table.rows.push_back(readSampleRow(reader, columns)); });
   if (!metadata) return tl::unexpected(metadata.error());
   reading.table.metadata = *metadata;
-  reading.notes = notesOn(*reader, kSampleKnown, columns->rotation.has_value());
+  reading.notes = notesOn(reader, kSampleKnown, columns.rotation.has_value());
   return reading;
 }
 

@@ -56,9 +56,8 @@ class LatticeBaker {
     double last_spacing_m = 0.0;
     double last_deviation_m = 0.0;
     for (int trial = 0; trial < kMostTrials; ++trial) {
-      auto parts = sampleLattice(model_, box_, spacing_m, false, control_);
-      if (!parts) return tl::unexpected(parts.error());
-      BakedLattice lattice(*std::move(parts));
+      FT_TRY(auto parts, sampleLattice(model_, box_, spacing_m, false, control_));
+      BakedLattice lattice(std::move(parts));
       double deviation_m = deviationOf(lattice, probes_);
       std::size_t n_points = probes_.p_m.size();
       if (deviation_m <= wanted_m_) {
@@ -152,9 +151,8 @@ class LatticeBaker {
     LatticeParts parts = lattice.parts();
     const bool with_uncertainty = !probes_.p_m.empty() && model_.uncertainty_m(probes_.p_m.front()).has_value();
     if (with_uncertainty) {
-      auto sampled = sampleLattice(model_, box_, parts.spacing_m, true, control_);
-      if (!sampled) return tl::unexpected(sampled.error());
-      parts = *std::move(sampled);
+      FT_TRY(auto sampled, sampleLattice(model_, box_, parts.spacing_m, true, control_));
+      parts = std::move(sampled);
     }
     markProbedCells(parts);
     parts.note = noteOf(parts, deviation_m, n_points);

@@ -29,13 +29,13 @@ class NothingHeldOut : public HoldOutFits<PositionModel> {
 };
 
 Result<std::unique_ptr<PositionModel>> fitNone(const FitData& data, const Settings&, const RunControl&) {
-  if (auto checked = checkPositions(data, "No correction"); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, "No correction"));
   return std::make_unique<NoPositionCorrection>();
 }
 
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutNone(const FitData& data, const Settings&,
                                                                 const RunControl&) {
-  if (auto checked = checkPositions(data, "No correction"); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, "No correction"));
   return std::make_unique<NothingHeldOut>(data.size());
 }
 

@@ -23,7 +23,7 @@ class ConstantErrorRotation : public ErrorRotationModel {
 
 Result<std::unique_ptr<OrientationModel>> fitConstant(const FitData& data, const Settings& settings,
                                                       const RunControl&) {
-  if (auto checked = checkOrientations(data, "Rigid orientation fit"); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkOrientations(data, "Rigid orientation fit"));
   const ErrorFrame frame = errorFrame(settings);
   return std::make_unique<ConstantErrorRotation>(frame, canonical(meanRotation(errorRotations(data, frame))));
 }

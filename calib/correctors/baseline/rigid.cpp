@@ -33,7 +33,7 @@ class RigidPosition : public PositionModel {
 };
 
 Result<std::unique_ptr<PositionModel>> fitRigidPosition(const FitData& data, const Settings&, const RunControl&) {
-  if (auto checked = checkPositions(data, "Rigid fit"); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, "Rigid fit"));
   const std::size_t n_places = mergePlaces(data).size();
   if (n_places < 3)
     return fail(ErrorCode::kTooFewNodes, "Rigid fit needs at least 3 places, got " + std::to_string(n_places));
@@ -68,9 +68,8 @@ class RigidHoldOut : public HoldOutFits<PositionModel> {
     const std::size_t n_places = placesLeft(places_, rows);
     if (n_places < 3)
       return fail(ErrorCode::kTooFewNodes, "Rigid fit needs at least 3 places, got " + std::to_string(n_places));
-    const auto true_from_tracked = poseWithout(rows);
-    if (!true_from_tracked) return tl::unexpected(true_from_tracked.error());
-    return std::make_unique<RigidPosition>(fold_from_data * *true_from_tracked, data_.dimension == 2);
+    FT_TRY(const auto true_from_tracked, poseWithout(rows));
+    return std::make_unique<RigidPosition>(fold_from_data * true_from_tracked, data_.dimension == 2);
   }
 
  private:
@@ -122,7 +121,7 @@ class RigidHoldOut : public HoldOutFits<PositionModel> {
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutRigid(const FitData& data, const Settings& settings,
                                                                  const RunControl& control) {
   // What keeps all rows from being fitted keeps a part of them from it too.
-  if (auto whole = fitRigidPosition(data, settings, control); !whole) return tl::unexpected(whole.error());
+  FT_TRY_VOID(fitRigidPosition(data, settings, control));
   return std::make_unique<RigidHoldOut>(data);
 }
 

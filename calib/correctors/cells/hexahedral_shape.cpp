@@ -115,12 +115,11 @@ std::string jumpNote(double jump_m) {
 Result<std::unique_ptr<PositionModel>> fitHexahedralShape(const FitData& data, const Settings& settings,
                                                           const RunControl&) {
   const std::string name = "Hexahedral shape functions";
-  const auto grid = placeGrid(data, name, "tetrahedral");
-  if (!grid) return tl::unexpected(grid.error());
+  FT_TRY(const auto grid, placeGrid(data, name, "tetrahedral"));
   const ShapeChoice choice{choiceSetting(settings, "map") == "isoparametric",
                            choiceSetting(settings, "axes") == "tracker" ? ShapeAxes::kTracker : ShapeAxes::kCell};
-  auto model = std::make_unique<HexahedralShapePosition>(HexahedralCells::of(*grid), errorVectors_m(grid->places),
-                                                         choice, std::string());
+  auto model = std::make_unique<HexahedralShapePosition>(HexahedralCells::of(grid), errorVectors_m(grid.places), choice,
+                                                         std::string());
   bool all_singular = true;
   for (std::size_t cell = 0; cell < model->cells().size(); ++cell)
     all_singular = all_singular && model->isSingular(cell);
@@ -129,8 +128,8 @@ Result<std::unique_ptr<PositionModel>> fitHexahedralShape(const FitData& data, c
                 name + " are singular in each of the " + std::to_string(model->cells().size()) + " cells; " +
                     (choice.axes == ShapeAxes::kTracker ? "axes=cell is not, where the cells enclose a volume"
                                                         : "cells that enclose a volume are needed"));
-  model->setNote(joinedNotes({gridNote(*grid), foldNote(model->cells(), grid->places),
-                              singularNote(*model, grid->places), jumpNote(model->largestJump_m())}));
+  model->setNote(joinedNotes({gridNote(grid), foldNote(model->cells(), grid.places), singularNote(*model, grid.places),
+                              jumpNote(model->largestJump_m())}));
   return model;
 }
 

@@ -10,12 +10,11 @@ namespace {
 Result<std::unique_ptr<PositionModel>> fitLocalBriggs(const FitData& data, const Settings& settings,
                                                       const RunControl&) {
   const WeightKind kind = boolSetting(settings, "as_published") ? WeightKind::kBriggsAsPublished : WeightKind::kBriggs;
-  auto grid = trackedGrid(data, settings, "Briggs's local interpolation");
-  if (!grid) return tl::unexpected(grid.error());
-  std::string note = joinedNotes({grid->note, kind == WeightKind::kBriggs
-                                                  ? std::string()
-                                                  : "Weights as published: they add up to 64 and more instead of 1."});
-  return makeLocalPosition(std::move(grid->cells), std::move(grid->v_m), weightRule(kind, settings), std::move(note));
+  FT_TRY(auto grid, trackedGrid(data, settings, "Briggs's local interpolation"));
+  std::string note = joinedNotes({grid.note, kind == WeightKind::kBriggs
+                                                 ? std::string()
+                                                 : "Weights as published: they add up to 64 and more instead of 1."});
+  return makeLocalPosition(std::move(grid.cells), std::move(grid.v_m), weightRule(kind, settings), std::move(note));
 }
 
 std::vector<Setting> briggsSettings() {

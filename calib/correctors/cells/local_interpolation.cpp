@@ -75,11 +75,10 @@ std::unique_ptr<PositionModel> makeLocalPosition(HexahedralCells cells, std::vec
 
 Result<std::unique_ptr<PositionModel>> fitLocalPosition(const FitData& data, const WeightRule& rule,
                                                         const std::string& name) {
-  const auto grid = placeGrid(data, name, "tetrahedral");
-  if (!grid) return tl::unexpected(grid.error());
-  HexahedralCells cells = HexahedralCells::of(*grid);
-  std::string note = joinedNotes({gridNote(*grid), foldNote(cells, grid->places), bumpNote(rule, cells)});
-  return makeLocalPosition(std::move(cells), errorVectors_m(grid->places), rule, std::move(note));
+  FT_TRY(const auto grid, placeGrid(data, name, "tetrahedral"));
+  HexahedralCells cells = HexahedralCells::of(grid);
+  std::string note = joinedNotes({gridNote(grid), foldNote(cells, grid.places), bumpNote(rule, cells)});
+  return makeLocalPosition(std::move(cells), errorVectors_m(grid.places), rule, std::move(note));
 }
 
 std::unique_ptr<PositionModel> loadLocalPosition(const JsonReader& parameters) {

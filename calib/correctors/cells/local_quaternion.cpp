@@ -53,14 +53,13 @@ class LocalErrorRotation : public ErrorRotationModel {
 Result<std::unique_ptr<OrientationModel>> fitLocalQuaternion(const FitData& data, const Settings& settings,
                                                              const RunControl&) {
   const std::string name = "Local mixture of rotations";
-  if (auto checked = checkOrientations(data, name); !checked) return tl::unexpected(checked.error());
-  const auto grid = placeGrid(data, name, "tetrahedral_quaternion");
-  if (!grid) return tl::unexpected(grid.error());
+  FT_TRY_VOID(checkOrientations(data, name));
+  FT_TRY(const auto grid, placeGrid(data, name, "tetrahedral_quaternion"));
   const ErrorFrame frame = errorFrame(settings);
   const WeightRule rule = weightRule(weightKind(choiceSetting(settings, "weight")), settings);
-  HexahedralCells cells = HexahedralCells::of(*grid);
-  std::string note = joinedNotes({gridNote(*grid), foldNote(cells, grid->places), bumpNote(rule, cells)});
-  return std::make_unique<LocalErrorRotation>(frame, std::move(cells), placeErrorRotations(data, grid->places, frame),
+  HexahedralCells cells = HexahedralCells::of(grid);
+  std::string note = joinedNotes({gridNote(grid), foldNote(cells, grid.places), bumpNote(rule, cells)});
+  return std::make_unique<LocalErrorRotation>(frame, std::move(cells), placeErrorRotations(data, grid.places, frame),
                                               rule, std::move(note));
 }
 

@@ -207,7 +207,7 @@ Result<void> checkVolume(const FitData& data, const std::string& method) {
 }
 
 Result<PlaceGrid> placeGrid(const FitData& data, const std::string& method, const std::string& otherwise) {
-  if (auto checked = checkVolume(data, method); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkVolume(data, method));
   if (data.index.empty())
     return fail(ErrorCode::kUnsupported, method + " needs places on a grid, and these " + std::to_string(data.size()) +
                                              " rows have no grid index and show none; " + otherwise +
@@ -224,9 +224,8 @@ Result<PlaceGrid> placeGrid(Places places, const std::string& method) {
       kMostNodesPerPlace * static_cast<double>(places.size()))
     return tl::unexpected(noWholeCell(places.size(), grid.counts, method));
   Lattice lattice(grid.counts);
-  auto settled = settle(places, lattice, method);
-  if (!settled) return tl::unexpected(settled.error());
-  grid.places = *std::move(settled);
+  FT_TRY(auto settled, settle(places, lattice, method));
+  grid.places = std::move(settled);
   addCells(grid, lattice);
   if (grid.cells.empty()) return tl::unexpected(noWholeCell(grid.places.size(), grid.counts, method));
   return grid;

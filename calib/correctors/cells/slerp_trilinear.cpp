@@ -46,13 +46,12 @@ class SlerpErrorRotation : public ErrorRotationModel {
 Result<std::unique_ptr<OrientationModel>> fitSlerpTrilinear(const FitData& data, const Settings& settings,
                                                             const RunControl&) {
   const std::string name = "Trilinear slerp";
-  if (auto checked = checkOrientations(data, name); !checked) return tl::unexpected(checked.error());
-  const auto grid = placeGrid(data, name, "tetrahedral_quaternion");
-  if (!grid) return tl::unexpected(grid.error());
+  FT_TRY_VOID(checkOrientations(data, name));
+  FT_TRY(const auto grid, placeGrid(data, name, "tetrahedral_quaternion"));
   const ErrorFrame frame = errorFrame(settings);
-  HexahedralCells cells = HexahedralCells::of(*grid);
-  std::string note = joinedNotes({gridNote(*grid), foldNote(cells, grid->places)});
-  return std::make_unique<SlerpErrorRotation>(frame, std::move(cells), placeErrorRotations(data, grid->places, frame),
+  HexahedralCells cells = HexahedralCells::of(grid);
+  std::string note = joinedNotes({gridNote(grid), foldNote(cells, grid.places)});
+  return std::make_unique<SlerpErrorRotation>(frame, std::move(cells), placeErrorRotations(data, grid.places, frame),
                                               std::move(note));
 }
 

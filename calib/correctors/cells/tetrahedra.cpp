@@ -38,22 +38,20 @@ std::vector<Corners> splitCells(const std::vector<GridCell>& cells, bool into_si
 }
 
 Result<Tetrahedra> gridTetrahedra(const FitData& data, bool into_six, const std::string& method) {
-  auto grid = placeGrid(data, method, "split=delaunay");
-  if (!grid) return tl::unexpected(grid.error());
+  FT_TRY(auto grid, placeGrid(data, method, "split=delaunay"));
   Tetrahedra tetrahedra;
-  tetrahedra.note = gridNote(*grid);
-  tetrahedra.mesh = TetrahedralMesh(grid->places.p_tracked_m, splitCells(grid->cells, into_six));
-  tetrahedra.places = std::move(grid->places);
+  tetrahedra.note = gridNote(grid);
+  tetrahedra.mesh = TetrahedralMesh(grid.places.p_tracked_m, splitCells(grid.cells, into_six));
+  tetrahedra.places = std::move(grid.places);
   return tetrahedra;
 }
 
 Result<Tetrahedra> delaunayOf(const FitData& data, const std::string& method) {
-  if (auto checked = checkVolume(data, method); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkVolume(data, method));
   Tetrahedra tetrahedra;
   tetrahedra.places = mergePlaces(data);
-  auto cells = delaunayTetrahedra(tetrahedra.places.p_tracked_m, method);
-  if (!cells) return tl::unexpected(cells.error());
-  tetrahedra.mesh = TetrahedralMesh(tetrahedra.places.p_tracked_m, *cells);
+  FT_TRY(auto cells, delaunayTetrahedra(tetrahedra.places.p_tracked_m, method));
+  tetrahedra.mesh = TetrahedralMesh(tetrahedra.places.p_tracked_m, cells);
   return tetrahedra;
 }
 

@@ -43,13 +43,12 @@ class TetrahedralErrorRotation : public ErrorRotationModel {
 Result<std::unique_ptr<OrientationModel>> fitTetrahedralQuaternion(const FitData& data, const Settings& settings,
                                                                    const RunControl&) {
   const std::string name = "Tetrahedral mixture of rotations";
-  if (auto checked = checkOrientations(data, name); !checked) return tl::unexpected(checked.error());
-  auto tetrahedra = tetrahedraOf(data, choiceSetting(settings, "split"), name);
-  if (!tetrahedra) return tl::unexpected(tetrahedra.error());
+  FT_TRY_VOID(checkOrientations(data, name));
+  FT_TRY(auto tetrahedra, tetrahedraOf(data, choiceSetting(settings, "split"), name));
   const ErrorFrame frame = errorFrame(settings);
-  std::vector<Eigen::Quaterniond> q_error = placeErrorRotations(data, tetrahedra->places, frame);
-  return std::make_unique<TetrahedralErrorRotation>(frame, std::move(tetrahedra->mesh), std::move(q_error),
-                                                    std::move(tetrahedra->note));
+  std::vector<Eigen::Quaterniond> q_error = placeErrorRotations(data, tetrahedra.places, frame);
+  return std::make_unique<TetrahedralErrorRotation>(frame, std::move(tetrahedra.mesh), std::move(q_error),
+                                                    std::move(tetrahedra.note));
 }
 
 std::unique_ptr<OrientationModel> loadTetrahedralQuaternion(const JsonReader& parameters) {

@@ -215,12 +215,11 @@ Result<TrackedGrid> resampledGrid(const Places& places, RegridMethod regrid, con
     counts += (counts.empty() ? "" : " x ") + std::to_string(axis_m.size());
   }
   std::size_t n_missing = 0;
-  auto grid = placeGrid(regridded(places, levels_m, options, n_missing), method);
-  if (!grid) return tl::unexpected(grid.error());
+  FT_TRY(auto grid, placeGrid(regridded(places, levels_m, options, n_missing), method));
   std::string note = "The error vectors were resampled to a grid of " + counts + " in tracked space (" +
                      regridMethodId(regrid) + ")" +
                      (n_missing == 0 ? "." : ", of which " + std::to_string(n_missing) + " nodes have no support.");
-  return gridOn(meanLevels_m(*grid), *grid, errorVectors_m(grid->places), joinedNotes({note, gridNote(*grid)}));
+  return gridOn(meanLevels_m(grid), grid, errorVectors_m(grid.places), joinedNotes({note, gridNote(grid)}));
 }
 
 }  // namespace
@@ -235,13 +234,12 @@ std::vector<Setting> resampleSettings() {
 }
 
 Result<TrackedGrid> trackedGrid(const FitData& data, const Settings& settings, const std::string& method) {
-  if (auto checked = checkVolume(data, method); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkVolume(data, method));
   const Places places = mergePlaces(data);
   const std::string& resample = choiceSetting(settings, "resample");
   if (resample == "none") return ownGrid(places, method);
-  const auto regrid = findRegridMethod(resample);
-  if (!regrid) return tl::unexpected(regrid.error());
-  return resampledGrid(places, *regrid, settings, method);
+  FT_TRY(const auto regrid, findRegridMethod(resample));
+  return resampledGrid(places, regrid, settings, method);
 }
 
 }  // namespace fieldtrue::correctors

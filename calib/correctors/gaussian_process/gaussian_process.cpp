@@ -191,13 +191,12 @@ std::unique_ptr<PositionModel> modelOf(const GaussianProcessSystem& system, std:
 
 Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, const Settings& settings,
                                                           const RunControl& control) {
-  const auto system = buildSystem(data, settings, control);
-  if (!system) return tl::unexpected(system.error());
-  const auto projection = TailProjection::of(system->frame.tail(system->places.p_tracked_m));
-  if (!projection) return notSolvable(*system);
-  const auto solution = solveRadial(*projection, matrixOf(*system), displacementMatrix(system->places));
-  if (!solution) return notSolvable(*system);
-  return modelOf(*system, {}, *solution);
+  FT_TRY(const auto system, buildSystem(data, settings, control));
+  const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
+  if (!projection) return notSolvable(system);
+  const auto solution = solveRadial(*projection, matrixOf(system), displacementMatrix(system.places));
+  if (!solution) return notSolvable(system);
+  return modelOf(system, {}, *solution);
 }
 
 class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
@@ -207,11 +206,10 @@ class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
 
   Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
                                                  const Pose& fold_from_data) const override {
-    const auto out = placesOfRows(system_.places, rows);
-    if (!out) return tl::unexpected(out.error());
-    auto solution = solutions_.without(*out, fold_from_data);
-    if (!solution) return tl::unexpected(degenerateTail(kName, system_.places.size() - out->size()));
-    return modelOf(system_, *out, *std::move(solution));
+    FT_TRY(const auto out, placesOfRows(system_.places, rows));
+    auto solution = solutions_.without(out, fold_from_data);
+    if (!solution) return tl::unexpected(degenerateTail(kName, system_.places.size() - out.size()));
+    return modelOf(system_, out, *std::move(solution));
   }
 
  private:
@@ -222,14 +220,13 @@ class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const FitData& data,
                                                                            const Settings& settings,
                                                                            const RunControl& control) {
-  auto system = buildSystem(data, settings, control);
-  if (!system) return tl::unexpected(system.error());
-  const auto projection = TailProjection::of(system->frame.tail(system->places.p_tracked_m));
-  if (!projection) return notSolvable(*system);
-  auto solutions = RadialHoldOut::of(*projection, matrixOf(*system), displacementMatrix(system->places),
-                                     positionMatrix(system->places));
-  if (!solutions) return notSolvable(*system);
-  return std::make_unique<GaussianProcessHoldOut>(*std::move(system), *std::move(solutions));
+  FT_TRY(auto system, buildSystem(data, settings, control));
+  const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
+  if (!projection) return notSolvable(system);
+  auto solutions = RadialHoldOut::of(*projection, matrixOf(system), displacementMatrix(system.places),
+                                     positionMatrix(system.places));
+  if (!solutions) return notSolvable(system);
+  return std::make_unique<GaussianProcessHoldOut>(std::move(system), *std::move(solutions));
 }
 
 std::unique_ptr<PositionModel> loadGaussianProcess(const JsonReader& parameters) {

@@ -102,11 +102,10 @@ std::string noteOf(const FitData& data, const HarmonicFit& fit) {
 
 Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Settings& settings,
                                                    const RunControl& control) {
-  if (auto checked = checkPositions(data, kName); !checked) return tl::unexpected(checked.error());
-  if (auto checked = checkSpread(data); !checked) return tl::unexpected(checked.error());
-  const auto memory = MemoryBooking::book(std::string(kName) + " on " + std::to_string(data.size()) + " rows",
-                                          memory_bytes(data.size()), control.stop);
-  if (!memory) return tl::unexpected(memory.error());
+  FT_TRY_VOID(checkPositions(data, kName));
+  FT_TRY_VOID(checkSpread(data));
+  FT_TRY_VOID(MemoryBooking::book(std::string(kName) + " on " + std::to_string(data.size()) + " rows",
+                                  memory_bytes(data.size()), control.stop));
   TrackedBox box{data.p_tracked_m.front(), data.p_tracked_m.front()};
   for (const Eigen::Vector3d& p_m : data.p_tracked_m) {
     box.low_m = box.low_m.cwiseMin(p_m);
@@ -117,9 +116,8 @@ Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Se
   box.high_m.array() += margin_m;
   const HarmonicOptions options{numberSetting(settings, "least_gain"),
                                 static_cast<std::size_t>(integerSetting(settings, "most_sources"))};
-  auto fit = fitHarmonicField(data, options, control);
-  if (!fit) return tl::unexpected(fit.error());
-  return std::make_unique<HarmonicField>(fit->field, fit->field_from_truth, box, fit->posterior, noteOf(data, *fit));
+  FT_TRY(auto fit, fitHarmonicField(data, options, control));
+  return std::make_unique<HarmonicField>(fit.field, fit.field_from_truth, box, fit.posterior, noteOf(data, fit));
 }
 
 FieldPosterior posteriorFrom(const JsonReader& parameters, const std::vector<FieldSource>& sources) {

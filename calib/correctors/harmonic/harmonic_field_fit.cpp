@@ -360,9 +360,8 @@ class Fitter {
 }  // namespace
 
 Result<HarmonicFit> fitHarmonicField(const FitData& data, const HarmonicOptions& options, const RunControl& control) {
-  const auto field_from_truth = fitRigid(data.p_true_m, data.p_tracked_m);
-  if (!field_from_truth) return tl::unexpected(field_from_truth.error());
-  return Fitter(data, options, control, *field_from_truth).run();
+  FT_TRY(const auto field_from_truth, fitRigid(data.p_true_m, data.p_tracked_m));
+  return Fitter(data, options, control, field_from_truth).run();
 }
 
 }  // namespace fieldtrue::correctors

@@ -45,16 +45,14 @@ void addSentence(std::string& note, const std::string& sentence) {
 
 Result<std::unique_ptr<PositionModel>> fitHmq(const FitData& data, const Settings& settings,
                                               const RunControl& control) {
-  const auto problem = makeHmqProblem(data, settings, control);
-  if (!problem) return tl::unexpected(problem.error());
-  const Places& places = problem->places;
-  auto field = MultiquadricField::fit(problem->name, places.p_tracked_m, places.node, places.index, truthOf(places),
-                                      problem->r2.r2_m2, control);
-  if (!field) return tl::unexpected(field.error());
+  FT_TRY(const auto problem, makeHmqProblem(data, settings, control));
+  const Places& places = problem.places;
+  FT_TRY(auto field, MultiquadricField::fit(problem.name, places.p_tracked_m, places.node, places.index,
+                                            truthOf(places), problem.r2.r2_m2, control));
   std::string note = planeNote(data, "nothing is claimed off it");
-  addSentence(note, problem->r2.note);
-  if (problem->precision == HmqPrecision::kSingle) addSentence(note, precisionNote(*field));
-  return std::make_unique<HmqPosition>(*std::move(field), problem->precision, note);
+  addSentence(note, problem.r2.note);
+  if (problem.precision == HmqPrecision::kSingle) addSentence(note, precisionNote(field));
+  return std::make_unique<HmqPosition>(std::move(field), problem.precision, note);
 }
 
 std::unique_ptr<PositionModel> loadHmq(const JsonReader& parameters) { return HmqPosition::fromJson(parameters); }
@@ -78,10 +76,9 @@ Eigen::MatrixXd truthOf(const Places& places) {
 Result<HmqProblem> makeHmqProblem(const FitData& data, const Settings& settings, const RunControl& control) {
   HmqProblem problem;
   problem.name = "Hardy's multiquadric";
-  if (auto checked = checkPositions(data, problem.name); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, problem.name));
   problem.places = mergePlaces(data);
-  if (auto checked = checkHmqSpread(problem.name, problem.places.size(), data.dimension); !checked)
-    return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkHmqSpread(problem.name, problem.places.size(), data.dimension));
   auto memory =
       bookSquareMatrices(problem.name, multiquadricMatrices(problem.places.size()), problem.places.size(), control);
   if (!memory) return tl::unexpected(memory.error());

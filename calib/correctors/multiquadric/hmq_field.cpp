@@ -20,16 +20,13 @@ Result<MultiquadricField> MultiquadricField::fit(const std::string& name, std::s
                                                  std::span<const int> node, std::span<const std::array<int, 3>> index,
                                                  const Eigen::MatrixXd& values, double r2_m2,
                                                  const RunControl& control) {
-  if (auto checked = checkMultiquadricCenters(name, centers_m, node, index, control); !checked)
-    return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkMultiquadricCenters(name, centers_m, node, index, control));
   if (values.cols() == 3)
     if (const auto alpha = solveMultiquadricMixed(centers_m, r2_m2, values))
       return MultiquadricField(centers_m, *alpha, r2_m2);
-  const auto system = MultiquadricSystem::factorise(name, centers_m, node, index, r2_m2, control);
-  if (!system) return tl::unexpected(system.error());
-  const auto alpha = system->solve(values);
-  if (!alpha) return tl::unexpected(alpha.error());
-  return MultiquadricField(centers_m, *alpha, r2_m2);
+  FT_TRY(const auto system, MultiquadricSystem::factorise(name, centers_m, node, index, r2_m2, control));
+  FT_TRY(const auto alpha, system.solve(values));
+  return MultiquadricField(centers_m, alpha, r2_m2);
 }
 
 MultiquadricField::MultiquadricField(std::span<const Eigen::Vector3d> centers_m, const Eigen::MatrixXd& alpha,

@@ -24,7 +24,7 @@ class HmqHoldOut : public HoldOutFits<PositionModel> {
   Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
                                                  const Pose& fold_from_data) const override {
     const Split split = splitPlaces(rows);
-    if (auto checked = checkRest(rows, split); !checked) return tl::unexpected(checked.error());
+    FT_TRY_VOID(checkRest(rows, split));
     if (!split.is_whole_places) return refit(rows, fold_from_data);
     const Eigen::MatrixXd alpha = downdated(split);
     std::vector<Eigen::Vector3d> centers_m;
@@ -103,10 +103,9 @@ class HmqHoldOut : public HoldOutFits<PositionModel> {
       rest.node.push_back(data_.node[row]);
     }
     const Places places = mergePlaces(rest);
-    auto field = MultiquadricField::fit(problem_.name, places.p_tracked_m, places.node, places.index, truthOf(places),
-                                        problem_.r2.r2_m2, {});
-    if (!field) return tl::unexpected(field.error());
-    return std::make_unique<HmqPosition>(*std::move(field), problem_.precision, problem_.r2.note);
+    FT_TRY(auto field, MultiquadricField::fit(problem_.name, places.p_tracked_m, places.node, places.index,
+                                              truthOf(places), problem_.r2.r2_m2, {}));
+    return std::make_unique<HmqPosition>(std::move(field), problem_.precision, problem_.r2.note);
   }
 
   FitData data_;
@@ -119,17 +118,14 @@ class HmqHoldOut : public HoldOutFits<PositionModel> {
 
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutHmq(const FitData& data, const Settings& settings,
                                                                const RunControl& control) {
-  const auto problem = makeHmqProblem(data, settings, control);
-  if (!problem) return tl::unexpected(problem.error());
-  const Places& places = problem->places;
-  auto system = MultiquadricSystem::factorise(problem->name, places.p_tracked_m, places.node, places.index,
-                                              problem->r2.r2_m2, control);
-  if (!system) return tl::unexpected(system.error());
+  FT_TRY(const auto problem, makeHmqProblem(data, settings, control));
+  const Places& places = problem.places;
+  FT_TRY(auto system, MultiquadricSystem::factorise(problem.name, places.p_tracked_m, places.node, places.index,
+                                                    problem.r2.r2_m2, control));
   Eigen::MatrixXd values(static_cast<Eigen::Index>(places.size()), 4);
   values << truthOf(places), Eigen::VectorXd::Ones(values.rows());
-  auto alpha = system->solve(values);
-  if (!alpha) return tl::unexpected(alpha.error());
-  return std::make_unique<HmqHoldOut>(data, *problem, std::move(*system).takeInverse(), *std::move(alpha));
+  FT_TRY(auto alpha, system.solve(values));
+  return std::make_unique<HmqHoldOut>(data, problem, std::move(system).takeInverse(), std::move(alpha));
 }
 
 }  // namespace fieldtrue::correctors

@@ -78,24 +78,21 @@ Eigen::MatrixXd placeElements(const Places& places, const std::vector<Eigen::Qua
 Result<std::unique_ptr<OrientationModel>> fitHmqMatrix(const FitData& data, const Settings& settings,
                                                        const RunControl& control) {
   const std::string name = "Multiquadric of rotations";
-  if (auto checked = checkOrientations(data, name); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkOrientations(data, name));
   const ErrorFrame frame = errorFrame(settings);
   const Places places = mergePlaces(data);
   if (data.dimension < 2)
     return fail(ErrorCode::kDegenerate, name + " needs places that span a plane or a volume, and these " +
                                             std::to_string(places.size()) + " lie " +
                                             (data.dimension == 1 ? "on one line" : "at one point"));
-  const auto memory = bookSquareMatrices(name, multiquadricMatrices(places.size()), places.size(), control);
-  if (!memory) return tl::unexpected(memory.error());
+  FT_TRY_VOID(bookSquareMatrices(name, multiquadricMatrices(places.size()), places.size(), control));
   const Eigen::MatrixXd elements = placeElements(places, errorRotations(data, frame));
-  const auto r2 = chooseR2(name, places, elements, settings, textInDegrees, control);
-  if (!r2) return tl::unexpected(r2.error());
-  auto field =
-      MultiquadricField::fit(name, places.p_tracked_m, places.node, places.index, elements, r2->r2_m2, control);
-  if (!field) return tl::unexpected(field.error());
+  FT_TRY(const auto r2, chooseR2(name, places, elements, settings, textInDegrees, control));
+  FT_TRY(auto field,
+         MultiquadricField::fit(name, places.p_tracked_m, places.node, places.index, elements, r2.r2_m2, control));
   std::string note = planeNote(data, "nothing is claimed off it");
-  note += (note.empty() || r2->note.empty() ? "" : " ") + r2->note;
-  return std::make_unique<HmqErrorRotation>(frame, *std::move(field), note);
+  note += (note.empty() || r2.note.empty() ? "" : " ") + r2.note;
+  return std::make_unique<HmqErrorRotation>(frame, std::move(field), note);
 }
 
 std::unique_ptr<OrientationModel> loadHmqMatrix(const JsonReader& parameters) {

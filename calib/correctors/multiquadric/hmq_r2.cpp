@@ -42,10 +42,9 @@ class R2Search {
       serialFor(kGridValues, body);
     else
       control_.parallel_for(kGridValues, body);
-    for (std::size_t i = 0; i < kGridValues; ++i)
-      if (auto kept = remember(gridPower(i), grid[i]); !kept) return tl::unexpected(kept.error());
+    for (std::size_t i = 0; i < kGridValues; ++i) FT_TRY_VOID(remember(gridPower(i), grid[i]));
     if (!std::isfinite(best_rms_)) return tl::unexpected(grid[0].error());
-    if (auto refined = refine(); !refined) return tl::unexpected(refined.error());
+    FT_TRY_VOID(refine());
     *rms = best_rms_;
     return roundedR2_cm2(best_power_);
   }
@@ -81,9 +80,8 @@ class R2Search {
     for (int step = 0; step < kRefinements; ++step) {
       for (std::size_t side = 0; side < 2; ++side) {
         if (known[side]) continue;
-        const auto tried = remember(power[side], residual(power[side]));
-        if (!tried) return tl::unexpected(tried.error());
-        rms[side] = *tried;
+        FT_TRY(const auto tried, remember(power[side], residual(power[side])));
+        rms[side] = tried;
         known[side] = true;
       }
       control_.progress(0.5 + 0.5 * (step + 1) / kRefinements);
@@ -114,12 +112,11 @@ class R2Search {
 
 Result<double> leaveOneOutRms(const std::string& name, const Places& places, const Eigen::MatrixXd& values,
                               double r2_m2, const RunControl& control) {
-  auto system = MultiquadricSystem::factorise(name, places.p_tracked_m, places.node, places.index, r2_m2, control);
-  if (!system) return tl::unexpected(system.error());
-  const auto alpha = system->solve(values);
-  if (!alpha) return tl::unexpected(alpha.error());
-  const Eigen::VectorXd inverse_diagonal = std::move(*system).takeInverseDiagonal();
-  const Eigen::ArrayXd squares = alpha->rowwise().squaredNorm().array() / inverse_diagonal.array().square();
+  FT_TRY(auto system,
+         MultiquadricSystem::factorise(name, places.p_tracked_m, places.node, places.index, r2_m2, control));
+  FT_TRY(const auto alpha, system.solve(values));
+  const Eigen::VectorXd inverse_diagonal = std::move(system).takeInverseDiagonal();
+  const Eigen::ArrayXd squares = alpha.rowwise().squaredNorm().array() / inverse_diagonal.array().square();
   return std::sqrt(squares.mean());
 }
 
@@ -132,13 +129,12 @@ Result<ChosenR2> chooseR2(const std::string& name, const Places& places, const E
     return fail(ErrorCode::kTooFewNodes,
                 name + " needs 3 places to choose R squared by leaving each out, got " + std::to_string(places.size()));
   double rms = 0.0;
-  const auto best_cm2 = R2Search(name, places, values, control).best_cm2(&rms);
-  if (!best_cm2) return tl::unexpected(best_cm2.error());
+  FT_TRY(const auto best_cm2, R2Search(name, places, values, control).best_cm2(&rms));
   std::string note =
-      "R squared = " + formatNumber(*best_cm2) + " cm2, chosen by leave-one-out (RMS " + residual_text(rms) + ")";
-  if (*best_cm2 <= 10.0 || *best_cm2 >= 1000.0)
-    note += *best_cm2 <= 10.0 ? ", the lower end of its range" : ", the upper end of its range";
-  return ChosenR2{kM2PerCm2 * *best_cm2, note + "."};
+      "R squared = " + formatNumber(best_cm2) + " cm2, chosen by leave-one-out (RMS " + residual_text(rms) + ")";
+  if (best_cm2 <= 10.0 || best_cm2 >= 1000.0)
+    note += best_cm2 <= 10.0 ? ", the lower end of its range" : ", the upper end of its range";
+  return ChosenR2{kM2PerCm2 * best_cm2, note + "."};
 }
 
 double multiquadricMatrices(std::size_t n_places) {

@@ -98,8 +98,7 @@ Result<MultiquadricSystem> MultiquadricSystem::factorise(const std::string& name
                                                          std::span<const std::array<int, 3>> index, double r2_m2,
                                                          const RunControl& control) {
   FT_CHECK(r2_m2 > 0.0);
-  if (auto checked = checkMultiquadricCenters(name, centers_m, node, index, control); !checked)
-    return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkMultiquadricCenters(name, centers_m, node, index, control));
   MultiquadricSystem system;
   system.name_ = name;
   system.r2_m2_ = r2_m2;

@@ -118,11 +118,11 @@ Result<Trained> train(const TrainingSet& set, const Settings& settings, double u
 
 Result<std::unique_ptr<PositionModel>> fitNeuralNetwork(const FitData& data, const Settings& settings,
                                                         const RunControl& control) {
-  if (auto checked = checkPositions(data, kName); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, kName));
   const Places places = mergePlaces(data);
   const int n_weights =
       FeedForwardNetwork::weightCount(static_cast<int>(integerSetting(settings, "hidden")), kSecondHidden);
-  if (auto checked = checkPlaces(data, places, n_weights); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPlaces(data, places, n_weights));
   const Scaling tracked = Scaling::of(places.p_tracked_m);
   const Scaling truth = Scaling::of(places.p_true_m);
   TrainingSet set;
@@ -130,11 +130,10 @@ Result<std::unique_ptr<PositionModel>> fitNeuralNetwork(const FitData& data, con
     set.input.push_back(tracked.scaled(places.p_tracked_m[i]));
     set.target.push_back(truth.scaled(places.p_true_m[i]));
   }
-  auto trained = train(set, settings, truth.half_m, control);
-  if (!trained) return tl::unexpected(trained.error());
+  FT_TRY(auto trained, train(set, settings, truth.half_m, control));
   const std::string plane = planeNote(data, "nothing is claimed off it");
-  const std::string note = plane + (plane.empty() || trained->note.empty() ? "" : " ") + trained->note;
-  return std::make_unique<NeuralNetworkPosition>(std::move(trained->network), tracked, truth, note);
+  const std::string note = plane + (plane.empty() || trained.note.empty() ? "" : " ") + trained.note;
+  return std::make_unique<NeuralNetworkPosition>(std::move(trained.network), tracked, truth, note);
 }
 
 std::unique_ptr<PositionModel> loadNeuralNetwork(const JsonReader& parameters) {

@@ -149,9 +149,8 @@ Result<std::unique_ptr<PositionModel>> modelOf(const FitData& data, std::optiona
                                                const RunControl& control) {
   std::optional<FitData> left = scene ? undone(data, *scene) : data;
   if (!left) return fail(ErrorCode::kDegenerate, kName + ": " + kNoPlace);
-  auto remainder = gaussianProcessPosition().fit(*left, settingsOfRemainder(settings), control);
-  if (!remainder) return tl::unexpected(remainder.error());
-  return std::make_unique<PhysicsResidual>(std::move(scene), *std::move(remainder), note);
+  FT_TRY(auto remainder, gaussianProcessPosition().fit(*left, settingsOfRemainder(settings), control));
+  return std::make_unique<PhysicsResidual>(std::move(scene), std::move(remainder), note);
 }
 
 /// Mean square of what a model leaves at rows it was not fitted to; a reading it cannot place is left as it is.
@@ -233,16 +232,14 @@ std::string noteOf(const identify::PhysicsFit& fit) {
 
 Result<std::unique_ptr<PositionModel>> fitPhysicsResidual(const FitData& data, const Settings& settings,
                                                           const RunControl& control) {
-  const auto places = smoothFitPlaces(data, kName);
-  if (!places) return tl::unexpected(places.error());
-  auto fit = findScene(data, *places, settings, control);
-  if (!fit) return tl::unexpected(fit.error());
-  if (fit->positions && !undone(data, *fit->positions)) {
-    fit->positions.reset();
-    fit->why_none = kNoPlace;
+  FT_TRY(const auto places, smoothFitPlaces(data, kName));
+  FT_TRY(auto fit, findScene(data, places, settings, control));
+  if (fit.positions && !undone(data, *fit.positions)) {
+    fit.positions.reset();
+    fit.why_none = kNoPlace;
   }
-  const std::string note = noteOf(*fit);
-  return modelOf(data, std::move(fit->positions), note, settings, control);
+  const std::string note = noteOf(fit);
+  return modelOf(data, std::move(fit.positions), note, settings, control);
 }
 
 identify::ScenePositions sceneFrom(const JsonReader& json) {

@@ -10,22 +10,20 @@ namespace {
 const std::string kLabel = "Polynomial";
 
 Result<PolynomialDegree> degreeOf(const FitData& data, const Settings& settings, const RunControl& control) {
-  if (auto checked = checkPositions(data, kLabel); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, kLabel));
   return degreeFor({kLabel, data, displacements_m(data)}, settings, control);
 }
 
 Result<std::unique_ptr<PositionModel>> fitPolynomial(const FitData& data, const Settings& settings,
                                                      const RunControl& control) {
-  const auto degree = degreeOf(data, settings, control);
-  if (!degree) return tl::unexpected(degree.error());
-  return fitPolynomialPosition(data, *degree, degreeName(kLabel, degree->degree));
+  FT_TRY(const auto degree, degreeOf(data, settings, control));
+  return fitPolynomialPosition(data, degree, degreeName(kLabel, degree.degree));
 }
 
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomial(const FitData& data, const Settings& settings,
                                                                       const RunControl& control) {
-  const auto degree = degreeOf(data, settings, control);
-  if (!degree) return tl::unexpected(degree.error());
-  return holdOutPolynomialPosition(data, *degree, degreeName(kLabel, degree->degree));
+  FT_TRY(const auto degree, degreeOf(data, settings, control));
+  return holdOutPolynomialPosition(data, degree, degreeName(kLabel, degree.degree));
 }
 
 }  // namespace

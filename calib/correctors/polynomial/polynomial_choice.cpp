@@ -83,13 +83,12 @@ Result<PolynomialDegree> degreeFor(const PolynomialTask& task, const Settings& s
 
 Result<ChosenPolynomial> fitChosenPolynomial(const PolynomialTask& task, const Settings& settings,
                                              const RunControl& control) {
-  const auto degree = degreeFor(task, settings, control);
-  if (!degree) return tl::unexpected(degree.error());
+  FT_TRY(const auto degree, degreeFor(task, settings, control));
   const PolynomialProblem problem{
-      degreeName(task.label, degree->degree), task.data.p_tracked_m, task.values, degree->degree, task.data.dimension,
+      degreeName(task.label, degree.degree), task.data.p_tracked_m, task.values, degree.degree, task.data.dimension,
       mergePlaces(task.data).size()};
   return PolynomialField::fit(problem).map([&](PolynomialField field) {
-    return ChosenPolynomial{std::move(field), degree->note};
+    return ChosenPolynomial{std::move(field), degree.note};
   });
 }
 

@@ -67,7 +67,7 @@ Result<void> checkPoles(const FitData& data, const std::vector<Eigen::Vector3d>&
 
 Result<std::unique_ptr<OrientationModel>> fitPolynomialEuler(const FitData& data, const Settings& settings,
                                                              const RunControl& control) {
-  if (auto checked = checkOrientations(data, kLabel); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkOrientations(data, kLabel));
   const ErrorFrame frame = errorFrame(settings);
   const std::vector<Eigen::Quaterniond> q_error = errorRotations(data, frame);
   const bool direct = std::all_of(q_error.begin(), q_error.end(), [](const Eigen::Quaterniond& q) {
@@ -75,7 +75,7 @@ Result<std::unique_ptr<OrientationModel>> fitPolynomialEuler(const FitData& data
   });
   const Eigen::Quaterniond q_reference = direct ? Eigen::Quaterniond::Identity() : canonical(meanRotation(q_error));
   std::vector<Eigen::Vector3d> angles_rad = eulerAngles_rad(q_error, q_reference);
-  if (auto checked = checkPoles(data, angles_rad); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPoles(data, angles_rad));
   return fitChosenPolynomial({kLabel, data, std::move(angles_rad)}, settings, control)
       .map([&](ChosenPolynomial angles) -> std::unique_ptr<OrientationModel> {
         return std::make_unique<EulerErrorRotation>(frame, q_reference, std::move(angles));

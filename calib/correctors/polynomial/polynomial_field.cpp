@@ -101,7 +101,7 @@ Eigen::MatrixXd PolynomialField::designMatrix(std::span<const Eigen::Vector3d> p
 Result<PolynomialField> PolynomialField::fit(const PolynomialProblem& problem) {
   FT_CHECK(problem.value.size() == problem.p_m.size());
   FT_CHECK(problem.degree >= 0 && problem.degree <= kMaxDegree);
-  if (auto checked = checkProblem(problem); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkProblem(problem));
 
   PolynomialField field;
   field.dimension_ = problem.dimension;

@@ -39,9 +39,8 @@ Eigen::Matrix<double, 3, 6> jointly(const ValueChange& change) {
 }  // namespace
 
 Result<PolynomialHoldOut> PolynomialHoldOut::make(const PolynomialProblem& problem, Places places) {
-  auto field = PolynomialField::fit(problem);
-  if (!field) return tl::unexpected(field.error());
-  PolynomialHoldOut fits(*std::move(field));
+  FT_TRY(auto field, PolynomialField::fit(problem));
+  PolynomialHoldOut fits(std::move(field));
   fits.places_ = std::move(places);
   fits.name_ = problem.name;
   fits.p_m_.assign(problem.p_m.begin(), problem.p_m.end());

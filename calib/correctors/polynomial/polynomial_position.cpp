@@ -69,7 +69,7 @@ std::vector<Eigen::Vector3d> displacements_m(const FitData& data) {
 
 Result<std::unique_ptr<PositionModel>> fitPolynomialPosition(const FitData& data, const PolynomialDegree& degree,
                                                              const std::string& name) {
-  if (auto checked = checkPositions(data, name); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, name));
   const std::vector<Eigen::Vector3d> d_m = displacements_m(data);
   const PolynomialProblem problem{name, data.p_tracked_m, d_m, degree.degree, data.dimension, mergePlaces(data).size()};
   return PolynomialField::fit(problem).map([&](PolynomialField field) -> std::unique_ptr<PositionModel> {
@@ -80,7 +80,7 @@ Result<std::unique_ptr<PositionModel>> fitPolynomialPosition(const FitData& data
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomialPosition(const FitData& data,
                                                                               const PolynomialDegree& degree,
                                                                               const std::string& name) {
-  if (auto checked = checkPositions(data, name); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, name));
   const std::vector<Eigen::Vector3d> d_m = displacements_m(data);
   Places places = mergePlaces(data);
   const PolynomialProblem problem{name, data.p_tracked_m, d_m, degree.degree, data.dimension, places.size()};

@@ -42,7 +42,7 @@ class PolynomialErrorRotation : public ErrorRotationModel {
 Result<std::unique_ptr<OrientationModel>> fitPolynomialQuaternion(const FitData& data, const Settings& settings,
                                                                   const RunControl& control) {
   const std::string label = "Quaternion polynomial";
-  if (auto checked = checkOrientations(data, label); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkOrientations(data, label));
   const ErrorFrame frame = errorFrame(settings);
   const std::vector<Eigen::Quaterniond> q_error = errorRotations(data, frame);
   const bool direct = std::all_of(q_error.begin(), q_error.end(), [](const Eigen::Quaterniond& q) {

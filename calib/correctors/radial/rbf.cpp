@@ -102,13 +102,12 @@ Result<RbfSystem> buildSystem(const FitData& data, const Settings& settings, con
   if (shape) *shape *= 1e-3 / unit_m;
   const auto smoothing = autoNumber(settings, "smoothing");
   const std::vector<std::size_t> used = spreadPlaces(system.places.p_tracked_m, kTuningPlaces);
-  const auto choice = choose(system, weights, used, shape, smoothing, control);
-  if (!choice) return tl::unexpected(choice.error());
-  system.c2 = choice->shape * choice->shape;
+  FT_TRY(const auto choice, choose(system, weights, used, shape, smoothing, control));
+  system.c2 = choice.shape * choice.shape;
   system.matrix = kernelMatrix(system.kernel, system.c2, system.frame, system.places.p_tracked_m);
-  system.matrix.diagonal() += choice->smoothing * weights;
+  system.matrix.diagonal() += choice.smoothing * weights;
   const bool is_chosen = (hasShape(system.kernel) && !shape) || !smoothing;
-  system.note = noteOf(data, *choice, system.kernel, unit_m, used.size(), is_chosen);
+  system.note = noteOf(data, choice, system.kernel, unit_m, used.size(), is_chosen);
   return system;
 }
 
@@ -129,13 +128,12 @@ std::unique_ptr<PositionModel> modelOf(const RbfSystem& system, std::span<const 
 
 Result<std::unique_ptr<PositionModel>> fitRbf(const FitData& data, const Settings& settings,
                                               const RunControl& control) {
-  const auto system = buildSystem(data, settings, control);
-  if (!system) return tl::unexpected(system.error());
-  const auto projection = TailProjection::of(system->frame.tail(system->places.p_tracked_m));
-  if (!projection) return notSolvable(*system);
-  const auto solution = solveRadial(*projection, system->matrix, displacementMatrix(system->places));
-  if (!solution) return notSolvable(*system);
-  return modelOf(*system, system->places.p_tracked_m, *solution);
+  FT_TRY(const auto system, buildSystem(data, settings, control));
+  const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
+  if (!projection) return notSolvable(system);
+  const auto solution = solveRadial(*projection, system.matrix, displacementMatrix(system.places));
+  if (!solution) return notSolvable(system);
+  return modelOf(system, system.places.p_tracked_m, *solution);
 }
 
 class RbfHoldOut : public HoldOutFits<PositionModel> {
@@ -146,11 +144,10 @@ class RbfHoldOut : public HoldOutFits<PositionModel> {
 
   Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
                                                  const Pose& fold_from_data) const override {
-    const auto out = placesOfRows(system_.places, rows);
-    if (!out) return tl::unexpected(out.error());
-    const auto solution = solutions_.without(*out, fold_from_data);
-    if (!solution) return tl::unexpected(degenerateTail(kName, system_.places.size() - out->size()));
-    return modelOf(system_, withoutPlaces(system_.places.p_tracked_m, *out), *solution);
+    FT_TRY(const auto out, placesOfRows(system_.places, rows));
+    const auto solution = solutions_.without(out, fold_from_data);
+    if (!solution) return tl::unexpected(degenerateTail(kName, system_.places.size() - out.size()));
+    return modelOf(system_, withoutPlaces(system_.places.p_tracked_m, out), *solution);
   }
 
  private:
@@ -160,14 +157,13 @@ class RbfHoldOut : public HoldOutFits<PositionModel> {
 
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutRbf(const FitData& data, const Settings& settings,
                                                                const RunControl& control) {
-  auto system = buildSystem(data, settings, control);
-  if (!system) return tl::unexpected(system.error());
-  const auto projection = TailProjection::of(system->frame.tail(system->places.p_tracked_m));
-  if (!projection) return notSolvable(*system);
-  auto solutions = RadialHoldOut::of(*projection, system->matrix, displacementMatrix(system->places),
-                                     positionMatrix(system->places));
-  if (!solutions) return notSolvable(*system);
-  return std::make_unique<RbfHoldOut>(*std::move(system), *std::move(solutions));
+  FT_TRY(auto system, buildSystem(data, settings, control));
+  const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
+  if (!projection) return notSolvable(system);
+  auto solutions =
+      RadialHoldOut::of(*projection, system.matrix, displacementMatrix(system.places), positionMatrix(system.places));
+  if (!solutions) return notSolvable(system);
+  return std::make_unique<RbfHoldOut>(std::move(system), *std::move(solutions));
 }
 
 std::unique_ptr<PositionModel> loadRbf(const JsonReader& parameters) {

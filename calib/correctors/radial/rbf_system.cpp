@@ -208,7 +208,7 @@ Eigen::MatrixXd positionMatrix(const Places& places) {
 }
 
 Result<Places> smoothFitPlaces(const FitData& data, const std::string& name) {
-  if (auto checked = checkPositions(data, name); !checked) return tl::unexpected(checked.error());
+  FT_TRY_VOID(checkPositions(data, name));
   Places places = mergePlaces(data);
   if (data.dimension < 2)
     return fail(ErrorCode::kDegenerate, name + " needs places that span a plane or a volume, and these " +

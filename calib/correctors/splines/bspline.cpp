@@ -83,30 +83,28 @@ std::string noteOf(const FitData& data, const SplineLattice& lattice, double smo
 }
 
 Result<BsplineSystem> buildSystem(const FitData& data, const Settings& settings, const RunControl& control) {
-  auto places = smoothFitPlaces(data, kName);
-  if (!places) return tl::unexpected(places.error());
-  const FieldFrame frame = frameOf(data, *places);
+  FT_TRY(auto places, smoothFitPlaces(data, kName));
+  const FieldFrame frame = frameOf(data, places);
   // Before the lattice: places at one point have no extent to cut into spans.
-  if (!TailProjection::of(frame.tail(places->p_tracked_m)))
-    return tl::unexpected(degenerateTail(kName, places->size()));
-  SplineLattice lattice = latticeOf(frame, *places, settings);
+  if (!TailProjection::of(frame.tail(places.p_tracked_m))) return tl::unexpected(degenerateTail(kName, places.size()));
+  SplineLattice lattice = latticeOf(frame, places, settings);
   if (lattice.size() > 3 * kMostFunctions)
     return fail(ErrorCode::kUnsupported, kName + ": " + std::to_string(lattice.size()) +
                                              " functions are too many; at most " + std::to_string(3 * kMostFunctions) +
                                              " can be solved for, so use fewer spans");
-  auto spline = SmoothingSpline::of({std::move(lattice), places->p_tracked_m, displacementMatrix(*places),
-                                     positionMatrix(*places), weightsOf(data, *places)});
-  if (!spline) return tl::unexpected(degenerateTail(kName, places->size()));
+  auto spline = SmoothingSpline::of({std::move(lattice), places.p_tracked_m, displacementMatrix(places),
+                                     positionMatrix(places), weightsOf(data, places)});
+  if (!spline) return tl::unexpected(degenerateTail(kName, places.size()));
   const SettingValue& wanted = settings.at("smoothing");
   const auto smoothing =
       std::holds_alternative<double>(wanted) ? std::optional(std::get<double>(wanted)) : spline->choose(control);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
   if (!smoothing || !spline->solve(*smoothing))
-    return fail(ErrorCode::kDegenerate, kName + ": " + std::to_string(places->size()) +
+    return fail(ErrorCode::kDegenerate, kName + ": " + std::to_string(places.size()) +
                                             " places are too few for its lattice at this smoothing; use fewer spans or "
                                             "more smoothing");
   const std::string note = noteOf(data, spline->lattice(), *smoothing, spline->degreesOfFreedom());
-  return BsplineSystem{*std::move(places), *std::move(spline), note};
+  return BsplineSystem{std::move(places), *std::move(spline), note};
 }
 
 Result<std::unique_ptr<PositionModel>> modelOf(const BsplineSystem& system, std::span<const std::size_t> out,
@@ -118,9 +116,8 @@ Result<std::unique_ptr<PositionModel>> modelOf(const BsplineSystem& system, std:
 
 Result<std::unique_ptr<PositionModel>> fitBspline(const FitData& data, const Settings& settings,
                                                   const RunControl& control) {
-  const auto system = buildSystem(data, settings, control);
-  if (!system) return tl::unexpected(system.error());
-  return modelOf(*system, {}, Pose{});
+  FT_TRY(const auto system, buildSystem(data, settings, control));
+  return modelOf(system, {}, Pose{});
 }
 
 class BsplineHoldOut : public HoldOutFits<PositionModel> {
@@ -129,9 +126,8 @@ class BsplineHoldOut : public HoldOutFits<PositionModel> {
 
   Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
                                                  const Pose& fold_from_data) const override {
-    const auto out = placesOfRows(system_.places, rows);
-    if (!out) return tl::unexpected(out.error());
-    return modelOf(system_, *out, fold_from_data);
+    FT_TRY(const auto out, placesOfRows(system_.places, rows));
+    return modelOf(system_, out, fold_from_data);
   }
 
  private:
@@ -140,9 +136,8 @@ class BsplineHoldOut : public HoldOutFits<PositionModel> {
 
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutBspline(const FitData& data, const Settings& settings,
                                                                    const RunControl& control) {
-  auto system = buildSystem(data, settings, control);
-  if (!system) return tl::unexpected(system.error());
-  return std::make_unique<BsplineHoldOut>(*std::move(system));
+  FT_TRY(auto system, buildSystem(data, settings, control));
+  return std::make_unique<BsplineHoldOut>(std::move(system));
 }
 
 std::unique_ptr<PositionModel> loadBspline(const JsonReader& parameters) {
