@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "calib/core/declare.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -114,6 +115,22 @@ class SettingsTest : public QObject {
     const auto half = resolveSettings("poly", whole, {{"degree", "2.5"}});
     QVERIFY(!half);
     FT_VERIFY_MATCH(holdsAll(half.error().message, {"degree must be auto or a whole number from 1 to 6, got '2.5'"}));
+  }
+
+  void vectorsAndWhatMayBeLeftOut() {
+    const Setting axis =
+        declare::vector3("axis_m", {-1.0, 1.0, "m"}, {0.0, 0.0, 1.0}, "Along it.").plausibly(-0.5, 0.5);
+    const Setting metal = declare::number("conductivity_s_per_m", {1.0, 1e8, "S/m"}, nullptr, "Null: ideal.");
+    const Setting tensor = declare::matrix3("tensor_m3", {}, "Row by row.");
+    QVERIFY(accepts(axis, {0.5, 0.0, -1.0}) && !accepts(axis, {0.5, 0.0, -1.1}) && !accepts(axis, {0.5, 0.0}));
+    QVERIFY(!accepts(axis, nullptr) && accepts(metal, nullptr) && accepts(metal, 5.8e7) && !accepts(metal, 0.5));
+    QVERIFY(accepts(tensor, {1, 2, 3, 2, 4, 5, 3, 5, 6}) && !accepts(tensor, {1, 2, 3, 9, 4, 5, 3, 5, 6}));
+    QVERIFY(valueOf(axis, " 0.5  0 -1") == SettingValue(std::vector<double>{0.5, 0.0, -1.0}));
+    QVERIFY(!valueOf(axis, "0.5 0") && !valueOf(axis, "0.5 0 up") && !valueOf(axis, "0.5 0 2"));
+    QCOMPARE(textOf(SettingValue(std::vector<double>{0.5, 0.0, -1.0})), std::string("0.5 0 -1"));
+    QCOMPARE(textOf(SettingValue(nullptr)), std::string());
+    QCOMPARE(neededFor(axis), std::string("three numbers from -1 to 1 [m]"));
+    QVERIFY(axis.hasPlausibleRange() && !metal.hasPlausibleRange());
   }
 
   void refusesValues_data() {
