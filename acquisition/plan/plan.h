@@ -37,8 +37,8 @@ struct Plan {
   std::uint64_t seed = 1;
   int orientations = 1;  ///< Visits at other sensor orientations: 1 = only identity.
   int reseat = 1;        ///< Visits of each place at the same orientation.
-  double pipe_base_m =
-      0.0;  ///< Height (true z) of the lowest level's pipe foot: pipe length of level k = z(k) - pipe_base_m.
+  /// Height (true z) of the lowest level's pipe foot: pipe length of level k = z(k) - pipe_base_m.
+  double pipe_base_m = 0.0;
   std::vector<PlannedPlace> explicit_places;  ///< Used instead of the grid when not empty.
 };
 

@@ -88,8 +88,8 @@ FastrakRecord recordOfPose(int station, char error, const Pose& tracker_from_sen
 
 /// Status texts of samples that carry no error letter of the tracker's own.
 inline constexpr const char* kStatusMissing = "missing";  ///< The record holds the marker of a missing reading.
-inline constexpr const char* kStatusDamaged =
-    "damaged";  ///< The numbers cannot be a pose: bytes were changed on the line.
+/// The numbers cannot be a pose: bytes were changed on the line.
+inline constexpr const char* kStatusDamaged = "damaged";
 inline constexpr const char* kStatusFlipped = "flipped";  ///< Mirrored through the transmitter: wrong hemisphere.
 
 /// The record as a sample: sensor = station - 1, orientation from the quaternion, else the cosines, else the angles.

@@ -12,8 +12,8 @@ namespace fieldtrue::calibration {
 /// reference_from_sensor = reference_from_tracker * tracker_from_sensor * sensor_from_mount.
 struct Alignment {
   Pose reference_from_tracker;
-  Eigen::Quaterniond sensor_from_mount =
-      Eigen::Quaterniond::Identity();  ///< Constant rotation of the sensor in its holder.
+  /// Constant rotation of the sensor in its holder.
+  Eigen::Quaterniond sensor_from_mount = Eigen::Quaterniond::Identity();
 };
 
 enum class AlignMode { kNone, kRigid };

@@ -31,8 +31,8 @@ struct Rejection {
 /// Mean pose of a still sensor and how well it is known.
 struct NodeStatistics {
   Pose mean;
-  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Of a single accepted sample (n - 1), variances floored
-                                                            ///< by quantum^2/12, with 1 um where no quantum is known.
+  /// Of a single accepted sample (n - 1), variances floored by quantum^2/12, with 1 um where no quantum is known.
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
   double sd_rot_rad = 0.0;       ///< RMS rotation angle of a single accepted sample about the mean, at least 1e-6.
   double autocorrelation = 0.0;  ///< Lag 1, pooled over the axes, in sample order; 1 when all samples are the same.
   double n_effective = 1.0;      ///< n (1 - rho) / (1 + rho), in [1, n].

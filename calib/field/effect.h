@@ -26,8 +26,8 @@ struct SensorSetting {
 /// What effects change at one reading, to first order: contributions of several effects add.
 struct EffectResponse {
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();  ///< Actual minus stated sensor position, tracker frame.
-  Eigen::Vector3d turn_rad =
-      Eigen::Vector3d::Zero();  ///< Actual from stated orientation, rotation vector, tracker frame.
+  /// Actual from stated orientation, rotation vector, tracker frame.
+  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
   /// Change of the 3x3 field matrix at the sensor (rows: field components in the tracker frame, columns: transmitter
   /// coils) in units in which the undisturbed field is G(p; C = 1) [1/m^3]. A receiver's own error E, which turns S
   /// into (1 + E) S, is R E R^T G here.

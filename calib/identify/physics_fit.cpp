@@ -108,28 +108,30 @@ Eigen::Vector3d moveOf_m(const field::PhysicalEffect& effect, const field::Senso
          Eigen::Map<const Eigen::Matrix<double, 9, 1>>(response.field_per_m3.data());
 }
 
-/// A setting as a position alone tells it.
-field::SensorSetting reduced(const field::SensorSetting& setting, const Eigen::Quaterniond& tracker_from_sensor) {
-  field::SensorSetting told;
-  told.tracker_from_reference = setting.tracker_from_reference;
-  told.tracker_from_sensor = {setting.tracker_from_sensor.position_m, tracker_from_sensor};
-  return told;
+/// The setting with the mean orientation, without grid index and time: what is known when only a position is.
+field::SensorSetting atMeanOrientation(const field::SensorSetting& setting,
+                                       const Eigen::Quaterniond& tracker_from_sensor) {
+  field::SensorSetting mean;
+  mean.tracker_from_reference = setting.tracker_from_reference;
+  mean.tracker_from_sensor = {setting.tracker_from_sensor.position_m, tracker_from_sensor};
+  return mean;
 }
 
-/// Whether an effect acts through the field alone, and by where the sensor is: what moves the sensor off its stated
-/// place is the rig's error and not the tracker's.
-bool isToldByPosition(const field::PhysicalEffect& effect, std::span<const field::SensorSetting> settings,
-                      const Eigen::Quaterniond& tracker_from_sensor) {
-  constexpr double kMostUntold = 0.1;
+/// Whether an effect is a function of position: it acts through the field, and the displacement it causes changes by at
+/// most a tenth when the orientation, index and time of the sensor do. What moves the sensor off its stated place is
+/// the rig's error and not the tracker's.
+bool dependsOnPositionOnly(const field::PhysicalEffect& effect, std::span<const field::SensorSetting> settings,
+                           const Eigen::Quaterniond& tracker_from_sensor) {
+  constexpr double kLargestShare = 0.1;
   double sum_m2 = 0.0;
-  double untold_m2 = 0.0;
+  double other_m2 = 0.0;
   for (const field::SensorSetting& setting : settings) {
     if (!effect.at(setting).shift_m.isZero()) return false;
     const Eigen::Vector3d move_m = moveOf_m(effect, setting);
     sum_m2 += move_m.squaredNorm();
-    untold_m2 += (move_m - moveOf_m(effect, reduced(setting, tracker_from_sensor))).squaredNorm();
+    other_m2 += (move_m - moveOf_m(effect, atMeanOrientation(setting, tracker_from_sensor))).squaredNorm();
   }
-  return std::isfinite(sum_m2) && sum_m2 > 0.0 && untold_m2 <= kMostUntold * kMostUntold * sum_m2;
+  return std::isfinite(sum_m2) && sum_m2 > 0.0 && other_m2 <= kLargestShare * kLargestShare * sum_m2;
 }
 
 std::vector<Eigen::Quaterniond> orientationsOf(std::span<const field::SensorSetting> settings) {
@@ -142,16 +144,16 @@ simulation::EffectInstance instanceOf(const GapTerm& term) {
   return {term.effect->id, term.fit->describe(term.searched, term.linear).parameters};
 }
 
-/// The terms of a model that a position tells.
-std::vector<std::size_t> toldTerms(const GapModel& model, std::span<const field::SensorSetting> settings) {
+/// The terms of a model that are functions of position.
+std::vector<std::size_t> positionTerms(const GapModel& model, std::span<const field::SensorSetting> settings) {
   const Eigen::Quaterniond tracker_from_sensor = meanRotation(orientationsOf(settings));
-  std::vector<std::size_t> told;
+  std::vector<std::size_t> terms;
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const simulation::EffectInstance instance = instanceOf(model.terms[t]);
     const auto effect = effects::makeEffect(instance.id, instance.parameters);
-    if (effect && isToldByPosition(**effect, settings, tracker_from_sensor)) told.push_back(t);
+    if (effect && dependsOnPositionOnly(**effect, settings, tracker_from_sensor)) terms.push_back(t);
   }
-  return told;
+  return terms;
 }
 
 Result<ScenePositions> positionsOf(const GapPhysics& physics, const GapModel& model,
@@ -214,13 +216,13 @@ Result<PhysicsFit> fitPhysics(const CalibrationTable& table, const PhysicsFitOpt
   const GapModel& model = selection.model.model;
   PhysicsFit fit;
   if (model.terms.empty()) return noPhysics(std::move(fit), "no known effect stands out of the noise");
-  const std::vector<std::size_t> told = toldTerms(model, search.physics().settings(model.alignment));
+  const std::vector<std::size_t> terms = positionTerms(model, search.physics().settings(model.alignment));
   for (std::size_t t = 0; t < model.terms.size(); ++t)
-    (std::count(told.begin(), told.end(), t) > 0 ? fit.named : fit.left_out).push_back(model.terms[t].effect->id);
-  if (told.empty())
-    return noPhysics(std::move(fit), "what stands out is an error of the rig, or is not told by a position alone");
-  auto positions = positionsOf(search.physics(), model, told);
-  auto scenes = refitted(search, model, told, options.fold_of_node, control);
+    (std::count(terms.begin(), terms.end(), t) > 0 ? fit.named : fit.left_out).push_back(model.terms[t].effect->id);
+  if (terms.empty())
+    return noPhysics(std::move(fit), "what stands out is an error of the rig, or depends on more than the position");
+  auto positions = positionsOf(search.physics(), model, terms);
+  auto scenes = refitted(search, model, terms, options.fold_of_node, control);
   if (!positions || !scenes || !explainsEveryReading(*positions, *rows))
     return noPhysics(std::move(fit), "the fitted scene has no place for some of the readings");
   fit.positions = *std::move(positions);

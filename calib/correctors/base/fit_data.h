@@ -17,10 +17,10 @@ struct FitData {
   std::vector<Eigen::Quaterniond> q_true;     ///< Same length as q_tracked.
   std::vector<int> node;                      ///< Place of each row, for messages and for grouping visits.
   std::vector<std::array<int, 3>> index;      ///< Grid index of each row; empty when the places are scattered.
-  std::vector<Eigen::Matrix3d> noise_m2;      ///< Covariance of each row's mean tracked position, tracker frame; empty
-                                              ///< when the table states none.
-  double jig_sd_m = 0.0;                      ///< SD of placing, per axis: noise of p_true_m; 0 = not stated.
-  int dimension = 3;                          ///< Spread of the true positions: 3 volume, 2 one plane, 1 line, 0 point.
+  /// Covariance of each row's mean tracked position, tracker frame; empty when the table states none.
+  std::vector<Eigen::Matrix3d> noise_m2;
+  double jig_sd_m = 0.0;  ///< SD of placing, per axis: noise of p_true_m; 0 = not stated.
+  int dimension = 3;      ///< Spread of the true positions: 3 volume, 2 one plane, 1 line, 0 point.
 
   std::size_t size() const { return p_tracked_m.size(); }
   bool hasOrientation() const { return !q_tracked.empty(); }

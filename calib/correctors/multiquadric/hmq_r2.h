@@ -11,7 +11,7 @@
 
 namespace fieldtrue::correctors {
 
-/// R squared of a multiquadric, and how it was come by.
+/// R squared of a multiquadric, and how it was chosen.
 struct ChosenR2 {
   double r2_m2 = 0.0;
   std::string note;  ///< One sentence where the data chose it.
