@@ -6,7 +6,7 @@
 #include "app/cli_values.h"
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/resampled_table.h"
-#include "calib/evaluation/noise_floor.h"
+#include "calib/evaluation/base/noise_floor.h"
 #include "calib/tables/table_writer.h"
 
 /// resample: brings the errors of scattered places to a grid in tracked space.

@@ -5,13 +5,13 @@
 #include <set>
 
 #include "calib/correctors/method_label.h"
+#include "calib/evaluation/base/noise_floor.h"
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/held_out.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/limits.h"
-#include "calib/evaluation/noise_floor.h"
 #include "calib/evaluation/place_scores.h"
-#include "calib/evaluation/resampling.h"
 #include "calib/evaluation/surroundings.h"
 #include "calib/evaluation/verdict.h"
 #include "calib/tables/true_box.h"

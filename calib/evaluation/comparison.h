@@ -12,10 +12,10 @@
 #include "calib/core/error.h"
 #include "calib/core/place_name.h"
 #include "calib/core/run_control.h"
-#include "calib/evaluation/coverage.h"
 #include "calib/evaluation/error_stats.h"
-#include "calib/evaluation/fold_back.h"
-#include "calib/evaluation/orientation_dependence.h"
+#include "calib/evaluation/orientation/orientation_dependence.h"
+#include "calib/evaluation/region/coverage.h"
+#include "calib/evaluation/region/fold_back.h"
 
 namespace fieldtrue::evaluation {
 

@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "calib/core/statistics.h"
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/comparison.h"
-#include "calib/evaluation/resampling.h"
 
 namespace fieldtrue::evaluation {
 

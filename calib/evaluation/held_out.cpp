@@ -6,9 +6,9 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/core/place_name.h"
+#include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/in_sample.h"
-#include "calib/evaluation/progress_meter.h"
 
 namespace fieldtrue::evaluation {
 namespace {

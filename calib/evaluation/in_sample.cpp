@@ -4,9 +4,9 @@
 #include <chrono>
 
 #include "calib/calibration/alignment.h"
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
-#include "calib/evaluation/resampling.h"
 
 namespace fieldtrue::evaluation {
 namespace {

@@ -8,11 +8,11 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/core/statistics.h"
+#include "calib/evaluation/base/progress_meter.h"
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/held_out.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
-#include "calib/evaluation/progress_meter.h"
-#include "calib/evaluation/resampling.h"
 
 namespace fieldtrue::evaluation {
 namespace {

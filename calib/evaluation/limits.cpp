@@ -8,11 +8,11 @@
 
 #include "calib/core/convex_hull.h"
 #include "calib/core/spacing.h"
-#include "calib/evaluation/figures.h"
+#include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
-#include "calib/evaluation/region_lattice.h"
-#include "calib/evaluation/resampling.h"
+#include "calib/evaluation/region/region_lattice.h"
 #include "calib/evaluation/verdict.h"
 
 namespace fieldtrue::evaluation {

@@ -5,10 +5,10 @@
 #include "calib/core/spacing.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/regrid/regrid_error.h"
-#include "calib/evaluation/figures.h"
+#include "calib/evaluation/base/figures.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/limits.h"
-#include "calib/evaluation/region_lattice.h"
+#include "calib/evaluation/region/region_lattice.h"
 #include "calib/evaluation/verdict.h"
 
 namespace fieldtrue::evaluation {

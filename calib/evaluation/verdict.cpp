@@ -5,8 +5,8 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/correctors/method_label.h"
-#include "calib/evaluation/figures.h"
-#include "calib/evaluation/resampling.h"
+#include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/resampling.h"
 
 namespace fieldtrue::evaluation {
 namespace {

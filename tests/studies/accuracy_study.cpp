@@ -10,7 +10,7 @@
 #include "calib/core/statistics.h"
 #include "calib/correctors/automatic_choice.h"
 #include "calib/correctors/base/method.h"
-#include "calib/evaluation/noise_floor.h"
+#include "calib/evaluation/base/noise_floor.h"
 #include "tests/studies/rooms.h"
 #include "tests/studies/table2.h"
 #include "tests/studies/workers.h"

@@ -9,8 +9,8 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/comparison.h"
-#include "calib/evaluation/resampling.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "tests/studies/rooms.h"

@@ -1,4 +1,4 @@
-#include "calib/evaluation/coverage.h"
+#include "calib/evaluation/region/coverage.h"
 
 #include <QTest>
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-#include "calib/evaluation/fold_back.h"
+#include "calib/evaluation/region/fold_back.h"
 
 #include <QTest>
 #include <nlohmann/json.hpp>

@@ -3,10 +3,10 @@
 #include <numeric>
 #include <random>
 
+#include "calib/evaluation/base/noise_floor.h"
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/error_stats.h"
-#include "calib/evaluation/noise_floor.h"
-#include "calib/evaluation/resampling.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 

@@ -1,4 +1,4 @@
-#include "calib/evaluation/orientation_dependence.h"
+#include "calib/evaluation/orientation/orientation_dependence.h"
 
 #include <QTest>
 #include <functional>

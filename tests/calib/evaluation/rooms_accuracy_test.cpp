@@ -7,7 +7,7 @@
 #include "calib/core/settings.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
-#include "calib/evaluation/noise_floor.h"
+#include "calib/evaluation/base/noise_floor.h"
 #include "tests/studies/rooms.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"

@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/limits.h"
-#include "calib/evaluation/resampling.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
 #include "tests/support/test_main.h"

@@ -1,4 +1,4 @@
-#include "calib/evaluation/orientation_rows.h"
+#include "calib/evaluation/orientation/orientation_rows.h"
 
 #include <algorithm>
 #include <map>

@@ -1,4 +1,4 @@
-#include "calib/evaluation/figures.h"
+#include "calib/evaluation/base/figures.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "calib/evaluation/orientation_models.h"
+#include "calib/evaluation/orientation/orientation_models.h"
 
 namespace fieldtrue::evaluation {
 

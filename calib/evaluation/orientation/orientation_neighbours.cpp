@@ -1,4 +1,4 @@
-#include "calib/evaluation/orientation_neighbours.h"
+#include "calib/evaluation/orientation/orientation_neighbours.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -7,10 +7,10 @@
 #include <numbers>
 
 #include "calib/core/spacing.h"
-#include "calib/evaluation/orientation_models.h"
-#include "calib/evaluation/orientation_rows.h"
-#include "calib/evaluation/region_lattice.h"
-#include "calib/evaluation/resampling.h"
+#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/orientation/orientation_models.h"
+#include "calib/evaluation/orientation/orientation_rows.h"
+#include "calib/evaluation/region/region_lattice.h"
 
 namespace fieldtrue::evaluation {
 namespace {

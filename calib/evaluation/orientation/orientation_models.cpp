@@ -1,4 +1,4 @@
-#include "calib/evaluation/orientation_models.h"
+#include "calib/evaluation/orientation/orientation_models.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -7,8 +7,8 @@
 #include <limits>
 #include <numeric>
 
-#include "calib/evaluation/orientation_rows.h"
-#include "calib/evaluation/resampling.h"
+#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/orientation/orientation_rows.h"
 
 namespace fieldtrue::evaluation {
 namespace {

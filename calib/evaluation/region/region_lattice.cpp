@@ -1,4 +1,4 @@
-#include "calib/evaluation/region_lattice.h"
+#include "calib/evaluation/region/region_lattice.h"
 
 #include <algorithm>
 #include <cmath>

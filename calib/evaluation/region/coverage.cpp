@@ -1,4 +1,4 @@
-#include "calib/evaluation/coverage.h"
+#include "calib/evaluation/region/coverage.h"
 
 #include <algorithm>
 #include <array>
@@ -16,8 +16,8 @@
 #include "calib/core/spacing.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/evaluation/figures.h"
-#include "calib/evaluation/region_lattice.h"
+#include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/region/region_lattice.h"
 
 namespace fieldtrue::evaluation {
 namespace {

@@ -1,12 +1,12 @@
-#include "calib/evaluation/orientation_dependence.h"
+#include "calib/evaluation/orientation/orientation_dependence.h"
 
 #include <nlohmann/json.hpp>
 
-#include "calib/evaluation/figures.h"
-#include "calib/evaluation/orientation_models.h"
-#include "calib/evaluation/orientation_neighbours.h"
-#include "calib/evaluation/orientation_rows.h"
-#include "calib/evaluation/resampling.h"
+#include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/orientation/orientation_models.h"
+#include "calib/evaluation/orientation/orientation_neighbours.h"
+#include "calib/evaluation/orientation/orientation_rows.h"
 
 namespace fieldtrue::evaluation {
 namespace {

@@ -1,4 +1,4 @@
-#include "calib/evaluation/noise_floor.h"
+#include "calib/evaluation/base/noise_floor.h"
 
 #include <cmath>
 #include <map>

@@ -1,4 +1,4 @@
-#include "calib/evaluation/resampling.h"
+#include "calib/evaluation/base/resampling.h"
 
 #include <algorithm>
 #include <cmath>

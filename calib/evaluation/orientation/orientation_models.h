@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "calib/core/run_control.h"
-#include "calib/evaluation/orientation_rows.h"
+#include "calib/evaluation/orientation/orientation_rows.h"
 
 namespace fieldtrue::evaluation {
 

@@ -1,4 +1,4 @@
-#include "calib/evaluation/fold_back.h"
+#include "calib/evaluation/region/fold_back.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -11,8 +11,8 @@
 #include "calib/core/number_text.h"
 #include "calib/core/place_name.h"
 #include "calib/correctors/base/fit_checks.h"
-#include "calib/evaluation/figures.h"
-#include "calib/evaluation/region_lattice.h"
+#include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/region/region_lattice.h"
 
 namespace fieldtrue::evaluation {
 namespace {
