@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""ctest's output, with what was skipped and why before its closing lines.
+"""ctest's output, with what was skipped and why, and what passed only when run again, before its closing lines.
 
 ctest ... | skips.py BUILD/Testing/Temporary/LastTest.log [LIST]
 
@@ -32,9 +32,10 @@ def allowed(list_path):
 
 
 def pass_on(lines):
-    """Prints the lines up to ctest's closing ones; those, and the tests that ctest calls skipped."""
+    """Prints the lines up to ctest's closing ones; those, the tests that ctest calls skipped, and those that failed once."""
     closing = []
     skipped_tests = []
+    failed_tests = []
     for line in lines:
         if closing or re.match(r"\d+% tests passed", line):
             closing.append(line)
@@ -43,13 +44,15 @@ def pass_on(lines):
         sys.stdout.flush()
         if skipped := re.match(r" *\d+/\d+ Test +#\d+: (\S+) .*\*\*\*Skipped", line):
             skipped_tests.append(skipped.group(1))
-    return closing, skipped_tests
+        elif failed := re.match(r" *\d+/\d+ Test +#\d+: (\S+) .*\*\*\*", line):
+            failed_tests.append(failed.group(1))
+    return closing, skipped_tests, failed_tests
 
 
 def main():
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # An interrupted ctest still has closing lines.
     sys.stdin.reconfigure(errors="replace")
-    closing, skipped_tests = pass_on(sys.stdin)
+    closing, skipped_tests, failed_tests = pass_on(sys.stdin)
     if not closing:
         return 0
     skips = reasons(sys.argv[1])
@@ -58,6 +61,10 @@ def main():
     print(f"Skipped: {len(skips) or 'nothing'}")
     for test, text in skips:
         print(f"  {test}: {text}")
+    still = {named.group(1) for line in closing if (named := re.match(r"\s+\d+ - (\S+) \((?!Skipped)", line))}
+    unsteady = [test for test in failed_tests if test not in still]
+    if unsteady:
+        print(f"Passed only when run again, to be made steady: {', '.join(unsteady)}")
     unlisted = []
     if len(sys.argv) > 2:
         known = allowed(sys.argv[2])

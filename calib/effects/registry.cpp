@@ -2,8 +2,8 @@
 // 1. Write calib/effects/<id>.cpp: a PhysicalEffect (a CouplingDistortion where it is metal in the room), and a
 //    function that returns its Effect row, declared in rows.h. Its comment states formula, convention and source.
 // 2. Declare every parameter (declare.h) with a key that ends in its unit, a range, a default, one sentence of help
-//    and, where one is known, the range met in practice. `make` receives them resolved; it only refuses what makes no sense
-//    together.
+//    and, where one is known, the range met in practice. `make` receives them resolved; it only refuses what makes no
+//    sense together.
 // 3. Say in `admits` where a sensor cannot be.
 // 4. Write `fits` (effect_fit.h): the ways it is looked for in a recording. Where nothing is searched, linear_fit.h
 //    makes both the effect and its ways from one function. Null where only the raw samples show it.

@@ -11,13 +11,14 @@ TESTS = """
 add_test(a/pass sh -c "echo fine")
 add_test(a/skip sh -c "echo 'SKIPPED A::b(c): no moon' >&2; exit 77")
 add_test(a/silent sh -c "exit 77")
+add_test(a/unsteady sh -c "test -f flag || { touch flag; exit 1; }")
 add_test(a/both sh -c "echo 'SKIPPED A::c: no sun' >&2; exit 1")
 set_tests_properties(a/pass a/skip a/silent a/both PROPERTIES SKIP_RETURN_CODE 77)
 """
 
 
 class SkipsCheck(unittest.TestCase):
-    def run_ctest(self, wanted, allowed=None):
+    def run_ctest(self, wanted, allowed=None, repeat=False):
         """The lines printed, and the exit status of skips.py."""
         with tempfile.TemporaryDirectory() as folder:
             with open(os.path.join(folder, "CTestTestfile.cmake"), "w") as tests:
@@ -27,7 +28,8 @@ class SkipsCheck(unittest.TestCase):
                 with open(os.path.join(folder, "list.txt"), "w") as list_file:
                     list_file.write(allowed)
                 command.append(list_file.name)
-            ctest = subprocess.run(["ctest", "--test-dir", folder, "-R", wanted], stdout=subprocess.PIPE)
+            again = ["--repeat", "until-pass:2"] if repeat else []
+            ctest = subprocess.run(["ctest", "--test-dir", folder, "-R", wanted] + again, stdout=subprocess.PIPE)
             told = subprocess.run(command, input=ctest.stdout, stdout=subprocess.PIPE, check=False)
             return told.stdout.decode().splitlines(), told.returncode
 
@@ -48,6 +50,12 @@ class SkipsCheck(unittest.TestCase):
     def test_nothing_skipped_is_said(self):
         lines, status = self.run_ctest("pass", allowed="")
         self.assertIn("Skipped: nothing", lines)
+        self.assertEqual(status, 0)
+
+    def test_what_passes_only_when_run_again_is_told(self):
+        lines, status = self.run_ctest("unsteady|both", repeat=True)
+        self.assertIn("Passed only when run again, to be made steady: a/unsteady", lines)
+        self.assertIn("50% tests passed, 1 tests failed out of 2", lines)
         self.assertEqual(status, 0)
 
     def test_only_what_the_list_names_may_be_skipped(self):

@@ -5,6 +5,7 @@
 #include <QCoreApplication>
 #include <algorithm>
 #include <array>
+#include <string_view>
 
 #include "widgets/pages/acquire_page.h"
 #include "widgets/pages/compare_page.h"
@@ -105,7 +106,9 @@ std::span<const PageRow> pageRows() { return kRows; }
 const PageRow& pageRow(const QString& id) {
   const auto row =
       std::find_if(kRows.begin(), kRows.end(), [&](const PageRow& one) { return id == QLatin1String(one.id); });
-  return row != kRows.end() ? *row : pageRow(QStringLiteral("acquire"));
+  constexpr std::size_t kAcquire = 3;
+  static_assert(std::string_view(kRows[kAcquire].id) == "acquire");
+  return row != kRows.end() ? *row : kRows[kAcquire];
 }
 
 }  // namespace fieldtrue::widgets

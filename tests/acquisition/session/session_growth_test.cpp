@@ -24,9 +24,11 @@ double computed_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-double middle(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
+/// The lower quartile: what else the machine does only adds.
+double usual(std::vector<double> values) {
+  const std::size_t quarter = values.size() / 4;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(quarter), values.end());
+  return values[quarter];
 }
 
 }  // namespace
@@ -86,9 +88,9 @@ class SessionGrowthTest : public QObject {
     }
     QCOMPARE(early.stored.size(), std::size_t{41});
     QCOMPARE(late.stored.size(), std::size_t{41});
-    const double ratio = middle(late_s) / middle(early_s);
-    qInfo("a place after %d costs %.2f ms, one of the first %.2f ms", kTaken, 1e3 * middle(late_s),
-          1e3 * middle(early_s));
+    const double ratio = usual(late_s) / usual(early_s);
+    qInfo("a place after %d costs %.2f ms, one of the first %.2f ms", kTaken, 1e3 * usual(late_s),
+          1e3 * usual(early_s));
 #ifdef __SANITIZE_ADDRESS__
     const double most = 4.0;  // Its allocator looks through a heap that grows with the session.
 #else
