@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <memory>
-#include <string>
 
 extern "C" {
 #include <libqhull_r/qhull_ra.h>
 }
+
+#include "calib/core/qhull_run.h"
 
 namespace fieldtrue {
 
@@ -30,65 +29,15 @@ std::vector<Eigen::Vector2d> leftTurningChain(Iterator first, Iterator last, dou
   return chain;
 }
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-
-/// One run of Qhull; its messages go nowhere.
-class QhullRun {
- public:
-  QhullRun(std::vector<double>& coordinates, const char* command)
-      : silence_(std::fopen("/dev/null", "w")), qhull_(std::make_unique<qhT>()) {
-    qh_zero(qhull_.get(), silence_.get());
-    std::string command_text = command;
-    succeeded_ = silence_ && qh_new_qhull(qhull_.get(), 3, static_cast<int>(coordinates.size() / 3), coordinates.data(),
-                                          False, command_text.data(), nullptr, silence_.get()) == 0;
+std::vector<Eigen::Vector3d> facetNormals(const QhullRun& run) {
+  std::vector<Eigen::Vector3d> normals;
+  const qhT* qh = run.get();
+  const facetT* facet = nullptr;
+  FORALLfacets {
+    const Eigen::Vector3d normal(facet->normal[0], facet->normal[1], facet->normal[2]);
+    normals.push_back(normal.normalized());
   }
-  QhullRun(const QhullRun&) = delete;
-  QhullRun& operator=(const QhullRun&) = delete;
-  ~QhullRun() {
-    qhT* qh = qhull_.get();
-    qh->NOerrexit = True;
-    qh_freeqhull(qh, !qh_ALL);
-    int blocks = 0;
-    int bytes = 0;
-    qh_memfreeshort(qh, &blocks, &bytes);
-  }
-  bool succeeded() const { return succeeded_; }
-  std::vector<Eigen::Vector3d> normals() const {
-    std::vector<Eigen::Vector3d> normals;
-    const qhT* qh = qhull_.get();
-    const facetT* facet = nullptr;
-    FORALLfacets {
-      const Eigen::Vector3d normal(facet->normal[0], facet->normal[1], facet->normal[2]);
-      normals.push_back(normal.normalized());
-    }
-    return normals;
-  }
-
- private:
-  std::unique_ptr<std::FILE, CloseFile> silence_;
-  std::unique_ptr<qhT> qhull_;
-  bool succeeded_ = false;
-};
-
-/// Qhull's tolerances are those of coordinates near 1: the points are moved to their middle and scaled alike.
-std::vector<double> centeredAndScaled(std::span<const Eigen::Vector3d> points_m) {
-  Eigen::Vector3d low = points_m.front();
-  Eigen::Vector3d high = points_m.front();
-  for (const Eigen::Vector3d& p : points_m) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  const double extent_m = (high - low).maxCoeff();
-  std::vector<double> coordinates;
-  if (!(extent_m > 0.0)) return coordinates;
-  coordinates.reserve(points_m.size() * 3);
-  for (const Eigen::Vector3d& p : points_m) {
-    const Eigen::Vector3d scaled = (p - (low + high) / 2.0) / extent_m;
-    coordinates.insert(coordinates.end(), {scaled.x(), scaled.y(), scaled.z()});
-  }
-  return coordinates;
+  return normals;
 }
 
 }  // namespace
@@ -116,7 +65,7 @@ std::optional<std::vector<Eigen::Vector3d>> convexHullNormals(std::span<const Ei
   // QJ joggles the input where merging facets does not help (Qhull manual, "Imprecision problems").
   for (const char* command : {"qhull Pp", "qhull QJ Pp"}) {
     const QhullRun run(coordinates, command);
-    if (run.succeeded()) return run.normals();
+    if (run.succeeded()) return facetNormals(run);
   }
   return std::nullopt;
 }
