@@ -13,8 +13,6 @@ namespace fieldtrue::acquisition {
 
 namespace {
 
-using nlohmann::json;
-
 constexpr std::string_view kSchema = "fieldtrue.plan/";
 constexpr int kSchemaVersion = 1;
 
@@ -122,21 +120,21 @@ Result<Plan> planFromJson(const nlohmann::json& object, const std::string& name)
 
 nlohmann::json toJson(const Plan& plan) {
   const auto& [nx, ny, nz] = plan.counts;
-  json object{{"schema", std::string(kSchema) + std::to_string(kSchemaVersion)},
-              {"grid", std::to_string(nx) + "x" + std::to_string(ny) + "x" + std::to_string(nz) + "@" +
-                           formatNumber(plan.pitch_m.x()) + "x" + formatNumber(plan.pitch_m.y()) + "x" +
-                           formatNumber(plan.pitch_m.z())},
-              {"order", plan.order == PlanOrder::kRandom ? "random" : "serpentine"},
-              {"seed", plan.seed},
-              {"orientations", plan.orientations},
-              {"reseat", plan.reseat},
-              {"pipe_base_m", plan.pipe_base_m}};
+  nlohmann::json object{{"schema", std::string(kSchema) + std::to_string(kSchemaVersion)},
+                        {"grid", std::to_string(nx) + "x" + std::to_string(ny) + "x" + std::to_string(nz) + "@" +
+                                     formatNumber(plan.pitch_m.x()) + "x" + formatNumber(plan.pitch_m.y()) + "x" +
+                                     formatNumber(plan.pitch_m.z())},
+                        {"order", plan.order == PlanOrder::kRandom ? "random" : "serpentine"},
+                        {"seed", plan.seed},
+                        {"orientations", plan.orientations},
+                        {"reseat", plan.reseat},
+                        {"pipe_base_m", plan.pipe_base_m}};
   if (plan.origin_m) object["origin"] = {plan.origin_m->x(), plan.origin_m->y(), plan.origin_m->z()};
   for (const PlannedPlace& place : plan.explicit_places) {
     const Pose& pose = place.reference_from_sensor;
-    json node{{"node", place.node},         {"visit", place.visit},       {"x_m", pose.position_m.x()},
-              {"y_m", pose.position_m.y()}, {"z_m", pose.position_m.z()}, {"qw", pose.orientation.w()},
-              {"qx", pose.orientation.x()}, {"qy", pose.orientation.y()}, {"qz", pose.orientation.z()}};
+    nlohmann::json node{{"node", place.node},         {"visit", place.visit},       {"x_m", pose.position_m.x()},
+                        {"y_m", pose.position_m.y()}, {"z_m", pose.position_m.z()}, {"qw", pose.orientation.w()},
+                        {"qx", pose.orientation.x()}, {"qy", pose.orientation.y()}, {"qz", pose.orientation.z()}};
     if (place.index) {
       node["i"] = (*place.index)[0];
       node["j"] = (*place.index)[1];

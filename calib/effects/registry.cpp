@@ -138,7 +138,7 @@ Result<nlohmann::json> resolveEffectParameters(const Effect& effect, const nlohm
 
 Result<std::unique_ptr<field::PhysicalEffect>> makeEffect(std::string_view id, const nlohmann::json& given,
                                                           const field::Excitation& excitation) {
-  FT_TRY(const const Effect* effect, findEffect(id));
+  FT_TRY(const Effect* effect, findEffect(id));
   FT_TRY(const nlohmann::json parameters, resolveEffectParameters(*effect, given));
   return effect->make(parameters, excitation);
 }

@@ -6,10 +6,8 @@ namespace fieldtrue {
 
 namespace {
 
-using nlohmann::json;
-
 template <class T>
-void put(json& to, std::string_view key, const std::optional<T>& value) {
+void put(nlohmann::json& to, std::string_view key, const std::optional<T>& value) {
   if (value) to[std::string(key)] = *value;
 }
 
@@ -31,17 +29,17 @@ NodeRole roleFrom(const JsonReader& json) {
   return NodeRole::kFit;
 }
 
-json nodeToJson(const Node& node) {
-  json to = {{"node", node.node},
-             {"sensor", node.sensor},
-             {"visit", node.visit},
-             {"role", nameOf(node.role)},
-             {"reference_from_sensor", jsonOf(node.reference_from_sensor)},
-             {"tracker_from_sensor", jsonOf(node.tracker_from_sensor)},
-             {"has_orientation", node.has_orientation},
-             {"n_used", node.n_used},
-             {"n_rejected", node.n_rejected},
-             {"n_effective", node.n_effective}};
+nlohmann::json nodeToJson(const Node& node) {
+  nlohmann::json to = {{"node", node.node},
+                       {"sensor", node.sensor},
+                       {"visit", node.visit},
+                       {"role", nameOf(node.role)},
+                       {"reference_from_sensor", jsonOf(node.reference_from_sensor)},
+                       {"tracker_from_sensor", jsonOf(node.tracker_from_sensor)},
+                       {"has_orientation", node.has_orientation},
+                       {"n_used", node.n_used},
+                       {"n_rejected", node.n_rejected},
+                       {"n_effective", node.n_effective}};
   put(to, "index", node.index);
   if (node.covariance_m2) to["covariance_m2"] = jsonOf(Eigen::MatrixXd(*node.covariance_m2));
   put(to, "sd_rot_rad", node.sd_rot_rad);
@@ -72,10 +70,10 @@ Node nodeFrom(const JsonReader& from) {
 
 }  // namespace
 
-json toJson(const TableMetadata& metadata) {
-  json to = {{"frame", metadata.frame},
-             {"alignment", metadata.alignment_known ? "known" : "unknown"},
-             {"other", metadata.other}};
+nlohmann::json toJson(const TableMetadata& metadata) {
+  nlohmann::json to = {{"frame", metadata.frame},
+                       {"alignment", metadata.alignment_known ? "known" : "unknown"},
+                       {"other", metadata.other}};
   forEachStatement([&](std::string_view key, auto member) { put(to, key, metadata.*member); });
   return to;
 }
@@ -89,8 +87,8 @@ TableMetadata metadataFrom(const JsonReader& json) {
   return metadata;
 }
 
-json toJson(const CalibrationTable& table) {
-  json nodes = json::array();
+nlohmann::json toJson(const CalibrationTable& table) {
+  nlohmann::json nodes = nlohmann::json::array();
   for (const Node& node : table.nodes) nodes.push_back(nodeToJson(node));
   return {{"metadata", toJson(table.metadata)}, {"nodes", std::move(nodes)}};
 }

@@ -102,7 +102,7 @@ std::string rowText(const Node& node, bool has_index) {
   row.integer(node.n_used);
   row.integer(node.n_rejected);
   row.number(node.n_effective);
-  row.word(nameOf(node.role));
+  row.word(std::string(nameOf(node.role)));
   return row.text();
 }
 

@@ -30,12 +30,12 @@ class JsonReaderTest : public QObject {
   Q_OBJECT
  private slots:
   void readsWhatIsThere() {
-    const auto read = readJson<double>(kDocument, "lab", [](const JsonReader& json) {
-      if (json["name"].text() != "hall" || !json["on"].flag() || json["rate_hz"].integer() != 60) json.fail("is wrong");
-      if (json["list"].vector3() != Eigen::Vector3d(1, 2, 3)) json.fail("is wrong");
-      if (json["none"].optionalNumber() || !std::isnan(json["none"].numberOrNan())) json.fail("is wrong");
-      if (json.find("no such key")) json.fail("is wrong");
-      return json["rate_hz"].number({0.0, 100.0}, "Hz");
+    const auto read = readJson<double>(kDocument, "lab", [](const JsonReader& lab) {
+      if (lab["name"].text() != "hall" || !lab["on"].flag() || lab["rate_hz"].integer() != 60) lab.fail("is wrong");
+      if (lab["list"].vector3() != Eigen::Vector3d(1, 2, 3)) lab.fail("is wrong");
+      if (lab["none"].optionalNumber() || !std::isnan(lab["none"].numberOrNan())) lab.fail("is wrong");
+      if (lab.find("no such key")) lab.fail("is wrong");
+      return lab["rate_hz"].number({0.0, 100.0}, "Hz");
     });
     FT_VERIFY_OK(read);
     QCOMPARE(*read, 60.0);
@@ -68,8 +68,8 @@ class JsonReaderTest : public QObject {
     QFETCH(QByteArray, key);
     QFETCH(QByteArray, kind);
     QFETCH(QByteArray, sentence);
-    const std::string seen = sentenceOf(kDocument, [&](const JsonReader& json) {
-      const JsonReader value = json[key.toStdString()];
+    const std::string seen = sentenceOf(kDocument, [&](const JsonReader& lab) {
+      const JsonReader value = lab[key.toStdString()];
       if (kind == "number") value.number();
       if (kind == "to50") value.number({1.0, 50.0}, "Hz");
       if (kind == "integer") value.integer();
@@ -88,11 +88,11 @@ class JsonReaderTest : public QObject {
 
   void keysNobodyAskedForAreRefused() {
     const json document{{"comment", "free text"}, {"tracker", {{"rate_hz", 60}, {"ratehz", 50}}}};
-    const std::string seen = sentenceOf(document, [](const JsonReader& json) {
-      const JsonReader tracker = json["tracker"];
+    const std::string seen = sentenceOf(document, [](const JsonReader& lab) {
+      const JsonReader tracker = lab["tracker"];
       double rate_hz = 0.0;
       tracker.number("rate_hz", rate_hz, {0.0, 100.0}, "Hz");
-      json.refuseOtherKeys();
+      lab.refuseOtherKeys();
       tracker.refuseOtherKeys();
     });
     QCOMPARE(seen, std::string("lab: tracker.ratehz is not known; did you mean rate_hz? Known: rate_hz."));
@@ -100,14 +100,14 @@ class JsonReaderTest : public QObject {
 
   void aMissingKeyLeavesTheDefault() {
     double rate_hz = 12.0;
-    QCOMPARE(sentenceOf(kDocument, [&](const JsonReader& json) { json.number("rate", rate_hz, {0, 1}, "Hz"); }), "");
+    QCOMPARE(sentenceOf(kDocument, [&](const JsonReader& lab) { lab.number("rate", rate_hz, {0, 1}, "Hz"); }), "");
     QCOMPARE(rate_hz, 12.0);
   }
 
   void schemasOfThisOfNoAndOfANewerVersion() {
     const auto read = [](const json& document) {
-      return readJson<int>(document, "lab", [](const JsonReader& json) {
-        return json.schema("fieldtrue.scene/", 3, "a scene").value_or(-1);
+      return readJson<int>(document, "lab", [](const JsonReader& lab) {
+        return lab.schema("fieldtrue.scene/", 3, "a scene").value_or(-1);
       });
     };
     QCOMPARE(*read(json{{"schema", "fieldtrue.scene/2"}}), 2);
@@ -124,25 +124,25 @@ class JsonReaderTest : public QObject {
 
   void aUnitQuaternionKeepsItsBits() {
     const Eigen::Quaterniond q(0.5, 0.5, -0.5, 0.5);
-    const auto kept = readJson<Eigen::Quaterniond>(kDocument, "lab",
-                                                   [](const JsonReader& json) { return json["turn"].quaternion(); });
+    const auto kept =
+        readJson<Eigen::Quaterniond>(kDocument, "lab", [](const JsonReader& lab) { return lab["turn"].quaternion(); });
     FT_VERIFY_OK(kept);
     QVERIFY(kept->coeffs() == q.coeffs());
-    const auto rounded = readJson<Eigen::Quaterniond>(
-        json{{"q", {0.707, 0.0, 0.0, 0.707}}}, "lab", [](const JsonReader& json) { return json["q"].quaternion(); });
+    const auto rounded = readJson<Eigen::Quaterniond>(json{{"q", {0.707, 0.0, 0.0, 0.707}}}, "lab",
+                                                      [](const JsonReader& lab) { return lab["q"].quaternion(); });
     FT_VERIFY_OK(rounded);
     QVERIFY(std::abs(rounded->norm() - 1.0) < 1e-15);
   }
 
   void anErrorOfWhatWasMadeIsToldAtItsPlace() {
-    const std::string seen = sentenceOf(kDocument, [](const JsonReader& json) {
-      json["name"].valueOf(Result<int>(fail(ErrorCode::kUnsupported, "No such hall.")));
+    const std::string seen = sentenceOf(kDocument, [](const JsonReader& lab) {
+      lab["name"].valueOf(Result<int>(fail(ErrorCode::kUnsupported, "No such hall.")));
     });
     QCOMPARE(seen, std::string("lab: name: No such hall."));
   }
 
   void textThatIsNoUtf8CanBeShown() {
-    const std::string seen = sentenceOf(json{{"name", "caf\xe9"}}, [](const JsonReader& json) { json["name"].number(); });
+    const std::string seen = sentenceOf(json{{"name", "caf\xe9"}}, [](const JsonReader& lab) { lab["name"].number(); });
     FT_VERIFY_MATCH(holdsAll(seen, {"lab: name is the text \"caf", "it must be a number"}));
   }
 };
