@@ -83,7 +83,7 @@ LoadedPart<Model> partFrom(const JsonReader& part,
 
 /// Schema and checksum: whether this is a whole calibration file that this version can read.
 void checkEnvelope(const JsonReader& content) {
-  if (!content.schema(kSchemaName, kSchemaVersion, "a calibration"))
+  if (!content.schema(kSchemaName, kSchemaVersion, "a Fieldtrue calibration"))
     content.fail("is not a Fieldtrue calibration; it needs the key schema with \"" + std::string(kSchemaName) +
                  std::to_string(kSchemaVersion) + "\".");
   if (const auto checksum = content.find("checksum"); !checksum || checksum->raw() != checksumOf(content.raw()))

@@ -88,7 +88,7 @@ void JsonReader::refuseOtherKeys() const {
 }
 
 std::optional<int> JsonReader::schema(std::string_view kind, int newest, const std::string& article_and_name) const {
-  const auto found = find("schema");
+  const auto found = value_->is_object() ? find("schema") : std::nullopt;
   if (!found) return std::nullopt;
   const std::string known = std::string(kind) + std::to_string(newest);
   const std::string text = found->value_->is_string() ? found->text() : std::string();
@@ -98,7 +98,11 @@ std::optional<int> JsonReader::schema(std::string_view kind, int newest, const s
     const auto [rest, error] = std::from_chars(text.data() + kind.size(), end, version);
     if (error != std::errc() || rest != end) version = 0;
   }
-  if (version < 1) found->fail("is " + seenValue(found->raw()) + "; " + article_and_name + " has \"" + known + "\".");
+  if (version < 1) {
+    throw JsonProblem{ErrorCode::kBadInput, document_ + " is not " + article_and_name + ": schema is " +
+                                                seenValue(found->raw()) + ", and " + article_and_name + " has \"" +
+                                                known + "\"."};
+  }
   if (version > newest) {
     found->fail("is \"" + text + "\", written by a newer version of Fieldtrue; this one reads " + known + ".",
                 ErrorCode::kNewerVersion);

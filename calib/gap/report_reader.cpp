@@ -176,7 +176,7 @@ Isolability isolabilityFrom(const JsonReader& json) {
 }
 
 GapReport reportFrom(const JsonReader& root) {
-  if (!root.raw().is_object() || !root.schema("fieldtrue.gap/", kVersion, "a gap report"))
+  if (!root.schema("fieldtrue.gap/", kVersion, "a gap report"))
     root.fail("is not a gap report; it needs the key schema with \"fieldtrue.gap/" + std::to_string(kVersion) + "\".");
   GapReport report;
   report.input = inputFrom(root["input"]);

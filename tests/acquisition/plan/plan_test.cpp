@@ -264,7 +264,7 @@ class PlanTest : public QObject {
     QTest::newRow("list") << "[]"
                           << "lab: the file is []; it must be an object";
     QTest::newRow("grid") << R"({"grid": "5x5@0.3"})"
-                          << "lab: grid 5x5@0.3: expected NXxNYxNZ, got 5x5";
+                          << "lab: grid: 5x5@0.3: expected NXxNYxNZ, got 5x5";
     QTest::newRow("grid is a number") << R"({"grid": 5})"
                                       << "grid is 5; it must be text like \"5x5x4@0.3048\"";
     QTest::newRow("unknown key") << R"({"grid": "1x1x1@1", "pitch": 1})"

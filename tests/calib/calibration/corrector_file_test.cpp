@@ -182,7 +182,7 @@ class CorrectorFileTest : public QObject {
     row("newer", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/3"; }), ErrorCode::kNewerVersion,
         "newer version");
     row("odd version", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/one"; }), ErrorCode::kBadInput,
-        "not a number");
+        "fieldtrue.ftcal/one");
     row("schema not text", rewritten(text, [](json& j) { j["schema"] = 1; }), ErrorCode::kBadInput, "calibration");
     row("unknown method", rewritten(text, [](json& j) { j["position"]["method"] = "spline"; }), ErrorCode::kBadInput,
         "spline");
