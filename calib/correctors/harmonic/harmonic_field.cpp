@@ -136,7 +136,6 @@ FieldPosterior posteriorFrom(const JsonReader& parameters, const std::vector<Fie
 }
 
 std::unique_ptr<PositionModel> loadHarmonic(const JsonReader& parameters) {
-  using Loaded = Result<std::unique_ptr<PositionModel>>;
   const Eigen::MatrixXd rows = parameters["sources"].matrix(12);
   std::vector<FieldSource> sources(static_cast<std::size_t>(rows.rows()));
   for (Eigen::Index k = 0; k < rows.rows(); ++k) {
