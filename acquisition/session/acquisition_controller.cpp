@@ -6,36 +6,19 @@
 
 namespace fieldtrue::acquisition {
 
-namespace {
-
-constexpr int kSilenceCheck_ms = 250;
-
-}  // namespace
-
-AcquisitionController::Impl::Impl(AcquisitionController* controller, SamplerOptions sampler_options)
-    : owner(controller),
-      options(sampler_options),
-      sampler(sampler_options),
-      silence_timer(controller),
-      retry_timer(controller),
-      status_timer(controller) {
-  status_timer.setSingleShot(true);
-  QObject::connect(&status_timer, &QTimer::timeout, controller, [this] { guarded(*owner, [this] { emitStatus(); }); });
-  silence_timer.setInterval(kSilenceCheck_ms);
-  QObject::connect(&silence_timer, &QTimer::timeout, controller,
-                   [this] { guarded(*owner, [this] { checkSilence(); }); });
-  retry_timer.setSingleShot(true);
-  QObject::connect(&retry_timer, &QTimer::timeout, controller, [this] {
-    guarded(*owner, [this] {
-      if (device) device->start();
-    });
+AcquisitionController::Impl::Impl(AcquisitionController* controller, const SamplerOptions& options)
+    : owner(controller), tracker(controller), places(store), take(options), views(controller) {
+  const auto at = [this](const QTimer& timer, auto call) {
+    QObject::connect(&timer, &QTimer::timeout, owner, [this, call] { guarded(*owner, call); });
+  };
+  at(views.status_timer, [this] {
+    views.since_status.start();
+    emit owner->statusChanged(status());
   });
-}
-
-AcquisitionController::Impl::~Impl() {
-  if (!device) return;
-  QObject::disconnect(device.get(), nullptr, owner, nullptr);
-  device->stop();
+  at(tracker.silence_timer, [this] { checkSilence(); });
+  at(tracker.retry_timer, [this] {
+    if (tracker.device) tracker.device->start();
+  });
 }
 
 AcquisitionController::AcquisitionController(SamplerOptions options, QObject* parent)
@@ -52,26 +35,19 @@ void AcquisitionController::adoptDevice(std::unique_ptr<TrackerDevice> device, c
 AcquisitionStatus AcquisitionController::status() const { return impl_->status(); }
 
 void AcquisitionController::connectDevice(const QString& device, const QString& scene_path) {
-  simulation::Scene scene;
-  if (!scene_path.isEmpty()) {
-    auto read = simulation::readScene(scene_path.toStdString());
-    if (!read) {
-      emit deviceFailed(QString::fromStdString(read.error().message));
-      return;
-    }
-    scene = *std::move(read);
-  }
-  auto made = makeDevice(device.toStdString(), scene);
-  if (!made) {
+  const Result<simulation::Scene> scene =
+      scene_path.isEmpty() ? simulation::Scene() : simulation::readScene(scene_path.toStdString());
+  auto made = scene ? makeDevice(device.toStdString(), *scene) : tl::unexpected(scene.error());
+  if (made) {
+    impl_->adopt(*std::move(made), scene->reference_from_tracker);
+  } else {
     emit deviceFailed(QString::fromStdString(made.error().message));
-    return;
   }
-  impl_->adopt(*std::move(made), scene.reference_from_tracker);
 }
 
 void AcquisitionController::disconnectDevice() {
   impl_->dropDevice();
-  impl_->changed();
+  impl_->views.tellSoon();
 }
 
 void AcquisitionController::openSession(const QString& path, const QString& create_plan_json) {
@@ -81,114 +57,90 @@ void AcquisitionController::openSession(const QString& path, const QString& crea
 void AcquisitionController::closeSession() { impl_->close(); }
 
 void AcquisitionController::take() {
-  if (impl_->collecting()) return;
+  if (impl_->take.collecting()) return;
   if (!impl_->store) {
     emit takeFailed(QStringLiteral("There is no session to record into; make a plan or open a session first."));
   } else if (impl_->store->isReadOnly()) {
     emit takeFailed(
         QStringLiteral("Nothing can be stored: the session's file cannot be written to. Copy it to a folder "
                        "that can be written to, and open it there."));
-  } else if (impl_->device_state != DeviceState::kRunning) {
+  } else if (!impl_->tracker.running()) {
     emit takeFailed(QStringLiteral("The tracker is not connected; connect it and take again."));
-  } else if (!impl_->current) {
+  } else if (!impl_->places.current) {
     emit takeFailed(QStringLiteral("All places are done; choose one to retake it."));
-  } else if (const auto off_m = impl_->tooFar_m(); off_m && !impl_->isRefused()) {
+  } else if (const auto off_m = impl_->places.tooFar_m(impl_->tracker.live);
+             off_m && !impl_->take.isRefusedAt(impl_->places.current)) {
     impl_->refuse(*off_m);
   } else {
-    impl_->startTake();
-    impl_->taken_away = off_m.has_value();
+    impl_->take.start(off_m.has_value());
+    impl_->views.tellSoon();
   }
 }
 
 void AcquisitionController::cancelTake() {
-  impl_->failure.clear();
-  impl_->refused_at.reset();
+  impl_->take.forgetFailure();
   impl_->stopTake();
-  impl_->changed();
+  impl_->views.tellSoon();
 }
 
 void AcquisitionController::skip() {
-  if (!impl_->store || !impl_->current) return;
-  impl_->failure.clear();
+  if (!impl_->store || !impl_->places.current) return;
+  impl_->take.failure.clear();
   impl_->stopTake();
-  const std::size_t place = *impl_->current;
+  const std::size_t place = *impl_->places.current;
   if (!impl_->told(impl_->store->skip(place, "skipped by the operator"))) return;
   if (impl_->told(impl_->reloadPlace(place))) impl_->goOn();
 }
 
 void AcquisitionController::undo() {
-  if (!impl_->store) return;
-  impl_->failure.clear();
-  impl_->stopTake();
-  const auto place = impl_->store->undo();
-  if (!place) {
-    emit failed(QString::fromStdString(place.error().message));
-    return;
-  }
-  if (!*place) return;
-  if (impl_->told(impl_->reloadPlace(**place))) impl_->setCurrent(**place);
+  if (const auto place = impl_->step(&SessionStore::undo)) impl_->setCurrent(*place);
 }
 
 void AcquisitionController::redo() {
-  if (!impl_->store) return;
-  impl_->failure.clear();
-  impl_->stopTake();
-  const auto place = impl_->store->redo();
-  if (!place) {
-    emit failed(QString::fromStdString(place.error().message));
-    return;
-  }
-  if (!*place) return;
-  if (impl_->told(impl_->reloadPlace(**place))) impl_->goOn();
+  if (impl_->step(&SessionStore::redo)) impl_->goOn();
 }
 
 void AcquisitionController::goTo(int place) {
-  if (!impl_->store || place >= static_cast<int>(impl_->states.size())) return;
-  impl_->failure.clear();
+  if (!impl_->store || place >= static_cast<int>(impl_->places.states.size())) return;
+  impl_->take.failure.clear();
   impl_->stopTake();
-  impl_->setCurrent(place < 0 ? impl_->nextPlace() : static_cast<std::size_t>(place));
+  impl_->setCurrent(place < 0 ? impl_->places.next() : static_cast<std::size_t>(place));
 }
 
 void AcquisitionController::setAutomatic(bool automatic) {
-  if (impl_->automatic == automatic) return;
-  impl_->automatic = automatic;
-  if (!impl_->stand.hasTaken()) impl_->stand.forget();
-  impl_->failure.clear();
-  impl_->waiting_since_s.reset();
-  impl_->changed();
+  if (impl_->take.automatic == automatic) return;
+  impl_->take.automatic = automatic;
+  if (!impl_->take.stand.hasTaken()) impl_->take.stand.forget();
+  impl_->take.failure.clear();
+  impl_->take.waiting_since_s.reset();
+  impl_->views.tellSoon();
 }
 
-void AcquisitionController::setReconnects(bool reconnects) { impl_->reconnects = reconnects; }
+void AcquisitionController::setReconnects(bool reconnects) { impl_->tracker.reconnects = reconnects; }
 
 void AcquisitionController::setSamplesPerNode(int count) {
   if (count < 1 || count > 100000) {
     emit failed(QStringLiteral("Samples per place must be 1 to 100000, got %1.").arg(count));
     return;
   }
-  impl_->options.samples_per_node = count;
-  if (!impl_->collecting()) impl_->sampler = NodeSampler(impl_->options);
-  impl_->changed();
+  impl_->take.options.samples_per_node = count;
+  if (!impl_->take.collecting()) impl_->take.sampler = NodeSampler(impl_->take.options);
+  impl_->views.tellSoon();
 }
 
 void AcquisitionController::setSessionState(const QString& key, const QString& value) {
-  if (!impl_->store) return;
-  impl_->told(impl_->store->setState(key.toStdString(), value.toStdString()));
+  if (impl_->store) impl_->told(impl_->store->setState(key.toStdString(), value.toStdString()));
 }
 
 void AcquisitionController::storeFit(const QString& name, const QString& ftcal_text) {
-  if (!impl_->store) return;
-  impl_->told(impl_->store->storeFit(name.toStdString(), ftcal_text.toStdString()));
+  if (impl_->store) impl_->told(impl_->store->storeFit(name.toStdString(), ftcal_text.toStdString()));
 }
 
 void AcquisitionController::requestTables() {
   if (!impl_->store) return;
   const auto table = impl_->store->nodeTable();
   const auto samples = table ? impl_->store->sampleTable() : tl::unexpected(table.error());
-  if (samples) {
-    emit tablesReady(*table, *samples);
-  } else {
-    emit failed(QString::fromStdString(samples.error().message));
-  }
+  if (impl_->told(samples)) emit tablesReady(*table, *samples);
 }
 
 }  // namespace fieldtrue::acquisition

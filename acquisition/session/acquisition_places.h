@@ -1,0 +1,65 @@
+#pragma once
+
+#include <map>
+
+#include "acquisition/sampling/node_sampler.h"
+#include "acquisition/sampling/reference_guess.h"
+#include "acquisition/sampling/rig_fit.h"
+#include "acquisition/session/session_store.h"
+
+namespace fieldtrue::acquisition {
+
+/// What is known of the places: what is recorded of each, how the takes fit each other, and where the next one belongs.
+struct KnownPlaces {
+  explicit KnownPlaces(const std::optional<SessionStore>& open_store) : store(open_store) {}
+
+  /// What is read of a session when it is opened.
+  struct Content {
+    std::vector<PlaceState> states;
+    std::vector<std::optional<Node>> nodes;
+    bool can_undo = false, can_redo = false;
+    std::string page;
+    std::string newest_fit;  ///< Empty when there is none.
+  };
+  static Result<Content> read(const SessionStore& store);
+  void fill(const Content& content);
+  void clear();
+  /// Reads again what is stored of one place. @return the samples of its live take
+  Result<std::vector<Sample>> reload(std::size_t place);
+  void setNode(std::size_t place, const std::optional<Node>& node);
+  std::optional<std::size_t> next() const;
+  const PlannedPlace& here() const { return store->places()[*current]; }  ///< Only where one is current.
+
+  /// Takes that count, nearest to a place first, its own among them.
+  std::vector<std::size_t> nearestTakes(std::size_t place, std::size_t most) const;
+  std::vector<NeighbourTake> neighbours(std::size_t place) const;
+  RigFit fitOf(const std::vector<std::size_t>& takes) const;
+  /// @param is_judged when given, marks the places that were judged
+  void judgeAround(std::size_t place, std::vector<bool>* is_judged = nullptr);
+  void judgeAll();
+
+  void updateGuess();
+  std::optional<double> distance_m(const std::optional<Sample>& live) const;  ///< To the current place.
+  /// The same, where it is farther than a take there may be.
+  std::optional<double> tooFar_m(const std::optional<Sample>& live) const;
+  /// Not at the current place, as far as that can be told.
+  bool isElsewhere(const std::optional<Sample>& live) const;
+
+  const std::optional<SessionStore>& store;  ///< None while no session is open.
+  std::vector<PlaceState> states;
+  std::vector<std::optional<Node>> nodes;
+  /// Where each place's take belongs [m], NaN without one that counts: small, for each new take looks through all.
+  std::vector<Eigen::Vector3d> takes_m;
+  std::vector<Node> done_nodes;  ///< Those not skipped, in any order: kept up, for gathering them costs each take more.
+  bool can_undo = false, can_redo = false;
+  std::map<std::size_t, double> misfits;  ///< Places whose takes do not fit the others, and how far they are off [m].
+
+  std::optional<std::size_t> current;
+  double spacing = 0.3;     ///< From the current place to the next one [m].
+  double near_m = 0.0;      ///< Within this distance a resting sensor is taken to stand on the current place.
+  Pose believed_reference;  ///< What is believed of the transmitter's place before the first take.
+  ReferenceGuess guess;
+  RigFit rig;  ///< The takes around the current place.
+};
+
+}  // namespace fieldtrue::acquisition

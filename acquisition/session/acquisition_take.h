@@ -1,0 +1,41 @@
+#pragma once
+
+#include <QString>
+
+#include "acquisition/sampling/node_sampler.h"
+#include "acquisition/sampling/stand_watch.h"
+#include "acquisition/sampling/stillness.h"
+
+namespace fieldtrue::acquisition {
+
+/// The take that runs or is waited for: how the sensor stands, what is collected, and why the last one failed.
+struct RunningTake {
+  explicit RunningTake(const SamplerOptions& sampler_options) : options(sampler_options), sampler(sampler_options) {}
+
+  bool collecting() const { return sampler.state() == TakeState::kCollecting; }
+  bool isRefusedAt(std::optional<std::size_t> place) const { return refused_at && refused_at == place; }
+  bool isWhereTaken() const { return stand.hasTaken() && !stand.left(); }
+  /// @param is_away the sensor stands elsewhere, and the take was asked for all the same
+  void start(bool is_away);
+  void forgetFailure();
+  /// Follows how the sensor stands. @return whether stillness is to be judged anew with this sample
+  bool watch(const Sample& sample, bool has_session);
+  /// It has stood still for long enough, and not where it was taken last, for a take by itself.
+  bool hasRested(bool reference_known) const;
+  bool waitedInVain(const Sample& live);  ///< For a usable signal, as long as a take may last.
+
+  SamplerOptions options;
+  NodeSampler sampler;
+  StillnessDetector stillness;
+  StandWatch stand;
+  std::optional<std::size_t> refused_at;  ///< The place whose take was refused because the sensor stood elsewhere.
+  bool taken_away = false;                ///< The running take was asked for although it had been refused.
+  bool automatic = false;
+  std::optional<double> looked_at_s;  ///< When stillness was last judged for automatic takes.
+  bool stood_still = false;
+  std::optional<double> waiting_since_s;  ///< Session time since which the current place waits for a usable signal.
+  QString failure;                        ///< Why the last take failed; shown until the next action, or for a while.
+  double failure_time_s = 0.0;
+};
+
+}  // namespace fieldtrue::acquisition

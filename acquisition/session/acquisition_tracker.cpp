@@ -1,0 +1,214 @@
+#include "acquisition/session/acquisition_tracker.h"
+
+#include <algorithm>
+
+#include "acquisition/session/acquisition_impl.h"
+#include "acquisition/session/guarded_call.h"
+#include "calib/tables/metadata_keys.h"
+#include "calib/tables/table_json.h"
+#include "calib/tables/table_metadata.h"
+
+/// The tracker and its stream, and what the session tells of it.
+namespace fieldtrue::acquisition {
+
+namespace {
+
+constexpr int kSilenceCheck_ms = 250;
+constexpr qint64 kSilence_ms = 3000;  ///< No reading for so long: the line is dead.
+constexpr std::size_t kRateReadings = 120;
+constexpr int kFirstRetry_ms = 500;
+constexpr int kLastRetry_ms = 8000;
+
+}  // namespace
+
+TrackerLink::TrackerLink(QObject* receiver) : owner(receiver), silence_timer(receiver), retry_timer(receiver) {
+  silence_timer.setInterval(kSilenceCheck_ms);
+  retry_timer.setSingleShot(true);
+}
+
+bool TrackerLink::silent() const { return running() && since_sample.elapsed() >= kSilence_ms; }
+
+double TrackerLink::rate_hz() const {
+  if (recent_times_s.size() < 2 || !live) return 0.0;
+  const double span_s = recent_times_s.back() - recent_times_s.front();
+  return span_s > 0.0 ? static_cast<double>(recent_times_s.size() - 1) / span_s : 0.0;
+}
+
+void TrackerLink::retryLater() {
+  retry_timer.start(std::min(kFirstRetry_ms << std::min(retries, 8), kLastRetry_ms));
+  ++retries;
+}
+
+void TrackerLink::beginStream() {
+  sensor.reset();
+  time_offset_s.reset();
+  recent_times_s.clear();
+  since_sample.start();
+  silence_timer.start();
+}
+
+void TrackerLink::add(const Sample& sample) {
+  live = sample;
+  recent_times_s.push_back(sample.time_s);
+  if (recent_times_s.size() > kRateReadings) recent_times_s.pop_front();
+}
+
+void TrackerLink::cut() {
+  if (!device) return;
+  QObject::disconnect(device.get(), nullptr, owner, nullptr);
+  device->stop();
+}
+
+void TrackerLink::drop() {
+  cut();
+  // It may be on the call stack below us.
+  device.release()->deleteLater();
+  state = DeviceState::kClosed;
+  text.clear();
+  live.reset();
+}
+
+void AcquisitionController::Impl::adopt(std::unique_ptr<TrackerDevice> next, const Pose& believed) {
+  FT_CHECK(next != nullptr);
+  dropDevice();
+  tracker.device = std::move(next);
+  places.believed_reference = believed;
+  places.updateGuess();
+  TrackerDevice* device = tracker.device.get();
+  QObject::connect(device, &TrackerDevice::stateChanged, owner, [this](DeviceState state, const QString& text) {
+    guarded(*owner, [&] { onDeviceState(state, text); });
+  });
+  QObject::connect(device, &TrackerDevice::samplesReceived, owner,
+                   [this](const std::vector<Sample>& samples) { guarded(*owner, [&] { onSamples(samples); }); });
+  device->start();
+  views.tellSoon();
+}
+
+void AcquisitionController::Impl::dropDevice() {
+  tracker.silence_timer.stop();
+  tracker.retry_timer.stop();
+  tracker.lost = false;
+  if (!tracker.device) return;
+  if (take.collecting()) failTake("the tracker was disconnected; nothing of this take was stored");
+  tracker.drop();
+  take.stillness.clear();
+}
+
+void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString& text) {
+  if (tracker.lost && state != DeviceState::kRunning) {
+    // Why it was lost stays to be read; what the attempts to reach it meet is of no use to anybody.
+    if (state == DeviceState::kFailed) tracker.retryLater();
+    return;
+  }
+  const bool was_lost = tracker.lost, was_running = tracker.running(), was_collecting = take.collecting();
+  const bool fails = state == DeviceState::kFailed && (state != tracker.state || text != tracker.text);
+  const QString why = text.endsWith(QLatin1Char('.')) ? text.chopped(1) : text;
+  tracker.lost = state == DeviceState::kFailed && was_running && tracker.reconnects;
+  tracker.state = state;
+  tracker.text = tracker.lost ? why + QStringLiteral(" (trying again by itself)") : text;
+  if (state == DeviceState::kRunning) {
+    if (!was_running) beginStream();
+  } else {
+    tracker.silence_timer.stop();
+    tracker.live.reset();
+    take.stillness.clear();
+    if (fails) emit owner->deviceFailed(tracker.text);
+    if (was_collecting) failTake("the tracker was lost: " + why.toStdString() + ". Nothing of this take was stored");
+    if (fails) note("device", "failed: " + text.toStdString());
+  }
+  if (tracker.lost) {
+    tracker.retries = 0;
+    tracker.retryLater();
+  }
+  if (was_lost) emit owner->deviceBack();
+  views.tellSoon();
+}
+
+void AcquisitionController::Impl::beginStream() {
+  tracker.beginStream();
+  take.stillness.clear();
+  take.failure.clear();
+  mergeMetadata();
+  remarkOnTracker();
+  places.updateGuess();
+  note("device", "running: " + tracker.text.toStdString());
+  guide();
+}
+
+void AcquisitionController::Impl::guide() {
+  if (tracker.running() && places.current) tracker.device->guideTo(places.here().reference_from_sensor);
+}
+
+void AcquisitionController::Impl::checkSilence() {
+  if (!tracker.silent()) return;
+  tracker.live.reset();
+  take.stillness.clear();
+  if (take.collecting()) failTake("the tracker stopped sending; nothing of this take was stored");
+  views.tellSoon();
+}
+
+double AcquisitionController::Impl::sessionTime_s(double device_time_s) {
+  if (!store) return device_time_s;
+  if (!tracker.time_offset_s) {
+    const auto newest = store->newestSample_s();
+    told(newest);
+    const double wall_s = 1e-3 * static_cast<double>(store->created().msecsTo(now()));
+    // A session that goes on keeps its clock, across reconnections and days, and never steps back.
+    const double begin_s = newest && newest->has_value() ? std::max(wall_s, newest->value() + 1.0) : 0.0;
+    tracker.time_offset_s = begin_s - device_time_s;
+  }
+  return device_time_s + *tracker.time_offset_s;
+}
+
+void AcquisitionController::Impl::onSamples(const std::vector<Sample>& samples) {
+  tracker.since_sample.start();
+  for (Sample sample : samples) {
+    if (!tracker.sensor) tracker.sensor = sample.sensor;
+    if (sample.sensor != *tracker.sensor) continue;
+    sample.time_s = sessionTime_s(sample.time_s);
+    addSample(sample);
+  }
+  views.tellSoon();
+}
+
+void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {
+  other_tracker.reset();
+  if (!known.tracker || !said.tracker || *known.tracker == *said.tracker) return;
+  const auto has_take = [](const std::optional<Node>& node) { return node.has_value(); };
+  if (std::none_of(places.nodes.begin(), places.nodes.end(), has_take)) {
+    known.tracker = said.tracker;
+    return;
+  }
+  other_tracker = said.tracker;
+  note("tracker", "recorded with " + *said.tracker + " from here on; the session was begun with " + *known.tracker);
+}
+
+void AcquisitionController::Impl::remarkOnTracker() {
+  if (!other_tracker) return;
+  emit owner->remarked(
+      QString::fromStdString("This session was begun with " + store->metadata().tracker.value_or("another tracker") +
+                             ", and what is taken now is of " + *other_tracker +
+                             ": one calibration of both is wrong. Connect the first again, or begin a new session."));
+}
+
+Result<void> AcquisitionController::Impl::markOtherTracker() {
+  if (!other_tracker) return {};
+  TableMetadata metadata = store->metadata();
+  if (!metadata.other.emplace(kOtherTracker, *other_tracker).second) return {};
+  auto stored = store->setMetadata(metadata);
+  if (stored) emit owner->metadataChanged(metadata);
+  return stored;
+}
+
+void AcquisitionController::Impl::mergeMetadata() {
+  if (!store || store->isReadOnly() || !tracker.running()) return;
+  const TableMetadata said = tracker.device->describe();
+  TableMetadata known = store->metadata();
+  if (known.rig == kDefaultRig && said.rig) known.rig = said.rig;
+  compareTrackers(known, said);
+  const TableMetadata both = merged(known, said);
+  if (toJson(both) == toJson(store->metadata())) return;
+  if (told(store->setMetadata(both))) emit owner->metadataChanged(both);
+}
+
+}  // namespace fieldtrue::acquisition

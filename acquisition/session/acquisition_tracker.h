@@ -1,0 +1,40 @@
+#pragma once
+
+#include <QElapsedTimer>
+#include <QTimer>
+#include <deque>
+
+#include "acquisition/devices/tracker_device.h"
+
+namespace fieldtrue::acquisition {
+
+/// The tracker that is connected: what it said last, and the watch over its stream.
+struct TrackerLink {
+  explicit TrackerLink(QObject* receiver);
+
+  bool running() const { return state == DeviceState::kRunning; }
+  bool silent() const;
+  double rate_hz() const;
+  void retryLater();
+  void beginStream();
+  void add(const Sample& sample);
+  void cut();   ///< Stops the device, and hears no more of it.
+  void drop();  ///< Gives the device away.
+
+  QObject* owner;  ///< Hears the device.
+  std::unique_ptr<TrackerDevice> device;
+  DeviceState state = DeviceState::kClosed;
+  QString text;
+  std::optional<int> sensor;            ///< The one recorded: the first that reports.
+  std::optional<double> time_offset_s;  ///< Session time minus the device's.
+  std::optional<Sample> live;
+  std::deque<double> recent_times_s;
+  QElapsedTimer since_sample;
+  QTimer silence_timer;
+  bool reconnects = true;
+  bool lost = false;  ///< It ran and is gone; retry_timer starts it again.
+  int retries = 0;
+  QTimer retry_timer;
+};
+
+}  // namespace fieldtrue::acquisition
