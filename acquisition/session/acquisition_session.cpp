@@ -18,20 +18,18 @@ constexpr double kLeaveAtLeast_m = 0.005;
 Result<Plan> planOf(const QString& text, const QString& path) {
   const std::string plain = text.trimmed().toStdString();
   if (!plain.starts_with('{')) return readPlan(plain);
-  const Result<nlohmann::json> json = parseJson(plain, path.toStdString() + ": plan");
-  if (!json) return tl::unexpected(json.error());
-  return planFromJson(*json, "plan");
+  FT_TRY(const nlohmann::json json, parseJson(plain, path.toStdString() + ": plan"));
+  return planFromJson(json, "plan");
 }
 
 }  // namespace
 
 Result<SessionStore> AcquisitionController::Impl::createSession(const QString& path, const QString& plan_text) const {
-  const Result<Plan> plan = planOf(plan_text, path);
-  if (!plan) return tl::unexpected(plan.error());
+  FT_TRY(const Plan plan, planOf(plan_text, path));
   TableMetadata metadata = tracker.device ? tracker.device->describe() : TableMetadata{};
   if (!metadata.rig) metadata.rig = kDefaultRig;
   metadata.date = now().toLocalTime().date().toString(Qt::ISODate).toStdString();
-  return SessionStore::create(path, *plan, metadata, now());
+  return SessionStore::create(path, plan, metadata, now());
 }
 
 void AcquisitionController::Impl::open(const QString& path, const QString& create_plan_json) {
@@ -80,6 +78,7 @@ void AcquisitionController::Impl::close() {
   store.reset();
   loose = LooseReadings();
   loose_refused = false;
+  other_tracker.reset();
   tracker.time_offset_s.reset();
   tracker.live.reset();
   tracker.recent_times_s.clear();
@@ -93,13 +92,12 @@ void AcquisitionController::Impl::close() {
 }
 
 Result<void> AcquisitionController::Impl::reloadPlace(std::size_t place) {
-  const auto samples = places.reload(place);
-  if (!samples) return tl::unexpected(samples.error());
+  FT_TRY(const auto samples, places.reload(place));
   ++views.revision;
   views.told_recorded.reset();
   places.judgeAround(place);
   const std::optional<Node> node = places.nodes[place];
-  emit owner->placeChanged(static_cast<int>(place), node, *samples);
+  emit owner->placeChanged(static_cast<int>(place), node, samples);
   return {};
 }
 

@@ -523,6 +523,29 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(QString::fromStdString(*second.table.metadata.tracker), QString("fake"));
   }
 
+  void aTrackerThatComesBackAfterItsSessionWasClosedHarmsNothing() {
+    QTemporaryDir folder;
+    const QString path = folder.filePath("closed.fieldtrue");
+    {
+      Bench first(path);
+      first.takeHere();
+    }
+    Bench second(path, {}, false);
+    auto other = std::make_unique<testing::FakeTracker>();
+    other->tracker_name = QStringLiteral("another");
+    second.controller.adoptDevice(std::move(other));
+    second.controller.closeSession();
+    QStringList remarks;
+    QObject::connect(&second.controller, &AcquisitionController::remarked,
+                     [&](const QString& remark) { remarks << remark; });
+    auto again = std::make_unique<testing::FakeTracker>();
+    again->tracker_name = QStringLiteral("another");
+    second.tracker = again.get();
+    second.controller.adoptDevice(std::move(again));
+    QVERIFY2(remarks.isEmpty(), qPrintable(remarks.join('\n')));
+    QVERIFY(second.controller.status().session->places.empty());
+  }
+
   void aTrackerBeforeTheFirstTakeIsForgotten() {
     QTemporaryDir folder;
     Bench bench(folder.filePath("one.fieldtrue"));
