@@ -89,7 +89,7 @@ void AcquisitionController::skip() {
   impl_->stopTake();
   const std::size_t place = *impl_->places.current;
   if (!impl_->told(impl_->store->skip(place, "skipped by the operator"))) return;
-  if (impl_->told(impl_->reloadPlace(place))) impl_->goOn();
+  if (impl_->told(impl_->reloadPlace(place))) impl_->advance();
 }
 
 void AcquisitionController::undo() {
@@ -97,7 +97,7 @@ void AcquisitionController::undo() {
 }
 
 void AcquisitionController::redo() {
-  if (impl_->step(&SessionStore::redo)) impl_->goOn();
+  if (impl_->step(&SessionStore::redo)) impl_->advance();
 }
 
 void AcquisitionController::goTo(int place) {

@@ -44,7 +44,7 @@ struct AcquisitionController::Impl {
   std::optional<std::size_t> step(Result<std::optional<std::size_t>> (SessionStore::*go)());
   void keepLoose(const std::vector<LooseSample>& readings);
   void setCurrent(std::optional<std::size_t> place);
-  void goOn();
+  void advance();
   void note(const std::string& kind, const std::string& text);
   /// Whether something could be done; where not, tells why.
   template <class T>

@@ -136,7 +136,7 @@ void AcquisitionController::Impl::setCurrent(std::optional<std::size_t> place) {
   views.tellSoon();
 }
 
-void AcquisitionController::Impl::goOn() {
+void AcquisitionController::Impl::advance() {
   setCurrent(places.next());
   if (!places.current) emit owner->finished();
 }
