@@ -323,9 +323,10 @@ class Acquisition {
 };
 
 Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
-  FT_TRY(const auto scene, readSceneArgument(options.scene));
+  const auto scene = readSceneArgument(options.scene);
+  if (!scene) return tl::unexpected(scene.error());
   // Made only to see that its text can be read, before a session file is made; it is not started.
-  if (const auto device = acquisition::makeDevice(options.device, scene); !device) return wrongUsage(device.error());
+  if (const auto device = acquisition::makeDevice(options.device, *scene); !device) return wrongUsage(device.error());
   const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
   if (!resumes && options.plan.empty()) {
     return wrongUsage(options.session + " does not exist yet; a new session needs --plan");
@@ -333,8 +334,9 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   QString create_plan_json;
   std::optional<nlohmann::json> plan_json;
   if (!options.plan.empty()) {
-    FT_TRY(const auto plan, readPlanArgument(options.plan));
-    plan_json = toJson(plan);
+    const auto plan = readPlanArgument(options.plan);
+    if (!plan) return tl::unexpected(plan.error());
+    plan_json = toJson(*plan);
     if (!resumes) create_plan_json = QString::fromStdString(plan_json->dump());
   }
   Acquisition acquisition(options, common);

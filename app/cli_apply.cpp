@@ -68,8 +68,9 @@ class TableCorrector {
   /// Copies the table with the corrected columns appended.
   Result<void> run(std::ostream& out) {
     while (true) {
-      FT_TRY(const bool more, lines_.next(line_));
-      if (!more) break;
+      const Result<bool> more = lines_.next(line_);
+      if (!more) return tl::unexpected(more.error());
+      if (!*more) break;
       if (line_.empty() || line_.front() == '#') {
         // Between rows the order of rows and remarks is kept by emptying the batch first.
         flush(out);
@@ -166,14 +167,16 @@ class TableCorrector {
   Result<Pose> pose(const std::vector<std::string_view>& fields) const {
     Pose pose;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      FT_TRY(const auto value, number(fields, columns_->position[axis]));
-      pose.position_m[static_cast<Eigen::Index>(axis)] = value;
+      const auto value = number(fields, columns_->position[axis]);
+      if (!value) return tl::unexpected(value.error());
+      pose.position_m[static_cast<Eigen::Index>(axis)] = *value;
     }
     if (!columns_->orientation) return pose;
     std::array<double, 4> q{};
     for (std::size_t i = 0; i < 4; ++i) {
-      FT_TRY(const auto value, number(fields, (*columns_->orientation)[i]));
-      q[i] = value;
+      const auto value = number(fields, (*columns_->orientation)[i]);
+      if (!value) return tl::unexpected(value.error());
+      q[i] = *value;
     }
     const Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
     if (!(orientation.norm() > 1e-6)) return bad(", columns qw to qz: the quaternion is zero");

@@ -75,13 +75,15 @@ struct SimulateOptions {
 };
 
 Outcome runSimulate(const SimulateOptions& options, const CommonOptions& common) {
-  FT_TRY(const auto plan, readPlanArgument(options.plan));
-  FT_TRY(const auto scene, readSceneArgument(options.scene));
+  const auto plan = readPlanArgument(options.plan);
+  if (!plan) return tl::unexpected(plan.error());
+  const auto scene = readSceneArgument(options.scene);
+  if (!scene) return tl::unexpected(scene.error());
   simulation::SimulationOptions simulation_options;
   simulation_options.seed = options.seed;
   simulation_options.samples_per_node = options.samples_per_node;
   const auto simulation =
-      simulation::simulate(scene, places(plan), simulation_options, runControl(common, "simulating"));
+      simulation::simulate(*scene, places(*plan), simulation_options, runControl(common, "simulating"));
   if (!simulation) return notPossible(simulation.error());
   return writeTables(options.out, &simulation->table, &simulation->samples, {});
 }
@@ -154,8 +156,9 @@ Read<std::pair<const importers::Importer*, Settings>> readFormat(const std::stri
 }
 
 Outcome runImport(const ImportOptions& options, const CommonOptions&) {
-  FT_TRY(const auto format, readFormat(options.format));
-  const auto& [importer, settings] = format;
+  const auto format = readFormat(options.format);
+  if (!format) return tl::unexpected(format.error());
+  const auto& [importer, settings] = *format;
   if (importer->needs_truth && options.truth.empty()) {
     return wrongUsage("format " + importer->id + " holds no true positions; name the file that does with --truth");
   }

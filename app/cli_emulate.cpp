@@ -58,8 +58,9 @@ Outcome runEmulate(const EmulateOptions& options, const CommonOptions& common) {
   const auto kind = acquisition::findEmulated(options.tracker);
   if (!kind) return wrongUsage(kind.error());
   Answer answer;
-  FT_TRY(const auto emulation, readEmulation(options, answer.remarks));
-  auto emulator = (*kind)->emulate(emulation);
+  const auto emulation = readEmulation(options, answer.remarks);
+  if (!emulation) return tl::unexpected(emulation.error());
+  auto emulator = (*kind)->emulate(*emulation);
   if (!emulator) return notPossible(emulator.error());
   acquisition::EmulatorRunner& runner = **emulator;
   std::ostream& lines = common.json ? std::cerr : std::cout;

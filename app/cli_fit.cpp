@@ -69,17 +69,19 @@ Answer fitAnswer(const FitOptions& options, const calibration::Corrector& correc
 Outcome runFit(const FitOptions& options, const CommonOptions& common) {
   const auto choice = calibration::parseCorrectorChoice(options.position, options.orientation);
   if (!choice) return wrongUsage(choice.error());
-  FT_TRY(const auto reading, readRowsArgument(options.nodes, options.table));
-  const CalibrationTable& table = reading.table;
-  FT_TRY(const auto align, readAlignArgument(options.align, calibration::defaultAlignMode(table.metadata)));
+  const auto reading = readRowsArgument(options.nodes, options.table);
+  if (!reading) return tl::unexpected(reading.error());
+  const CalibrationTable& table = reading->table;
+  const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(table.metadata));
+  if (!align) return tl::unexpected(align.error());
   const std::vector<Node> rows = fitRows(table);
-  auto corrector = calibration::Corrector::fit(rows, table.metadata, *choice, align, runControl(common, "fitting"));
+  auto corrector = calibration::Corrector::fit(rows, table.metadata, *choice, *align, runControl(common, "fitting"));
   if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
   const auto saved = corrector->save(options.out);
   if (!saved) return notPossible(saved.error());
-  Answer answer = fitAnswer(options, *corrector, align, table.nodes.size() - rows.size());
-  answer.remarks = reading.notes;
+  Answer answer = fitAnswer(options, *corrector, *align, table.nodes.size() - rows.size());
+  answer.remarks = reading->notes;
   return answer;
 }
 
@@ -126,24 +128,26 @@ widgets::ReportInput reportInput(CalibrationTable table, evaluation::Comparison 
 }
 
 Outcome runCompare(const CompareOptions& options, const CommonOptions& common) {
-  FT_TRY(const auto arguments, readComparisonArguments(options.comparison));
-  FT_TRY(const auto reading, readRowsArgument(options.nodes, options.table));
-  const auto comparison = evaluation::compareMethods(reading.table, arguments, runControl(common, "comparing"));
+  const auto arguments = readComparisonArguments(options.comparison);
+  if (!arguments) return tl::unexpected(arguments.error());
+  const auto reading = readRowsArgument(options.nodes, options.table);
+  if (!reading) return tl::unexpected(reading.error());
+  const auto comparison = evaluation::compareMethods(reading->table, *arguments, runControl(common, "comparing"));
   if (!comparison) return notPossible(comparison.error());
   std::vector<evaluation::LearningCurve> curves;
   if (options.learning_curve) {
-    auto learned = evaluation::learningCurves(reading.table, arguments, runControl(common, "learning"));
+    auto learned = evaluation::learningCurves(reading->table, *arguments, runControl(common, "learning"));
     if (!learned) return notPossible(learned.error());
     curves = *std::move(learned);
   }
-  Answer answer{comparisonText(*comparison, curves), toJson(*comparison), reading.notes};
+  Answer answer{comparisonText(*comparison, curves), toJson(*comparison), reading->notes};
   if (options.learning_curve) {
     answer.json["learning_curves"] = nlohmann::json::array();
     for (const evaluation::LearningCurve& curve : curves) answer.json["learning_curves"].push_back(toJson(curve));
   }
   if (!options.html.empty()) {
-    widgets::ReportInput input = reportInput(reading.table, *comparison, options.nodes, options.comparison.seed);
-    input.notes = reading.notes;
+    widgets::ReportInput input = reportInput(reading->table, *comparison, options.nodes, options.comparison.seed);
+    input.notes = reading->notes;
     input.learning_curves = std::move(curves);
     const auto written = widgets::writeHtmlReport(input, options.html);
     if (!written) return notPossible(written.error());
@@ -173,9 +177,10 @@ struct ReportOptions {
 Read<widgets::ReportInput> readReportInput(const ReportOptions& options) {
   widgets::ReportInput input;
   if (options.session.empty()) {
-    FT_TRY(auto reading, readRowsArgument(options.nodes, options.table));
-    input.table = std::move(reading.table);
-    input.notes = std::move(reading.notes);
+    auto reading = readRowsArgument(options.nodes, options.table);
+    if (!reading) return tl::unexpected(reading.error());
+    input.table = std::move(reading->table);
+    input.notes = std::move(reading->notes);
     input.source = options.nodes;
     return input;
   }
@@ -205,20 +210,23 @@ Outcome runReport(const ReportOptions& options, const CommonOptions& common) {
   if (options.nodes.empty() == options.session.empty()) {
     return wrongUsage("name what to report on: --session FILE or --nodes FILE, one of the two");
   }
-  FT_TRY(const auto arguments, readComparisonArguments(options.comparison));
-  FT_TRY(auto input, readReportInput(options));
-  const auto comparison = evaluation::compareMethods(input.table, arguments, runControl(common, "comparing"));
+  const auto arguments = readComparisonArguments(options.comparison);
+  if (!arguments) return tl::unexpected(arguments.error());
+  auto input = readReportInput(options);
+  if (!input) return tl::unexpected(input.error());
+  const auto comparison = evaluation::compareMethods(input->table, *arguments, runControl(common, "comparing"));
   if (!comparison) return notPossible(comparison.error());
-  widgets::ReportInput whole = reportInput(std::move(input.table), *comparison, input.source, options.comparison.seed);
-  whole.plan = input.plan;
-  whole.places = input.places;
-  whole.states = input.states;
-  whole.notes = input.notes;
+  widgets::ReportInput whole =
+      reportInput(std::move(input->table), *comparison, input->source, options.comparison.seed);
+  whole.plan = input->plan;
+  whole.places = input->places;
+  whole.states = input->states;
+  whole.notes = input->notes;
   const auto written = widgets::writeHtmlReport(whole, options.html);
   if (!written) return notPossible(written.error());
   Answer answer;
   answer.json = {{"file", options.html}, {"verdict", comparison->verdict.text}};
-  answer.remarks = input.notes;
+  answer.remarks = input->notes;
   answer.text = comparison->verdict.text + "\nReport written to " + options.html + "\n";
   answer.remarks = whole.notes;
   return answer;

@@ -49,12 +49,14 @@ struct DiagnosisInput {
 
 Read<DiagnosisInput> readDiagnosisInput(const DiagnoseOptions& options) {
   DiagnosisInput input;
-  FT_TRY(auto nodes, readRowsArgument(options.nodes, options.table));
-  input.table = std::move(nodes.table);
-  input.notes = std::move(nodes.notes);
+  auto nodes = readRowsArgument(options.nodes, options.table);
+  if (!nodes) return tl::unexpected(nodes.error());
+  input.table = std::move(nodes->table);
+  input.notes = std::move(nodes->notes);
   if (!options.against.empty()) {
-    FT_TRY(auto before, readRowsArgument(options.against, options.table));
-    auto change = recording::changeSince(before.table, input.table);
+    auto before = readRowsArgument(options.against, options.table);
+    if (!before) return tl::unexpected(before.error());
+    auto change = recording::changeSince(before->table, input.table);
     if (!change) return notPossible(change.error());
     input.table = *std::move(change);
   }
@@ -160,28 +162,32 @@ Read<std::vector<PlannedPlace>> readPlaces(const PlanCheckOptions& options) {
     return wrongUsage("name the grid to check: --plan PLAN or --nodes FILE, one of the two");
   }
   if (!options.plan.empty()) {
-    FT_TRY(const auto plan, readPlanArgument(options.plan));
-    return places(plan);
+    const auto plan = readPlanArgument(options.plan);
+    if (!plan) return tl::unexpected(plan.error());
+    return places(*plan);
   }
-  FT_TRY(const auto reading, readRowsArgument(options.nodes, options.table));
-  return placesOf(reading.table);
+  const auto reading = readRowsArgument(options.nodes, options.table);
+  if (!reading) return tl::unexpected(reading.error());
+  return placesOf(reading->table);
 }
 
 Outcome runPlanCheck(const PlanCheckOptions& options, const CommonOptions& common) {
-  FT_TRY(const auto places, readPlaces(options));
+  const auto places = readPlaces(options);
+  if (!places) return tl::unexpected(places.error());
   std::optional<simulation::Scene> scene;
   if (!options.scene.empty()) {
-    FT_TRY(auto read, readSceneArgument(options.scene));
-    scene = std::move(read);
+    auto read = readSceneArgument(options.scene);
+    if (!read) return tl::unexpected(read.error());
+    scene = *std::move(read);
   }
   const auto isolability = stoppable<gap::Isolability>(runControl(common, "checking"), [&](const RunControl& control) {
-    return gap::planCheck(places, scene ? &*scene : nullptr, control);
+    return gap::planCheck(*places, scene ? &*scene : nullptr, control);
   });
   if (!isolability) return notPossible(isolability.error());
   Answer answer;
   answer.json = toJson(*isolability);
   answer.json["schema"] = "fieldtrue.plan-check/1";
-  answer.json["rows"] = places.size();
+  answer.json["rows"] = places->size();
   answer.text = isolabilityText(*isolability);
   return answer;
 }

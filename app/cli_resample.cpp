@@ -75,22 +75,27 @@ Answer answerOf(const ResampleOptions& options, const calibration::ResampledTabl
 Outcome runResample(const ResampleOptions& options, const CommonOptions& common) {
   const auto method = correctors::findRegridMethod(options.method);
   if (!method) return wrongUsage(method.error());
-  FT_TRY(const auto plan, readPlanArgument(options.plan));
-  FT_TRY(const auto grid, readGrid(plan));
-  FT_TRY(const auto reading, readRowsArgument(options.nodes, options.table));
-  FT_TRY(const auto align, readAlignArgument(options.align, calibration::defaultAlignMode(reading.table.metadata)));
+  const auto plan = readPlanArgument(options.plan);
+  if (!plan) return tl::unexpected(plan.error());
+  const auto grid = readGrid(*plan);
+  if (!grid) return tl::unexpected(grid.error());
+  const auto reading = readRowsArgument(options.nodes, options.table);
+  if (!reading) return tl::unexpected(reading.error());
+  const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(reading->table.metadata));
+  if (!align) return tl::unexpected(align.error());
   // The longest pitch, so that the kernel reaches the neighbours along every axis.
-  const correctors::RegridOptions how{*method, plan.pitch_m.maxCoeff(), options.width_pitches};
-  const auto resampled = calibration::resampleTable(reading.table, grid, how, align, runControl(common, "resampling"));
+  const correctors::RegridOptions how{*method, plan->pitch_m.maxCoeff(), options.width_pitches};
+  const auto resampled =
+      calibration::resampleTable(reading->table, *grid, how, *align, runControl(common, "resampling"));
   if (!resampled) return notPossible(resampled.error());
   const auto written = writeNodeTable(std::filesystem::path(options.out), resampled->table);
   if (!written) return notPossible(written.error());
   std::vector<Node> used;
-  std::copy_if(reading.table.nodes.begin(), reading.table.nodes.end(), std::back_inserter(used),
+  std::copy_if(reading->table.nodes.begin(), reading->table.nodes.end(), std::back_inserter(used),
                [](const Node& node) { return node.role == NodeRole::kFit; });
-  Answer answer = answerOf(options, *resampled, evaluation::noiseFloor(used, reading.table.metadata));
-  answer.remarks.insert(answer.remarks.begin(), reading.notes.begin(), reading.notes.end());
-  if (const std::size_t n_unused = reading.table.nodes.size() - used.size(); n_unused > 0)
+  Answer answer = answerOf(options, *resampled, evaluation::noiseFloor(used, reading->table.metadata));
+  answer.remarks.insert(answer.remarks.begin(), reading->notes.begin(), reading->notes.end());
+  if (const std::size_t n_unused = reading->table.nodes.size() - used.size(); n_unused > 0)
     answer.remarks.push_back(std::to_string(n_unused) + " rows of role validation or skipped were not used");
   return answer;
 }

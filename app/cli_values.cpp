@@ -16,7 +16,8 @@ namespace {
 template <class Row>
 Result<MethodText> readMethod(const MethodText& text, Result<const Row*> row) {
   if (!row) return tl::unexpected(row.error());
-  FT_TRY_VOID(resolveSettings(text.id, (*row)->settings, text.given));
+  auto settings = resolveSettings(text.id, (*row)->settings, text.given);
+  if (!settings) return tl::unexpected(settings.error());
   return text;
 }
 
@@ -145,7 +146,8 @@ Read<evaluation::ComparisonOptions> readComparisonArguments(const ComparisonArgu
   }
   if (arguments.methods == "all") return options;
   for (const std::string& text : splitMethods(arguments.methods)) {
-    FT_TRY_VOID(addMethod(text, options));
+    const auto added = addMethod(text, options);
+    if (!added) return tl::unexpected(added.error());
   }
   // An empty list means all methods to compareMethods; whoever names only the other kind wants none of this one.
   if (options.position_methods.empty()) options.position_methods.push_back({"none", {}});

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "calib/core/json_reader.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 

@@ -172,14 +172,14 @@ class CorrectorContractTest : public QObject {
   void rowsAreComplete() {
     std::set<std::string> ids;
     for (const PositionMethod& method : positionMethods()) {
-      QVERIFY(!method.label.empty() && !method.source.empty() && method.fit && method.load);
+      QVERIFY(!method.label.empty() && !method.source.empty() && method.fit && method.read);
       QVERIFY2(ids.insert(method.id).second, method.id.c_str());
       QVERIFY2(kPositionRecoveries.contains(method.id), "say in this test what the method must recover");
       FT_VERIFY_OK(resolveSettings(method.id, method.settings, {}));
     }
     ids.clear();
     for (const OrientationMethod& method : orientationMethods()) {
-      QVERIFY(!method.label.empty() && !method.source.empty() && method.fit && method.load);
+      QVERIFY(!method.label.empty() && !method.source.empty() && method.fit && method.read);
       QVERIFY2(ids.insert(method.id).second, method.id.c_str());
       QVERIFY2(kOrientationRecoveries.contains(method.id), "say in this test what the method must recover");
       FT_VERIFY_OK(resolveSettings(method.id, method.settings, {}));

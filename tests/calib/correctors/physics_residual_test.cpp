@@ -216,11 +216,11 @@ class PhysicsResidualTest : public QObject {
     QFETCH(QByteArray, pointer);
     QFETCH(QByteArray, value);
     static const nlohmann::json whole = fitPosition("physics_residual", steelData()).value()->parameters();
-    const auto load = findPositionMethod("physics_residual").value()->load;
-    FT_VERIFY_OK(load(whole));
+    const PositionMethod& method = *findPositionMethod("physics_residual").value();
+    FT_VERIFY_OK(method.load(whole));
     nlohmann::json damaged = whole;
     damaged.at(nlohmann::json::json_pointer(pointer.toStdString())) = nlohmann::json::parse(value.toStdString());
-    const auto loaded = load(damaged);
+    const auto loaded = method.load(damaged);
     QVERIFY(!loaded && loaded.error().code == ErrorCode::kBadInput);
     QVERIFY(loaded.error().message.size() > 20 && loaded.error().message.find('\n') == std::string::npos);
   }
