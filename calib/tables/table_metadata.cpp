@@ -96,7 +96,7 @@ std::optional<std::string_view> likelyKey(std::string_view key) {
     const std::size_t unit = known.rfind('_');
     const bool is_other_unit =
         unit != std::string_view::npos && letters(key).starts_with(letters(known.substr(0, unit)));
-    const std::size_t slips = is_other_unit ? 1 : editDistance(letters(key), letters(known));
+    const std::size_t slips = is_other_unit ? 0 : editDistance(letters(key), letters(known));
     // In four letters two slips make another word.
     if (slips >= fewest || 3 * slips > known.size()) continue;
     fewest = slips;

@@ -283,7 +283,7 @@ class PlanTest : public QObject {
                               << "nodes is []; it must be a list with at least one node";
     QTest::newRow("no z") << node("\"y_m\": 2") << "lab: nodes[0].z_m is missing";
     QTest::newRow("far away") << node("\"z_m\": 1e9")
-                              << "nodes[0].z_m is 1000000000; it must be a number of metres within 1000";
+                              << "nodes[0].z_m is 1e+09; it must be a number of metres within 1000";
     QTest::newRow("half a quaternion") << node("\"z_m\": 3, \"qw\": 1") << "nodes[0] needs qw, qx, qy and qz together";
     QTest::newRow("zero quaternion") << node("\"z_m\": 3, \"qw\": 0, \"qx\": 0, \"qy\": 0, \"qz\": 0")
                                      << "quaternion of zeros";

@@ -117,7 +117,8 @@ class JsonReaderTest : public QObject {
     for (const char* other : {"fieldtrue.plan/1", "fieldtrue.scene/", "fieldtrue.scene/2b", "fieldtrue.scene/-1"}) {
       const auto wrong = read(json{{"schema", other}});
       QVERIFY(!wrong && wrong.error().code == ErrorCode::kBadInput);
-      FT_VERIFY_MATCH(holdsAll(wrong.error().message, {"lab is not a scene: schema is", other, "a scene has \"fieldtrue.scene/3\""}));
+      FT_VERIFY_MATCH(holdsAll(wrong.error().message,
+                               {"lab is not a scene: schema is", other, "a scene has \"fieldtrue.scene/3\""}));
     }
     QVERIFY(!read(json{{"schema", 3}}));
   }

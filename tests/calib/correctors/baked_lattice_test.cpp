@@ -38,7 +38,7 @@ class FormulaModel : public PositionModel {
 };
 
 Result<std::unique_ptr<PositionModel>> load(const json& stored) {
-  return readJson<std::unique_ptr<PositionModel>>(stored, "lattice", BakedLattice::fromJson);
+  return readJson<std::unique_ptr<PositionModel>>(stored, "baked lattice", BakedLattice::fromJson);
 }
 
 std::vector<Eigen::Vector3d> places() { return shakenGrid({5, 5, 4}, 0.25, 0.01); }
