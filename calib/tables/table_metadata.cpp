@@ -28,9 +28,12 @@ const std::array<WordKey, 3>& wordKeys() {
 std::string checkWord(const std::string& key, const std::string& value) {
   for (const WordKey& row : wordKeys()) {
     if (row.key != key || std::find(row.words.begin(), row.words.end(), value) != row.words.end()) continue;
-    std::string words;
-    for (const std::string_view word : row.words) words += (words.empty() ? "" : ", ") + std::string(word);
-    return "'" + value + "' is not one of " + words;
+    std::string wrong = "'" + value + "' is not one of ";
+    for (const std::string_view word : row.words) {
+      if (!wrong.ends_with(' ')) wrong += ", ";
+      wrong += word;
+    }
+    return wrong;
   }
   return {};
 }

@@ -58,7 +58,9 @@ inline int latticeCells(const LatticeParts& parts, std::size_t axis) { return pa
 
 /// Place of a cell in `covered`.
 inline std::size_t latticeCellIndex(const LatticeParts& parts, const std::array<int, 3>& cell) {
-  return static_cast<std::size_t>(cell[2] + latticeCells(parts, 2) * (cell[1] + latticeCells(parts, 1) * cell[0]));
+  const std::ptrdiff_t n1 = latticeCells(parts, 1);
+  const std::ptrdiff_t n2 = latticeCells(parts, 2);
+  return static_cast<std::size_t>(cell[2] + n2 * (cell[1] + n1 * cell[0]));
 }
 
 /// The most coefficients a lattice may have: 2,000,000, which are 32 MB in memory and as much in a file.

@@ -151,7 +151,7 @@ class PlanTest : public QObject {
   void everyVisitAppearsOnce() {
     QFETCH(QString, order);
     const auto all = places(read(qPrintable("grid:3x2x2@0.3:orientations=3:reseat=2:order=" + order)));
-    QCOMPARE(all.size(), std::size_t{12 * 6});
+    QCOMPARE(all.size(), std::size_t{12} * 6);
     std::set<std::pair<int, int>> seen;
     for (const PlannedPlace& place : all) {
       QVERIFY(place.node >= 0 && place.node < 12 && place.visit >= 0 && place.visit < 6);

@@ -481,7 +481,7 @@ class AcquisitionControllerTest : public QObject {
     QVERIFY2(bench.failures.isEmpty() && bench.take_failures.isEmpty(), qPrintable(bench.take_failures.join(' ')));
     bench.readTables();
     QCOMPARE(bench.table.nodes.size(), std::size_t{18});
-    QCOMPARE(bench.readingsAtPlaces(), std::size_t{18 * 60});
+    QCOMPARE(bench.readingsAtPlaces(), std::size_t{18} * 60);
     for (const Node& node : bench.nodes) {
       QCOMPARE(node.n_used, 60);
       const Pose expected_pose = inverse(bench.tracker->reference_from_tracker) * node.reference_from_sensor;

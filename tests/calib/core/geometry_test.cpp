@@ -79,7 +79,7 @@ class GeometryTest : public QObject {
     for (int axis = 0; axis < 3; ++axis) {
       for (const double step : {-1e-3, 1e-3}) {
         Pose turned = *pose;
-        const Eigen::Vector3d center = from[13];
+        const Eigen::Vector3d& center = from[13];
         turned.orientation = rotationFromVector(step * Eigen::Vector3d::Unit(axis)) * pose->orientation;
         turned.position_m = *pose * center - turned.orientation * center;
         QVERIFY(squaredError(from, mirrored, turned) > best);
