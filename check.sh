@@ -3,7 +3,7 @@
 #   tsan        the tests of acquisition under ThreadSanitizer
 #   tidy        clang-tidy over every file
 #   clang       a build with clang
-#   odr         a build with -flto -Wodr, which finds a name that two files define differently
+#   odr         the programs with -flto -Wodr, which finds a name that two files define differently
 #   sanitizers  every test, those of the window included, under address and undefined sanitizers
 # Started again it goes on where it stopped: a stage that passed at this commit is left out, and so are, in one that did
 # not, the tests that passed and the files that were clean. What has passed stands in build/check/COMMIT.
@@ -30,13 +30,13 @@ run_tests() {
 }
 
 stage_tsan() {
-  build tsan
+  build tsan --target acquisition_programs
   # Qt is not built for the sanitizer, so what its own code does is left out.
   TSAN_OPTIONS="suppressions=$suppressions/tsan.supp:ignore_noninstrumented_modules=1" run_tests tsan -L acquisition
 }
 stage_tidy() { .ci/tidy.py --all --done "$state/tidy.clean"; }
 stage_clang() { build clang; }
-stage_odr() { build odr; }
+stage_odr() { build odr --target fieldtrue fieldtrue-cli fieldtrue-pictures fieldtrue-blind; }
 stage_sanitizers() {
   build sanitizers
   run_tests sanitizers

@@ -13,6 +13,7 @@
 #include "app/cli_values.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/file_io.h"
+#include "calib/core/trimmed.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/tables/line_reader.h"
 
@@ -39,12 +40,7 @@ std::vector<std::string_view> splitFields(std::string_view line) {
   return fields;
 }
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\"";
-  const auto first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
+constexpr std::string_view kBlankOrQuote = " \t\"";
 
 /// Where the columns that matter stand.
 struct Columns {
@@ -107,7 +103,7 @@ class TableCorrector {
 
   Result<void> takeHeader(std::ostream& out) {
     std::vector<std::string> names;
-    for (const std::string_view field : splitFields(line_)) names.emplace_back(trimmed(field));
+    for (const std::string_view field : splitFields(line_)) names.emplace_back(trimmed(field, kBlankOrQuote));
     for (const std::string& name : names) {
       if (std::count(names.begin(), names.end(), name) > 1) return bad(": column " + name + " stands there twice");
     }
@@ -156,7 +152,7 @@ class TableCorrector {
   }
 
   Result<double> number(const std::vector<std::string_view>& fields, std::size_t column) const {
-    std::string_view text = trimmed(fields[column]);
+    std::string_view text = trimmed(fields[column], kBlankOrQuote);
     if (text.starts_with('+')) text.remove_prefix(1);
     double value = 0.0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -190,7 +186,7 @@ class TableCorrector {
       return bad(" has " + std::to_string(fields.size()) + " fields, the header has " +
                  std::to_string(columns_->count) + "; is the file cut off?");
     }
-    const bool marked = columns_->status && !trimmed(fields[*columns_->status]).empty();
+    const bool marked = columns_->status && !trimmed(fields[*columns_->status], kBlankOrQuote).empty();
     const auto read = pose(fields);
     // A reading the tracker itself marked may hold anything; it is kept, and corrected only when it is a pose.
     if (!read && !marked) return tl::unexpected(read.error());

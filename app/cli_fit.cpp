@@ -11,6 +11,7 @@
 #include "app/cli_values.h"
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
+#include "calib/core/units.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/learning_curve.h"
 #include "widgets/report/report.h"
@@ -20,7 +21,6 @@ namespace fieldtrue::cli {
 namespace {
 
 constexpr double kMmPerM = 1000.0;
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 struct FitOptions {
   std::string nodes;

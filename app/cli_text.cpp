@@ -6,6 +6,7 @@
 
 #include "app/cli_values.h"
 #include "calib/calibration/alignment.h"
+#include "calib/core/units.h"
 #include "calib/correctors/method_label.h"
 #include "calib/evaluation/error_stats.h"
 #include "widgets/report/numbers.h"
@@ -106,7 +107,6 @@ std::string alignedColumns(const std::vector<std::vector<std::string>>& rows) {
 }
 
 std::string fitText(const calibration::Corrector& corrector, calibration::AlignMode align, std::size_t n_unused) {
-  constexpr double kDegPerRad = 180.0 / std::numbers::pi;
   const calibration::FitReport& report = corrector.report();
   const calibration::CorrectorChoice& choice = corrector.choice();
   std::string text = "Fitted " + correctors::positionLabel(choice.position_id, choice.position_settings) +

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "acquisition/protocols/plain_number.h"
+#include "calib/core/trimmed.h"
 
 namespace fieldtrue::acquisition {
 namespace {
@@ -87,17 +88,11 @@ std::string joined(const std::vector<std::string>& fields, bool leading_comma) {
   return out;
 }
 
-std::string trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(' ');
-  if (first == std::string_view::npos) return {};
-  return std::string(text.substr(first, text.find_last_not_of(' ') - first + 1));
-}
-
 std::vector<std::string> split(std::string_view text) {
   std::vector<std::string> fields;
   for (std::size_t start = 0; start <= text.size();) {
     const std::size_t comma = std::min(text.find(',', start), text.size());
-    fields.push_back(trimmed(text.substr(start, comma - start)));
+    fields.emplace_back(trimmed(text.substr(start, comma - start)));
     start = comma + 1;
   }
   return fields;

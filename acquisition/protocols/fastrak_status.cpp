@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "calib/core/trimmed.h"
+
 namespace fieldtrue::acquisition {
 namespace {
 
@@ -12,12 +14,6 @@ constexpr std::size_t kStatusBytes = 55;
 constexpr std::size_t kShortStatusBytes = 54;
 constexpr unsigned kReservedFlags = 0x3F0;
 constexpr std::string_view kErrorMark = "*ERROR*";
-
-std::string trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \r\n");
-  if (first == std::string_view::npos) return {};
-  return std::string(text.substr(first, text.find_last_not_of(" \r\n") - first + 1));
-}
 
 std::optional<unsigned> hex(std::string_view text) {
   unsigned value = 0;
@@ -147,7 +143,7 @@ std::optional<std::string> findReadBack(std::string_view bytes, char letter, int
   if (start == std::string_view::npos) return std::nullopt;
   const std::size_t end = bytes.find('\n', start);
   if (end == std::string_view::npos) return std::nullopt;
-  return trimmed(bytes.substr(start + head.size(), end - start - head.size()));
+  return std::string(trimmed(bytes.substr(start + head.size(), end - start - head.size())));
 }
 
 }  // namespace fieldtrue::acquisition

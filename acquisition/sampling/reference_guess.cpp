@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kSamePosition_m = 1e-3;
 constexpr double kOnlyPlaceSpacing_m = 0.3;
-constexpr double kFlatRatio = 0.1;
+constexpr double kFlatReferenceRatio = 0.1;
 constexpr std::size_t kNearestPlaces = 4;
 
 }  // namespace
@@ -23,7 +23,7 @@ ReferenceGuess guessReference(std::span<const Node> done, const Pose& fallback, 
     tracked_m.push_back(node.tracker_from_sensor.position_m);
     true_m.push_back(node.reference_from_sensor.position_m);
   }
-  const int dimension = true_m.size() < 3 ? 0 : pointSpread(true_m, kFlatRatio).dimension;
+  const int dimension = true_m.size() < 3 ? 0 : pointSpread(true_m, kFlatReferenceRatio).dimension;
   if (dimension < 2) return {fallback, false};
   const Result<Pose> fitted = fitRigid(tracked_m, true_m);
   if (!fitted) return {fallback, false};

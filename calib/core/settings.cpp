@@ -7,16 +7,11 @@
 #include <optional>
 
 #include "calib/core/file_io.h"
+#include "calib/core/trimmed.h"
 
 namespace fieldtrue {
 
 namespace {
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
 
 /// The whole of a text as a number.
 template <class Number>

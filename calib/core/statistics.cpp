@@ -6,13 +6,13 @@
 #include <cstdio>
 
 #include "calib/core/quantum.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue {
 
 namespace {
 
 /// MAD to SD of a normal distribution: 1 / quantile(3/4).
-constexpr double kMadToSd = 1.4826;
 /// No tracker resolves less: what takes the quantum's place where none is known.
 constexpr double kFinestQuantum_m = 1e-6;
 /// A lattice coarser than this in one node's samples is a coincidence of few values, not the tracker's.
@@ -82,7 +82,7 @@ double deviationLimit(const std::vector<double>& deviations, double smallest_sd,
   const double middle = median(deviations);
   std::vector<double> spread;
   for (const double deviation : deviations) spread.push_back(std::abs(deviation - middle));
-  return middle + threshold * std::max(kMadToSd * median(std::move(spread)), smallest_sd);
+  return middle + threshold * std::max(kSdPerMad * median(std::move(spread)), smallest_sd);
 }
 
 std::string phrase(double seen, double limit, const char* unit) {

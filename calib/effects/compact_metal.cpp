@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "calib/core/units.h"
 #include "calib/effects/metal_body.h"
 #include "calib/effects/rows.h"
 
@@ -9,14 +10,12 @@ namespace fieldtrue::effects {
 
 namespace {
 
-constexpr double kFourPi = 4.0 * std::numbers::pi;
-
 class CompactMetal final : public field::CouplingDistortion {
  public:
   explicit CompactMetal(const MetalBody& body)
       : center_m_(body.center_m),
         radius_m_(body.radius_m),
-        moment_m3_(body.polarizability_m3 * field::dipoleField(body.center_m, 1.0 / kFourPi)) {}
+        moment_m3_(body.polarizability_m3 * field::dipoleField(body.center_m, 1.0 / (4.0 * kPi))) {}
 
   Eigen::Matrix3d fieldChange(const Eigen::Vector3d& p_sensor_m, double dipole_constant_m3,
                               double /*time_s*/) const override {
@@ -58,7 +57,7 @@ class CompactMetalFit final : public EffectFit {
   void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
                std::span<field::EffectResponse> responses) const override {
     const Eigen::Vector3d center_m = searched.head<3>();
-    const Eigen::Matrix3d field_of_transmitter = field::dipoleField(center_m, 1.0 / kFourPi);
+    const Eigen::Matrix3d field_of_transmitter = field::dipoleField(center_m, 1.0 / (4.0 * kPi));
     const std::size_t count = shape_ == BodyShape::kSphere ? 1 : 6;
     for (std::size_t i = 0; i < at.size(); ++i) {
       respondAsBody(shape_, center_m, field_of_transmitter, at[i].tracker_from_sensor.position_m,
@@ -87,7 +86,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 double spherePolarizability_m3(double radius_m, bool is_ferromagnetic, double relative_permeability) {
   const double a3 = radius_m * radius_m * radius_m;
   if (!is_ferromagnetic) return -2.0 * std::numbers::pi * a3;
-  return kFourPi * a3 * (relative_permeability - 1.0) / (relative_permeability + 2.0);
+  return (4.0 * kPi) * a3 * (relative_permeability - 1.0) / (relative_permeability + 2.0);
 }
 
 std::unique_ptr<field::CouplingDistortion> makeCompactMetal(const Eigen::Vector3d& center_m,

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/effects/parameters.h"
 #include "calib/effects/room_search.h"
 #include "calib/effects/rows.h"
@@ -17,7 +18,6 @@ namespace fieldtrue::effects {
 
 namespace {
 
-constexpr double kFourPi = 4.0 * std::numbers::pi;
 /// A plate looked for is a square this big at first, in metres.
 constexpr double kFirstSize_m = 0.6;
 constexpr double kSmallest_m = 0.1;
@@ -72,14 +72,14 @@ class FinitePlate final : public field::CouplingDistortion {
       const Eigen::MatrixXd field = sources(ring_centers_m, scale, [&](const Eigen::Vector3d& c_m) {
         return Eigen::RowVector3d(R.col(2).transpose() * field::dipoleField(c_m, 1.0));
       });
-      moments_ = -strength / kFourPi * (answer.moments * field);
+      moments_ = -strength / (4.0 * kPi) * (answer.moments * field);
       ring_centers_m_ = scaled(ring_centers_m, scale);
     }
     if (answer.charges.size() > 0) {
       const Eigen::MatrixXd potential = sources(charge_centers_m, scale, [](const Eigen::Vector3d& c_m) {
         return Eigen::RowVector3d(c_m.transpose() / std::pow(c_m.norm(), 3));
       });
-      charges_ = -strength / kFourPi * (answer.charges * potential);
+      charges_ = -strength / (4.0 * kPi) * (answer.charges * potential);
       charge_centers_m_ = scaled(charge_centers_m, scale);
     }
   }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/effects/compact_metal.h"
 #include "calib/effects/parameters.h"
 #include "calib/field/metal_response.h"
@@ -14,7 +15,6 @@ namespace fieldtrue::effects {
 
 namespace {
 
-constexpr double kFourPi = 4.0 * std::numbers::pi;
 constexpr double kLargestBelievable_m = 0.6;
 /// Eigenvalues of the other sign below this share of the largest are noise.
 constexpr double kMixedShare = 0.15;
@@ -26,7 +26,7 @@ Eigen::Vector3d eigenvaluesOf(const Eigen::Matrix3d& symmetric) {
 /// No body answers more strongly than the permeable sphere of A = 4 pi a^3: one of polarizability A is at least this
 /// big.
 double smallestRadius_m(const Eigen::Matrix3d& polarizability_m3) {
-  return std::cbrt(eigenvaluesOf(polarizability_m3).cwiseAbs().maxCoeff() / kFourPi);
+  return std::cbrt(eigenvaluesOf(polarizability_m3).cwiseAbs().maxCoeff() / (4.0 * kPi));
 }
 
 Eigen::Matrix3d matrixOf(const nlohmann::json& list) {
@@ -41,7 +41,7 @@ double sphereOf(const nlohmann::json& parameters, const field::Excitation& excit
   const nlohmann::json& conductivity = parameters.at("conductivity_s_per_m");
   if (conductivity.is_null()) return spherePolarizability_m3(radius_m, is_ferromagnetic, mu_r);
   const field::Metal metal{conductivity.get<double>(), is_ferromagnetic ? mu_r : 1.0};
-  return kFourPi / 3.0 * radius_m * radius_m * radius_m * field::sphereSusceptibility(radius_m, metal, excitation);
+  return (4.0 * kPi) / 3.0 * radius_m * radius_m * radius_m * field::sphereSusceptibility(radius_m, metal, excitation);
 }
 
 Eigen::Matrix3d tensorOf(BodyShape shape, const Eigen::VectorXd& linear) {
@@ -75,7 +75,7 @@ std::string doubtOf(double radius_m, double clearance_m) {
 
 Eigen::Matrix3d MetalBody::fieldChange_per_m3(const Eigen::Vector3d& p_sensor_m) const {
   return field::dipoleField(p_sensor_m - center_m, 1.0) * polarizability_m3 *
-         field::dipoleField(center_m, 1.0 / kFourPi);
+         field::dipoleField(center_m, 1.0 / (4.0 * kPi));
 }
 
 std::vector<Setting> bodyParameters() {
@@ -143,7 +143,7 @@ FittedEffect describeBody(BodyShape shape, const Eigen::Vector3d& center_m, cons
                           const RoomSearch& search) {
   const Eigen::Matrix3d A = tensorOf(shape, linear);
   const Eigen::Vector3d eigenvalues = eigenvaluesOf(A);
-  const double conducting_radius_m = std::cbrt(eigenvalues.cwiseAbs().maxCoeff() / (0.5 * kFourPi));
+  const double conducting_radius_m = std::cbrt(eigenvalues.cwiseAbs().maxCoeff() / (0.5 * (4.0 * kPi)));
   FittedEffect fitted;
   fitted.location_m = center_m;
   fitted.material = materialOf(eigenvalues);

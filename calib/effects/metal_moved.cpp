@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "calib/core/units.h"
 #include "calib/effects/metal_body.h"
 #include "calib/effects/parameters.h"
 #include "calib/effects/rows.h"
@@ -13,7 +14,6 @@ namespace {
 /// by this share of what it explains.
 constexpr double kShareForMoved = 0.06;
 
-constexpr double kFourPi = 4.0 * std::numbers::pi;
 /// A change that fewer readings than this on one side of it speak for is not looked for.
 constexpr double kLeastShare = 0.05;
 
@@ -96,7 +96,7 @@ class MetalMovedFit final : public EffectFit {
   void respond(std::span<const field::SensorSetting> at, const Eigen::VectorXd& searched,
                std::span<field::EffectResponse> responses) const override {
     const Eigen::Vector3d center_m = searched.head<3>();
-    const Eigen::Matrix3d field_of_transmitter = field::dipoleField(center_m, 1.0 / kFourPi);
+    const Eigen::Matrix3d field_of_transmitter = field::dipoleField(center_m, 1.0 / (4.0 * kPi));
     const std::size_t count = shape_ == BodyShape::kSphere ? 1 : 6;
     for (std::size_t i = 0; i < at.size(); ++i) {
       const auto own = responses.subspan(i * count, count);

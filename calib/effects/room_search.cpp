@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "calib/core/units.h"
+
 namespace fieldtrue::effects {
 
 namespace {
@@ -120,7 +122,6 @@ Eigen::Vector2d DirectionChart::angles_rad(const Eigen::Vector3d& direction) con
 }
 
 std::vector<FitParameter> DirectionChart::parameters() {
-  constexpr double kPi = std::numbers::pi;
   return {{"latitude_rad", "rad", -0.5 * kPi, 0.5 * kPi}, {"longitude_rad", "rad", -2.0 * kPi, 2.0 * kPi}};
 }
 

@@ -6,6 +6,7 @@
 
 #include "calib/correctors/method_label.h"
 #include "calib/evaluation/base/noise_floor.h"
+#include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/held_out.h"
@@ -18,8 +19,6 @@
 
 namespace fieldtrue::evaluation {
 namespace {
-
-tl::unexpected<Error> stoppedError() { return fail(ErrorCode::kCancelled, "The comparison was stopped on request"); }
 
 /// The places' errors of one candidate, with what its fits told.
 MethodScore methodScore(const HeldOutJob& job, const Candidate& candidate, CandidateScores scores,
@@ -147,12 +146,12 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
     comparison.notes.push_back("The places lie in one plane: methods are fitted in it, and nothing is claimed off it.");
   scoreBefore(job, held_out, scored, comparison);
   scoreMethods(job, held_out, scored, comparison, control);
-  if (control.stop.stop_requested()) return stoppedError();
+  if (control.stop.stop_requested()) return comparisonStopped();
   scoreCommonPlaces(comparison.position, comparison.places.size());
   noteClosedForm(comparison);
   pickBest(comparison, options.seed, control);
   judgePlaces(comparison, job);
-  if (control.stop.stop_requested()) return stoppedError();
+  if (control.stop.stop_requested()) return comparisonStopped();
   if (options.with_surroundings) FT_TRY_VOID(addSurroundings(comparison, table, job, partOf(control, scores_end, 1.0)));
   writeVerdictText(comparison);
   return comparison;

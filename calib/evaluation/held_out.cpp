@@ -211,8 +211,6 @@ Result<void> alignFolds(Run& run) {
   return {};
 }
 
-tl::unexpected<Error> stoppedError() { return fail(ErrorCode::kCancelled, "The comparison was stopped on request"); }
-
 /// What a method that failed with something held out leaves behind.
 void keepReasons(Run& run) {
   for (std::size_t i = 0; i < run.why_not.size(); ++i)
@@ -229,7 +227,7 @@ Result<void> runFolds(Run& run) {
   run.control.parallel_for(tasks.size(), [&](std::size_t t) {
     if (!run.stopped()) tasks[t].work();
   });
-  if (run.stopped()) return stoppedError();
+  if (run.stopped()) return comparisonStopped();
   keepReasons(run);
   for (std::size_t i = 0; i < run.job.candidates.size(); ++i) {
     CandidateScores& scores = run.scores.candidates[i];
@@ -261,9 +259,9 @@ Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& cont
     if (!is_role) scores.candidates[i].held_out.resize(job.scored.size());
     meter.add(1.0);
   });
-  if (run.stopped()) return stoppedError();
+  if (run.stopped()) return comparisonStopped();
   FT_TRY_VOID(alignFolds(run));
-  if (run.stopped()) return stoppedError();
+  if (run.stopped()) return comparisonStopped();
   if (is_role) {
     control.progress(1.0);
     return scores;

@@ -140,7 +140,7 @@ Result<std::vector<LearningCurve>> learningCurves(const CalibrationTable& table,
       rms[i][d] = heldOutRms(job, candidate, draws[d], scored, split.scored, dimension, inner);
     meter.add(1.0);
   });
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
+  if (control.stop.stop_requested()) return comparisonStopped();
   std::vector<LearningCurve> curves;
   for (std::size_t i = 0; i < n_candidates; ++i) curves.push_back(curveOf(job.candidates[i], points, draws, rms[i]));
   return curves;

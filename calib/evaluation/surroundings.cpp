@@ -6,6 +6,7 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/regrid/regrid_error.h"
 #include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/limits.h"
 #include "calib/evaluation/region/region_lattice.h"
@@ -16,7 +17,7 @@ namespace {
 
 Result<void> unlessStopped(const RunControl& control, double done) {
   control.progress(done);
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
+  if (control.stop.stop_requested()) return comparisonStopped();
   return {};
 }
 

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "calib/core/error.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::field {
 
@@ -11,7 +12,6 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kPi = std::numbers::pi;
 /// Stands for the limit of high frequency [1/s].
 constexpr double kVeryFast_per_s = 1e18;
 

@@ -7,12 +7,12 @@
 #include <numbers>
 
 #include "calib/core/error.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::field {
 
 namespace {
 
-constexpr double kFourPi = 4.0 * std::numbers::pi;
 constexpr double kInset = 0.25;
 /// Of the charges' mesh beyond the edge, both sides together, in cells: flat charges fall short of the peak at an edge.
 constexpr double kOutset = 0.34;
@@ -38,7 +38,7 @@ double ringField_per_m(const Eigen::Vector2d& from_center_m, const Eigen::Vector
       sum += (side_x * side_y > 0.0 ? 1.0 : -1.0) * std::hypot(u, v) / (u * v);
     }
   }
-  return sum / kFourPi;
+  return sum / (4.0 * kPi);
 }
 
 /// Potential at a place in its plane of unit charge spread over a rectangular cell [1/m].
@@ -52,7 +52,7 @@ double chargePotential_per_m(const Eigen::Vector2d& from_center_m, const Eigen::
       sum += side_x * side_y > 0.0 ? corner : -corner;
     }
   }
-  return sum / (kFourPi * cell_m.prod());
+  return sum / ((4.0 * kPi) * cell_m.prod());
 }
 
 Eigen::MatrixXd pairs(const std::vector<Eigen::Vector2d>& centers_m, const Eigen::Vector2d& cell_m,

@@ -241,12 +241,6 @@ Shrinkage shrinkageOf(double before, double after, double low_after, double high
   return shrinkage;
 }
 
-double sumOfSquares(std::span<const identify::Vector6d> residuals) {
-  double sum = 0.0;
-  for (const identify::Vector6d& residual : residuals) sum += residual.squaredNorm();
-  return sum;
-}
-
 /// What an effect that was not selected would take away: by its exact fit, less what that many parameters take from
 /// noise; nothing where the places it did not see say so.
 Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::TriedEffect& tried,
@@ -256,7 +250,7 @@ Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::Tr
     double parameters = 0.0;
     for (const identify::GapTerm& term : tried.model.terms)
       parameters += static_cast<double>(term.linear.size() + term.searched.size());
-    const double left = sumOfSquares(identify::whitenedResiduals(search.physics(), tried.model, search.whitening()));
+    const double left = whitenedSquares(search, tried.model);
     fall = std::max(fall, none - left - parameters);
   }
   const double after = held_out.before - fall / count;
@@ -273,8 +267,7 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search,
                                              double mm_per_unit) {
   const identify::GapRows& rows = search.physics().rows();
   const double count = static_cast<double>(rows.rows.size()) * rows.channels();
-  const double none =
-      sumOfSquares(identify::whitenedResiduals(search.physics(), search.none().model, search.whitening()));
+  const double none = whitenedSquares(search, search.none().model);
   std::vector<GapCandidate> candidates;
   for (const identify::TriedEffect& tried : selection.alternatives) {
     GapCandidate candidate;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/effects/registry.h"
 #include "calib/field/tracker_model.h"
 #include "calib/gap/candidates.h"
@@ -23,7 +24,6 @@ namespace fieldtrue::gap {
 namespace {
 
 constexpr std::size_t kStartsForIsolability = 24;
-constexpr double kDegree = 180.0 / std::numbers::pi;
 
 Result<std::vector<std::unique_ptr<field::PhysicalEffect>>> believedEffects(const simulation::Scene* scene,
                                                                             const field::Excitation& excitation) {
@@ -100,7 +100,7 @@ void addBoundOfFloor(const identify::GapSearch& search, GapReport& report) {
          "a foot set on its mark within a finger's breadth",
          "Are true and tracked positions of the same places and of one sensor? Else state jig_tolerance_m.");
   if (search.floorPlacingSd_rad() < search.placingSd_rad())
-    tell(kDegree * search.placingSd_rad(), kDegree * identify::kWorstPlacing_rad, "degrees",
+    tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * identify::kWorstPlacing_rad, "degrees",
          "turned and held upright by eye within ten degrees",
          "Are the true orientations those of the places, and all rows of one sensor? Else state jig_tolerance_rad, or "
          "leave the columns of the orientation out.");

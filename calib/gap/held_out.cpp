@@ -55,12 +55,6 @@ class FoldFitter {
   std::span<const int> blocks_;
 };
 
-double sumOfSquares(std::span<const identify::Vector6d> residuals) {
-  double sum = 0.0;
-  for (const identify::Vector6d& r : residuals) sum += r.squaredNorm();
-  return sum;
-}
-
 /// Means over places drawn with replacement of the fall from step 0 to each step.
 std::vector<std::vector<double>> bootstrapFalls(const RowSquares& squares, const identify::GapRows& rows) {
   constexpr int kDraws = 300;
@@ -94,6 +88,13 @@ double HeldOutGap::fractionAfter(std::size_t effects) const {
   return std::sqrt(std::max(0.0, after[effects - 1]) / before);
 }
 
+double whitenedSquares(const identify::GapSearch& search, const identify::GapModel& model) {
+  double sum = 0.0;
+  for (const identify::Vector6d& r : identify::whitenedResiduals(search.physics(), model, search.whitening()))
+    sum += r.squaredNorm();
+  return sum;
+}
+
 HeldOutGap holdOut(const identify::GapSearch& search, const identify::EffectSelection& selection,
                    const identify::Structure& structure, const RunControl& control) {
   const identify::GapRows& rows = search.physics().rows();
@@ -109,10 +110,8 @@ HeldOutGap holdOut(const identify::GapSearch& search, const identify::EffectSele
   HeldOutGap gap;
   gap.left = std::max(0.0, structure.energy) / count;
   gap.left_sd = structure.energy_sd / count;
-  const double none =
-      sumOfSquares(identify::whitenedResiduals(search.physics(), search.none().model, search.whitening()));
-  const double last =
-      sumOfSquares(identify::whitenedResiduals(search.physics(), selection.model.model, search.whitening()));
+  const double none = whitenedSquares(search, search.none().model);
+  const double last = whitenedSquares(search, selection.model.model);
   double parameters = 0.0;
   for (const identify::GapTerm& term : selection.model.model.terms)
     parameters += static_cast<double>(term.linear.size() + term.searched.size());
@@ -143,8 +142,7 @@ std::vector<double> creditShares(const identify::GapSearch& search, const identi
     model.alignment = full.alignment;
     for (std::size_t t = 0; t < n; ++t)
       if ((subset >> t & 1U) != 0) model.terms.push_back(full.terms[t]);
-    value[subset] =
-        -sumOfSquares(identify::whitenedResiduals(search.physics(), search.refined(model).model, search.whitening()));
+    value[subset] = -whitenedSquares(search, search.refined(model).model);
   }
   const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1.0); };
   std::vector<double> credit(n, 0.0);

@@ -22,6 +22,9 @@ struct HeldOutGap {
   double fractionAfter(std::size_t effects) const;  ///< Amplitude left over amplitude before.
 };
 
+/// Sum of the squares that a model leaves, whitened.
+double whitenedSquares(const identify::GapSearch& search, const identify::GapModel& model);
+
 /// Refits the whole sequence with each block of places held out, every searched parameter searched anew.
 /// @param structure of the residuals of the full model
 HeldOutGap holdOut(const identify::GapSearch& search, const identify::EffectSelection& selection,

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/recording/finding.h"
 
 namespace fieldtrue::gap {
@@ -13,7 +14,6 @@ namespace {
 using nlohmann::json;
 
 constexpr double kMmPerM = 1000.0;
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 json numberToJson(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 

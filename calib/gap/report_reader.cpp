@@ -5,6 +5,7 @@
 #include "calib/core/file_io.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/json_text.h"
+#include "calib/core/units.h"
 #include "calib/gap/report_json.h"
 #include "calib/recording/finding.h"
 
@@ -13,8 +14,6 @@ namespace fieldtrue::gap {
 namespace {
 
 constexpr int kVersion = 1;
-constexpr double kMPerMm = 1e-3;
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 /// Components that could not be estimated are null.
 Eigen::Vector3d vectorFrom(const JsonReader& json) {

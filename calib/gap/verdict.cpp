@@ -5,12 +5,11 @@
 #include <numbers>
 
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/effects/registry.h"
 
 namespace fieldtrue::gap {
 namespace {
-
-constexpr double kDegree = 180.0 / std::numbers::pi;
 
 /// How much of the gap's amplitude scatters from place to place beyond what a person with a jig does, where no
 /// tolerance is stated; 0 where it is not clearly beyond that. No effect of the catalogue explains it.
@@ -26,7 +25,7 @@ double scatterAboveBound(const identify::GapSearch& search, const identify::GapR
   if (!stated.placing_sd_m)
     most = share(search.placingSd_m(), identify::kWorstPlacing_m, 1e-3 * report.position_rms_mm);
   if (!stated.placing_sd_rad && report.orientation_rms_deg) {
-    const double gap_rad = *report.orientation_rms_deg / kDegree;
+    const double gap_rad = *report.orientation_rms_deg / kDegPerRad;
     most = std::max(most, share(search.placingSd_rad(), identify::kWorstPlacing_rad, gap_rad));
   }
   return most;

@@ -8,11 +8,10 @@
 #include <numeric>
 
 #include "calib/core/statistics.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::gap {
 namespace {
-
-constexpr double kDegree = 180.0 / std::numbers::pi;
 
 /// Upper tail of chi-square. @source Wilson and Hilferty 1931, Proc. Nat. Acad. Sci. 17 684
 double chiSquareTail(double value, double freedom) {
@@ -130,8 +129,8 @@ void describeChannels(const identify::GapRows& table, const GapReport& at, const
     std::vector<double> values;
     std::vector<double> floors;
     for (std::size_t i = 0; i < noise.size(); ++i) {
-      values.push_back(kDegree * at.nodes[i].before_rad[axis]);
-      floors.push_back(kDegree * std::sqrt(noise[i](3 + axis, 3 + axis)));
+      values.push_back(kDegPerRad * at.nodes[i].before_rad[axis]);
+      floors.push_back(kDegPerRad * std::sqrt(noise[i](3 + axis, 3 + axis)));
     }
     addChannel(std::string("rotation_") + kAxes[axis], "deg", values, floors, report);
   }
@@ -183,7 +182,7 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
     noise.push_back(identify::noiseOf(table.rows[i], search.floorPlacingSd_m(), search.floorPlacingSd_rad()));
     const double var_m2 = noise.back().topLeftCorner<3, 3>().trace();
     const double var_rad2 = noise.back().bottomRightCorner<3, 3>().trace();
-    rows.push_back({1e3 * std::sqrt(var_m2), kDegree * std::sqrt(var_rad2),
+    rows.push_back({1e3 * std::sqrt(var_m2), kDegPerRad * std::sqrt(var_rad2),
                     settings[i].tracker_from_sensor.position_m.norm(), table.rows[i].time_s});
     const double d2 = white[i].squaredNorm();
     p.push_back(chiSquareTail(d2, channels));
@@ -209,8 +208,8 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
   report.position_rms_mm = 1e3 * std::sqrt(gap_m2 / n);
   report.floor_position_mm = 1e3 * std::sqrt(floor_m2 / n);
   if (table.has_orientation) {
-    report.orientation_rms_deg = kDegree * std::sqrt(gap_rad2 / n);
-    report.floor_orientation_deg = kDegree * std::sqrt(floor_rad2 / n);
+    report.orientation_rms_deg = kDegPerRad * std::sqrt(gap_rad2 / n);
+    report.floor_orientation_deg = kDegPerRad * std::sqrt(floor_rad2 / n);
   }
   report.ratio_to_floor = std::sqrt(sum / (n * channels));
   describeHotspot(report);

@@ -3,6 +3,7 @@
 
 #include "calib/core/declare.h"
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/importers/rows.h"
 #include "calib/tables/csv_reader.h"
 
@@ -10,7 +11,6 @@ namespace fieldtrue::importers {
 
 namespace {
 
-constexpr double kMm_m = 1e-3;
 constexpr std::array<std::string_view, 8> kColumns{"condition", "node",         "true_x_mm",    "true_y_mm",
                                                    "true_z_mm", "tracked_x_mm", "tracked_y_mm", "tracked_z_mm"};
 
@@ -18,7 +18,7 @@ Eigen::Vector3d position_m(CsvReader& reader, const std::vector<std::size_t>& co
   const double x_mm = reader.number(columns[first]);
   const double y_mm = reader.number(columns[first + 1]);
   const double z_mm = reader.number(columns[first + 2]);
-  return kMm_m * Eigen::Vector3d(x_mm, y_mm, z_mm);
+  return kMPerMm * Eigen::Vector3d(x_mm, y_mm, z_mm);
 }
 
 Node readNode(CsvReader& reader, const std::vector<std::size_t>& columns) {

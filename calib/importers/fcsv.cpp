@@ -3,6 +3,7 @@
 #include <array>
 
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/importers/rows.h"
 #include "calib/importers/truth.h"
 #include "calib/tables/csv_reader.h"
@@ -10,8 +11,6 @@
 namespace fieldtrue::importers {
 
 namespace {
-
-constexpr double kMm_m = 1e-3;
 
 /// Signs that bring x, y, z to RAS.
 Result<Eigen::Vector3d> signsToRas(const CsvReader& reader, std::vector<std::string>& notes) {
@@ -72,7 +71,7 @@ Result<FcsvPoints> readFcsv(const std::filesystem::path& path) {
     if (!more) break;
     const Eigen::Vector3d position_mm(reader.number(columns[0]), reader.number(columns[1]), reader.number(columns[2]));
     if (reader.error()) return tl::unexpected(*reader.error());
-    fcsv.points.push_back({label ? std::string(reader.field(*label)) : "", kMm_m * signs.cwiseProduct(position_mm)});
+    fcsv.points.push_back({label ? std::string(reader.field(*label)) : "", kMPerMm * signs.cwiseProduct(position_mm)});
   }
   if (fcsv.points.empty()) return fail(ErrorCode::kBadInput, reader.name() + " has a header but no points");
   return fcsv;

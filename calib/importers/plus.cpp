@@ -6,6 +6,7 @@
 #include "calib/core/file_io.h"
 #include "calib/core/quantum.h"
 #include "calib/core/statistics.h"
+#include "calib/core/units.h"
 #include "calib/importers/averaging.h"
 #include "calib/importers/rows.h"
 #include "calib/tables/csv_reader.h"
@@ -16,7 +17,6 @@ namespace {
 
 using Names = std::vector<std::string_view>;
 
-constexpr double kMm_m = 1e-3;
 const Names kPlaceColumns{"t_s", "landmark", "true_x_mm", "true_y_mm", "true_z_mm"};
 
 /// Which columns hold the tracked pose of a body.
@@ -54,7 +54,7 @@ Eigen::Vector3d position_m(CsvReader& reader, std::span<const std::size_t> colum
   const double x_mm = reader.number(columns[0]);
   const double y_mm = reader.number(columns[1]);
   const double z_mm = reader.number(columns[2]);
-  return kMm_m * Eigen::Vector3d(x_mm, y_mm, z_mm);
+  return kMPerMm * Eigen::Vector3d(x_mm, y_mm, z_mm);
 }
 
 void readRow(CsvReader& reader, const std::vector<std::size_t>& place, const std::vector<std::size_t>& position,

@@ -3,6 +3,7 @@
 
 #include "calib/core/declare.h"
 #include "calib/core/file_io.h"
+#include "calib/core/trimmed.h"
 #include "calib/importers/rows.h"
 #include "calib/tables/csv_reader.h"
 
@@ -16,13 +17,13 @@ constexpr double kLargestRotationError = 1e-2;
 /// Four numbers of a line; none when it holds anything else.
 std::optional<Eigen::RowVector4d> numbersOf(std::string_view line) {
   Eigen::RowVector4d row;
-  std::string_view rest = trimBlanks(line);
+  std::string_view rest = trimmed(line);
   for (Eigen::Index column = 0; column < 4; ++column) {
     const std::size_t end = std::min(rest.find_first_of(" \t"), rest.size());
     const std::optional<double> value = parseFinite(rest.substr(0, end));
     if (!value) return std::nullopt;
     row[column] = *value;
-    rest = trimBlanks(rest.substr(end));
+    rest = trimmed(rest.substr(end));
   }
   return rest.empty() ? std::optional(row) : std::nullopt;
 }
@@ -47,7 +48,7 @@ Result<std::vector<SampleRow>> readMatrices(std::istream& in, const std::string&
   for (std::string line;;) {
     FT_TRY(const bool more, lines.next(line));
     if (!more) break;
-    if (trimBlanks(line).empty()) {
+    if (trimmed(line).empty()) {
       if (next_row != 0) return bad("a matrix has " + std::to_string(next_row) + " rows, it needs 4");
       continue;
     }

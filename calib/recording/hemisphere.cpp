@@ -15,7 +15,7 @@ namespace fieldtrue::recording {
 
 namespace {
 
-constexpr std::size_t kFewestRows = 6;
+constexpr std::size_t kFewestHemisphereRows = 6;
 /// Rows on which guesses are judged; the best is then judged on all.
 constexpr std::size_t kMostJudged = 150;
 constexpr int kTriples = 150;
@@ -144,7 +144,7 @@ std::vector<std::size_t> rowsOf(const std::vector<Node>& nodes, int sensor) {
 }
 
 void markMirrored(const std::vector<Node>& nodes, const std::vector<std::size_t>& rows, std::vector<bool>& mirrored) {
-  if (rows.size() < kFewestRows) return;
+  if (rows.size() < kFewestHemisphereRows) return;
   std::vector<Pair> pairs;
   std::vector<double> ranges_m;
   for (const std::size_t row : rows) {

@@ -6,17 +6,17 @@
 #include <random>
 
 #include "calib/core/statistics.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::recording {
 
 namespace {
 
-constexpr std::size_t kFewestRows = 12;
-constexpr int kFewestReadings = 5;
+constexpr std::size_t kFewestNoiseRows = 12;
+constexpr int kFewestReadingsOfAVisit = 5;
 /// SD of the logarithm of range below which no power can be told.
 constexpr double kLeastSpread = 0.1;
 constexpr int kDraws = 200;
-constexpr double kMadToSd = 1.4826;
 /// Variances below so many of the quantum's own say nothing of the noise.
 constexpr double kTimesQuantumVariance = 2.0;
 /// Total position SD over sigma r^4/C: one radial axis of 1/(3 sqrt(6)), two transverse ones of sqrt(5)/3.
@@ -57,7 +57,7 @@ Line robustLine(const std::vector<Point>& points) {
     line = weightedLine(points, weights);
     std::vector<double> sizes;
     for (const Point& point : points) sizes.push_back(std::abs(point.y - line.offset - line.slope * point.x));
-    const double scale = std::max(kMadToSd * median(sizes), 1e-6);
+    const double scale = std::max(kSdPerMad * median(sizes), 1e-6);
     for (std::size_t i = 0; i < points.size(); ++i) weights[i] = std::min(1.0, 1.5 * scale / std::max(sizes[i], 1e-12));
   }
   return line;
@@ -123,7 +123,7 @@ std::vector<NoiseRow> noiseRows(const std::vector<SampleVisit>& visits, double c
 std::vector<NoiseRow> noiseRows(std::span<const Node> nodes, double quantum_m) {
   std::vector<NoiseRow> rows;
   for (const Node& node : nodes) {
-    if (!node.covariance_m2 || node.n_used < kFewestReadings || node.role == NodeRole::kSkipped) continue;
+    if (!node.covariance_m2 || node.n_used < kFewestReadingsOfAVisit || node.role == NodeRole::kSkipped) continue;
     auto row = noiseRow(node.tracker_from_sensor.position_m, *node.covariance_m2, quantum_m);
     if (!row) continue;
     if (node.has_orientation && node.sd_rot_rad && *node.sd_rot_rad > 2e-6) row->rotation_sd_rad = node.sd_rot_rad;
@@ -146,7 +146,7 @@ std::optional<NoiseLaw> fitNoiseLaw(const std::vector<NoiseRow>& rows) {
     law.farthest_m = std::max(law.farthest_m, row.range_m);
     ++law.rows;
   }
-  if (rows.size() < kFewestRows || spreadOf(position) < kLeastSpread) return std::nullopt;
+  if (rows.size() < kFewestNoiseRows || spreadOf(position) < kLeastSpread) return std::nullopt;
   const auto slope = [](const std::vector<Point>& points) { return robustLine(points).slope; };
   const auto middle = [](const std::vector<Point>& points) {
     std::vector<double> values;
@@ -154,7 +154,7 @@ std::optional<NoiseLaw> fitNoiseLaw(const std::vector<NoiseRow>& rows) {
     return median(std::move(values));
   };
   law.position_power = resampled(position, slope);
-  if (rotation.size() >= kFewestRows && spreadOf(rotation) >= kLeastSpread) {
+  if (rotation.size() >= kFewestNoiseRows && spreadOf(rotation) >= kLeastSpread) {
     law.rotation_power = resampled(rotation, slope);
   }
   law.log_transverse_to_radial = resampled(anisotropy, middle);

@@ -11,14 +11,14 @@ namespace fieldtrue::recording {
 namespace {
 
 constexpr std::size_t kMostRows = 2000;
-constexpr double kFinest_m = 1e-6;
+constexpr double kFinestStep_m = 1e-6;
 constexpr double kMostReadingsARow = 3.0;
-constexpr std::size_t kFewestRows = 20;
+constexpr std::size_t kFewestLatticeRows = 20;
 
 std::optional<double> latticeOf_m(std::span<const double> values_m) {
   if (const auto quantum_m = findQuantum_m(values_m)) return quantum_m;
   const double printed_m = values_m.empty() ? 0.0 : printedStep_m(values_m);
-  return printed_m >= kFinest_m ? std::optional(printed_m) : std::nullopt;
+  return printed_m >= kFinestStep_m ? std::optional(printed_m) : std::nullopt;
 }
 
 void append(std::vector<double>& values_m, const Eigen::Vector3d& p_m) {
@@ -62,7 +62,7 @@ std::optional<double> latticeOfRows_m(std::span<const Node> nodes) {
     append(values_m, node.tracker_from_sensor.position_m);
     readings.push_back(node.n_used);
   }
-  if (nodes.size() < kFewestRows || median(std::move(readings)) > kMostReadingsARow) return std::nullopt;
+  if (nodes.size() < kFewestLatticeRows || median(std::move(readings)) > kMostReadingsARow) return std::nullopt;
   return latticeOf_m(values_m);
 }
 

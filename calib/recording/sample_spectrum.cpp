@@ -12,7 +12,7 @@ namespace fieldtrue::recording {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr std::size_t kFewestReadings = 16;
+constexpr std::size_t kFewestSpectrumReadings = 16;
 constexpr std::size_t kFewestStops = 4;
 constexpr std::size_t kMostStops = 1500;
 constexpr std::size_t kLongestPart = 128;
@@ -89,7 +89,7 @@ std::vector<Part> partsOf(const std::vector<SampleVisit>& visits, double rate_hz
     const std::size_t n = visit.times_s.size();
     const std::size_t pieces = std::min<std::size_t>((n + kLongestPart - 1) / kLongestPart, 16);
     const std::size_t length = std::min(n / pieces, kLongestPart);
-    if (length < kFewestReadings) continue;
+    if (length < kFewestSpectrumReadings) continue;
     for (std::size_t piece = 0; piece < pieces; ++piece) {
       Part part;
       part.times_s = partTimes_s(visit, piece * length, length, rate_hz);

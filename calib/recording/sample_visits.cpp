@@ -6,13 +6,13 @@
 #include <tuple>
 
 #include "calib/core/statistics.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::recording {
 
 namespace {
 
 constexpr double kOutlierSds = 8.0;
-constexpr double kMadToSd = 1.4826;
 constexpr double kFinest_m = 1e-6;
 
 using StopKey = std::tuple<int, int, int>;
@@ -35,7 +35,7 @@ std::vector<const Sample*> withoutOutliers(const std::vector<const Sample*>& sam
   for (const Sample* sample : samples) {
     distances_m.push_back((sample->tracker_from_sensor.position_m - middle_m).norm());
   }
-  const double limit_m = kOutlierSds * std::max(kMadToSd * median(distances_m), kFinest_m);
+  const double limit_m = kOutlierSds * std::max(kSdPerMad * median(distances_m), kFinest_m);
   std::vector<const Sample*> left;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (distances_m[i] <= limit_m) left.push_back(samples[i]);

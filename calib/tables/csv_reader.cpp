@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "calib/core/file_io.h"
+#include "calib/core/trimmed.h"
 
 namespace fieldtrue {
 
@@ -30,14 +31,8 @@ std::string fieldCount(std::size_t count) { return std::to_string(count) + (coun
 
 }  // namespace
 
-std::string_view trimBlanks(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
 std::optional<double> parseFinite(std::string_view text) {
-  std::string_view digits = trimBlanks(text);
+  std::string_view digits = trimmed(text);
   if (digits.size() > 1 && digits.front() == '+' && digits[1] != '-') digits.remove_prefix(1);
   double value = 0.0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
@@ -66,9 +61,9 @@ std::optional<CsvReader::MetadataLine> CsvReader::metadataLine(char mark) const 
   const std::string_view text = std::string_view(line_).substr(1);
   const std::size_t at = text.find(mark);
   if (at == std::string_view::npos) return std::nullopt;
-  const std::string_view key = trimBlanks(text.substr(0, at));
+  const std::string_view key = trimmed(text.substr(0, at));
   if (key.empty()) return std::nullopt;
-  return MetadataLine{std::string(key), std::string(trimBlanks(text.substr(at + 1))), line()};
+  return MetadataLine{std::string(key), std::string(trimmed(text.substr(at + 1))), line()};
 }
 
 Result<void> CsvReader::readHeader(bool is_comment_header) {
@@ -88,7 +83,7 @@ Result<void> CsvReader::readHeader(bool is_comment_header) {
       if (!is_header) continue;
       line_ = metadata->value;
     }
-    if (!trimBlanks(line_).empty()) break;
+    if (!trimmed(line_).empty()) break;
   }
   if (!splitLine()) return tl::unexpected(*error_);
   columns_.assign(fields_.begin(), fields_.end());
@@ -153,7 +148,7 @@ bool CsvReader::splitLine() {
       continue;
     }
     const std::size_t end = std::min(text.find(separator_, at), text.size());
-    fields_.push_back(trimBlanks(text.substr(at, end - at)));
+    fields_.push_back(trimmed(text.substr(at, end - at)));
     if (end == text.size()) break;
     at = end + 1;
   }
@@ -169,7 +164,7 @@ Result<bool> CsvReader::next() {
       // A key is one word; a remark like "moved at 10:30" is none.
       if (!metadata || metadata->key.find(' ') != std::string::npos) continue;
       if (++n_late_metadata_ == 1) late_metadata_ = metadata;
-    } else if (!trimBlanks(line_).empty()) {
+    } else if (!trimmed(line_).empty()) {
       break;
     }
   }

@@ -93,6 +93,4 @@ class CsvReader {
 /// A finite number without anything around it but blanks; none otherwise.
 std::optional<double> parseFinite(std::string_view text);
 
-std::string_view trimBlanks(std::string_view text);
-
 }  // namespace fieldtrue

@@ -1,6 +1,7 @@
 #include <QTest>
 #include <cmath>
 
+#include "tests/blind/is_near.h"
 #include "tests/blind/plates.h"
 #include "tests/blind/pose_solver.h"
 #include "tests/support/test_main.h"
@@ -8,12 +9,6 @@
 using namespace blind;
 
 namespace {
-
-bool isNear(double value, double expected, double share) {
-  const bool is_near = std::abs(value - expected) <= share * std::abs(expected);
-  if (!is_near) qWarning("%.9g, expected %.9g", value, expected);
-  return is_near;
-}
 
 bool isNear(const Matrix3d& value, const Matrix3d& expected, double share) {
   const double away = (value - expected).norm() / expected.norm();

@@ -5,18 +5,13 @@
 
 #include "tests/blind/generate_effects.h"
 #include "tests/blind/generate_session.h"
+#include "tests/blind/is_near.h"
 #include "tests/blind/session_draw.h"
 #include "tests/support/test_main.h"
 
 using namespace blind;
 
 namespace {
-
-bool isNear(double value, double expected, double share) {
-  const bool is_near = std::abs(value - expected) <= share * std::abs(expected);
-  if (!is_near) qWarning("%.9g, expected %.9g", value, expected);
-  return is_near;
-}
 
 /// One column of a node or sample table.
 std::vector<double> columnOf(const std::string& csv, const std::string& name) {

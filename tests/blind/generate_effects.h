@@ -19,6 +19,9 @@ struct Drawn {
   std::function<void(double size, nlohmann::json& effect)> describe;
 };
 
+/// A vector as truth.json has it.
+inline nlohmann::json listed(const Vector3d& v) { return nlohmann::json::array({v.x(), v.y(), v.z()}); }
+
 /// A kind of effect and how one of it is drawn. The registry of this program.
 struct Kind {
   std::string id;

@@ -9,8 +9,6 @@ namespace {
 
 using nlohmann::json;
 
-json listed(const Vector3d& v) { return json::array({v.x(), v.y(), v.z()}); }
-
 double sign(Random& random) { return uniform(random, 0, 1) < 0.5 ? -1.0 : 1.0; }
 
 /// What the amplitude of an instrument effect is called and how it follows from the size.

@@ -30,8 +30,6 @@ Vector3d placeNearGrid(const Setup& setup, Random& random, double low_m, double 
   return at_m;
 }
 
-json listed(const Vector3d& v) { return json::array({v.x(), v.y(), v.z()}); }
-
 struct Metal {
   const char* name;
   double permeability;

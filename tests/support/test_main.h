@@ -36,9 +36,12 @@ int runCoreTest(int argc, char** argv) {
 }  // namespace fieldtrue::testing
 
 /// At the end of a test's source file: enters it into the program of its folder.
-#define FIELDTRUE_TEST_PROGRAM(run)                                                        \
-  namespace {                                                                              \
-  [[maybe_unused]] const bool is_entered = ::fieldtrue::testing::enterTest(__FILE__, run); \
+#define FIELDTRUE_TEST_PROGRAM(run) FIELDTRUE_ENTER_TEST(run, __COUNTER__)
+// Names of their own, for files that are compiled together; the second step puts the number in.
+#define FIELDTRUE_ENTER_TEST(run, number) FIELDTRUE_ENTER_NUMBERED_TEST(run, number)
+#define FIELDTRUE_ENTER_NUMBERED_TEST(run, number)                                                  \
+  namespace {                                                                                       \
+  [[maybe_unused]] const bool is_entered_##number = ::fieldtrue::testing::enterTest(__FILE__, run); \
   }
 
 /// The same for a test class that needs no window.

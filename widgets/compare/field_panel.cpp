@@ -16,6 +16,7 @@
 #include "widgets/compare/volume_bar.h"
 #include "widgets/compare/volume_store.h"
 #include "widgets/figures/field_scale.h"
+#include "widgets/style/theme.h"
 #include "widgets/style/unit_texts.h"
 #include "widgets/views/field/field_view.h"
 #include "widgets/workbench/fitted_methods.h"
@@ -39,12 +40,8 @@ QFrame* framed(QWidget* view) {
   auto* layout = new QVBoxLayout(frame);
   layout->setContentsMargins(2, 2, 2, 2);
   layout->addWidget(view);
-  QObject::connect(qApp, &QApplication::focusChanged, frame, [frame, view](QWidget*, QWidget* now) {
-    if (frame->property("focused").toBool() == (now == view)) return;
-    frame->setProperty("focused", now == view);
-    frame->style()->unpolish(frame);
-    frame->style()->polish(frame);
-  });
+  QObject::connect(qApp, &QApplication::focusChanged, frame,
+                   [frame, view](QWidget*, QWidget* now) { setStyled(*frame, "focused", now == view); });
   return frame;
 }
 

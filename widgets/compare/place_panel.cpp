@@ -18,7 +18,7 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kRowHeight = 24;
+constexpr int kPlaceRowHeight = 24;
 
 QTableWidgetItem* cell(const QString& text, Qt::Alignment alignment) {
   auto* item = new QTableWidgetItem(text);
@@ -73,7 +73,7 @@ QTableWidget* PlacePanel::makeTable(const QString& name, const QString& title, c
   table->horizontalHeader()->setSectionResizeMode(0, QHeaderView::Stretch);
   table->horizontalHeader()->setSectionResizeMode(1, QHeaderView::ResizeToContents);
   table->verticalHeader()->hide();
-  table->verticalHeader()->setDefaultSectionSize(kRowHeight);
+  table->verticalHeader()->setDefaultSectionSize(kPlaceRowHeight);
   table->setShowGrid(false);
   table->setSelectionBehavior(QAbstractItemView::SelectRows);
   table->setEditTriggers(QAbstractItemView::NoEditTriggers);

@@ -14,7 +14,7 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kSteps = 100;
+constexpr int kSliceSteps = 100;
 constexpr double kLeastIso_mm = 0.01;
 constexpr double kMostIso_mm = 2000.0;
 
@@ -73,8 +73,8 @@ void VolumeBar::makeSlice() {
   axis_->setCurrentIndex(2);
   position_->setObjectName(QStringLiteral("slicePosition"));
   position_->setAccessibleName(tr("Where the plane stands"));
-  position_->setRange(0, kSteps);
-  position_->setValue(kSteps / 2);
+  position_->setRange(0, kSliceSteps);
+  position_->setValue(kSliceSteps / 2);
   position_->setPageStep(10);
   position_text_->setMinimumWidth(72);
   const auto moved = [this] {
@@ -125,7 +125,7 @@ void VolumeBar::setLattice(const VolumeField& lattice) {
 
 double VolumeBar::position_m() const {
   const int axis = axis_->currentIndex();
-  const double share = position_->value() / static_cast<double>(kSteps);
+  const double share = position_->value() / static_cast<double>(kSliceSteps);
   return lattice_.low_m[axis] + share * (lattice_.high_m()[axis] - lattice_.low_m[axis]);
 }
 

@@ -17,6 +17,7 @@
 #include "widgets/forms/empty_page.h"
 #include "widgets/pages/place_list_model.h"
 #include "widgets/style/icons.h"
+#include "widgets/style/theme.h"
 #include "widgets/style/unit_texts.h"
 #include "widgets/views/room/room_view.h"
 #include "widgets/views/room/sample_ring.h"
@@ -294,10 +295,8 @@ void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
   if (banner_->property("state").toString() == state) return;
   banner_->setProperty("state", state);
   for (QWidget* widget :
-       {banner_, static_cast<QWidget*>(place_), static_cast<QWidget*>(position_), static_cast<QWidget*>(reason_)}) {
-    widget->style()->unpolish(widget);
-    widget->style()->polish(widget);
-  }
+       {banner_, static_cast<QWidget*>(place_), static_cast<QWidget*>(position_), static_cast<QWidget*>(reason_)})
+    restyle(*widget);
   fitText();
 }
 
@@ -308,11 +307,7 @@ void AcquirePage::showDistance(const acquisition::AcquisitionStatus& status) {
   to_go_caption_->setVisible(shown);
   if (!shown) return;
   to_go_->setText(distanceText(*status.distance_m));
-  if (to_go_->property("away").toBool() == status.away) return;
-  to_go_->setProperty("away", status.away);
-  to_go_->style()->unpolish(to_go_);
-  to_go_->style()->polish(to_go_);
-  fitText();
+  if (setStyled(*to_go_, "away", status.away)) fitText();
 }
 
 void AcquirePage::fitReason() {

@@ -21,6 +21,7 @@
 #include "widgets/forms/empty_page.h"
 #include "widgets/forms/sensor_choice.h"
 #include "widgets/report/report_data.h"
+#include "widgets/style/theme.h"
 #include "widgets/style/unit_texts.h"
 #include "widgets/views/field/volume_field.h"
 #include "widgets/workbench/fitted_methods.h"
@@ -28,20 +29,9 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kInspectorWidth = 432;
+constexpr int kCompareInspectorWidth = 432;
 constexpr int kNarrowestInspector = 320;
 constexpr std::size_t kFewestPlaces = 5;
-
-void restyle(QWidget* widget) {
-  widget->style()->unpolish(widget);
-  widget->style()->polish(widget);
-}
-
-void setPrimary(QPushButton* button, bool primary) {
-  if (button->property("primary").toBool() == primary) return;
-  button->setProperty("primary", primary);
-  restyle(button);
-}
 
 }  // namespace
 
@@ -60,7 +50,7 @@ ComparePage::ComparePage(Workbench& workbench, QWidget* parent)
   splitter->addWidget(fields_);
   splitter->addWidget(makeInspector());
   splitter->setStretchFactor(0, 1);
-  splitter->setSizes({880, kInspectorWidth});
+  splitter->setSizes({880, kCompareInspectorWidth});
   splitter->setCollapsible(0, false);
   rows->addWidget(splitter, 1);
 
@@ -255,7 +245,7 @@ void ComparePage::onComparison() {
   progress_->setVisible(running);
   progress_text_->setVisible(running);
   run_->setText(running ? tr("Stop") : tr("Compare again"));
-  setPrimary(run_, !workbench_.comparison());
+  setStyled(*run_, "primary", !workbench_.comparison());
   if (running) {
     onProgress(0.0);
     showHeadline();
@@ -336,7 +326,7 @@ void ComparePage::showHeadline() {
   headline_->setText(headline);
   verdict_->setText(words);
   header_->setProperty("state", state);
-  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(widget);
+  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(*widget);
 }
 
 QString ComparePage::whyNotFit() const {

@@ -31,7 +31,7 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kColumnWidth = 720;
+constexpr int kExportColumnWidth = 720;
 constexpr int kRowHeight = 36;
 constexpr double kLeastDeviation_mm = 0.001;
 constexpr double kUsualDeviation_mm = 0.05;
@@ -49,7 +49,7 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   auto* content = new QWidget(this);
   auto* outer = new QHBoxLayout(content);
   auto* column = new QWidget(content);
-  column->setMaximumWidth(kColumnWidth);
+  column->setMaximumWidth(kExportColumnWidth);
   auto* layout = new QVBoxLayout(column);
   layout->setSpacing(12);
   auto* title = new QLabel(tr("Export"), column);

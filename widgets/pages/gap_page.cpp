@@ -24,6 +24,7 @@
 #include "widgets/forms/empty_page.h"
 #include "widgets/forms/sensor_choice.h"
 #include "widgets/report/gap_section.h"
+#include "widgets/style/theme.h"
 #include "widgets/views/charts/gap_bar_view.h"
 #include "widgets/views/draw_picture.h"
 #include "widgets/views/field/field_view.h"
@@ -32,12 +33,7 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr std::size_t kFewestRows = 12;
-constexpr int kInspectorWidth = 400;
-
-void restyle(QWidget* widget) {
-  widget->style()->unpolish(widget);
-  widget->style()->polish(widget);
-}
+constexpr int kGapInspectorWidth = 400;
 
 Result<gap::GapReport> diagnoseWithCalib(const CalibrationTable& table, const SampleTable* samples,
                                          const simulation::Scene* scene, const RunControl& control) {
@@ -57,7 +53,7 @@ GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
   splitter->addWidget(makeFieldSide());
   splitter->addWidget(makeInspector());
   splitter->setStretchFactor(0, 1);
-  splitter->setSizes({880, kInspectorWidth});
+  splitter->setSizes({880, kGapInspectorWidth});
   splitter->setCollapsible(0, false);
   rows->addWidget(splitter, 1);
   stack_ = new QStackedWidget(this);
@@ -300,7 +296,7 @@ void GapPage::showWords() {
   const bool matches =
       report_ && (report_->verdict == gap::GapVerdict::kNoGap || report_->verdict == gap::GapVerdict::kExplained);
   header_->setProperty("state", !report_ ? "" : matches ? "apply" : "leave");
-  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(widget);
+  for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(*widget);
   QString next;
   if (report_) {
     headline_->setText(QString::fromStdString(gapHeadline(*report_)));
@@ -358,10 +354,9 @@ void GapPage::showCharts() {
 
 void GapPage::showButtons() {
   run_->setText(isDiagnosing() ? tr("&Stop") : report_ ? tr("&Diagnose again") : tr("&Diagnose"));
-  run_->setProperty("primary", !report_);
+  setStyled(*run_, "primary", !report_);
   const bool can_add = !isDiagnosing() && report_ && !report_->selected.empty();
-  add_->setProperty("primary", can_add);
-  for (QWidget* button : {run_, add_}) restyle(button);
+  setStyled(*add_, "primary", can_add);
   add_->setEnabled(can_add);
   undo_->setEnabled(!earlier_.empty());
   choose_->setEnabled(!isDiagnosing());

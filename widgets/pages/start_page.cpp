@@ -16,7 +16,7 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kColumnWidth = 560;
+constexpr int kStartColumnWidth = 560;
 
 QPushButton* makeChoice(const QString& name, const QString& icon_name, const QString& title, const QString& text,
                         bool primary) {
@@ -37,7 +37,7 @@ QPushButton* makeChoice(const QString& name, const QString& icon_name, const QSt
 StartPage::StartPage(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
   auto* outer = new QHBoxLayout(this);
   auto* column = new QWidget(this);
-  column->setMaximumWidth(kColumnWidth);
+  column->setMaximumWidth(kStartColumnWidth);
   auto* layout = new QVBoxLayout(column);
   layout->setSpacing(12);
   layout->addStretch(1);

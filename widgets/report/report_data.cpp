@@ -9,6 +9,7 @@
 #include "calib/core/file_io.h"
 #include "calib/core/number_text.h"
 #include "calib/core/statistics.h"
+#include "calib/core/units.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "widgets/report/numbers.h"
@@ -17,7 +18,6 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr double kMmPerM = 1000.0;
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 std::optional<double> sd_mm(const Node& node) {
   if (!node.covariance_m2) return std::nullopt;

@@ -65,11 +65,7 @@ void DeviceStrip::setStatus(const acquisition::AcquisitionStatus& status) {
   const bool failed = status.device == acquisition::DeviceState::kFailed;
   state_->setWordWrap(failed);
   static_cast<QHBoxLayout*>(layout())->setStretchFactor(state_, failed ? 1 : 0);
-  if (state_->property("failed").toBool() != failed) {
-    state_->setProperty("failed", failed);
-    state_->style()->unpolish(state_);
-    state_->style()->polish(state_);
-  }
+  setStyled(*state_, "failed", failed);
   for (QLabel* label : {rate_, noise_, pose_}) label->setVisible(running && status.live.has_value());
   session_->setText(status.session->path.isEmpty() ? QString() : QFileInfo(status.session->path).fileName());
   if (!running || !status.live) return;

@@ -101,9 +101,7 @@ void MessageLine::display() {
   action_->setText(message.action_label);
   action_->setVisible(static_cast<bool>(message.action));
   dismiss_->setVisible(said);
-  setProperty("severity", said ? severityName(message.severity) : QString());
-  style()->unpolish(this);
-  style()->polish(this);
+  setStyled(*this, "severity", said ? severityName(message.severity) : QString());
   if (said && message.severity == Severity::kInfo) {
     fade_->start(kFadeMs);
   } else {

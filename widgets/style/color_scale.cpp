@@ -17,12 +17,12 @@ constexpr QRgb kLess = 0x1f66b5;
 constexpr QRgb kEven = 0xb4b4b4;
 constexpr QRgb kMore = 0xc65a00;
 
+}  // namespace
+
 QColor mixed(const QColor& a, const QColor& b, double share_of_b) {
   const auto mix = [share_of_b](int x, int y) { return static_cast<int>(std::lround(x + share_of_b * (y - x))); };
   return QColor(mix(a.red(), b.red()), mix(a.green(), b.green()), mix(a.blue(), b.blue()));
 }
-
-}  // namespace
 
 QColor magnitudeColor(double fraction) {
   if (std::isnan(fraction)) return QColor(kUnknown);

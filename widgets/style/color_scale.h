@@ -4,6 +4,10 @@
 
 namespace fieldtrue::widgets {
 
+/// A colour between two.
+/// @param share_of_b 0 gives a, 1 gives b
+QColor mixed(const QColor& a, const QColor& b, double share_of_b);
+
 /// Colour of a magnitude on the perceptually uniform scale every error view shares.
 /// @param fraction of the scale's maximum; below 0 and above 1 clamp; NaN gives a neutral grey
 /// @source viridis control colours, S. van der Walt and N. Smith 2015

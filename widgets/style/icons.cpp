@@ -11,7 +11,7 @@
 #include "calib/core/error.h"
 #include "widgets/style/theme.h"
 
-static void initResources() { Q_INIT_RESOURCE(fieldtrue); }
+static void initIcons() { Q_INIT_RESOURCE(fieldtrue); }
 
 namespace fieldtrue::widgets {
 namespace {
@@ -51,7 +51,7 @@ class SymbolEngine : public QIconEngine {
 };
 
 QIcon makeIcon(const QString& name, std::optional<QColor> color) {
-  initResources();
+  initIcons();
   QFile file(QStringLiteral(":/icons/%1.svg").arg(name));
   FT_CHECK(file.open(QIODevice::ReadOnly));
   return QIcon(new SymbolEngine(file.readAll(), color));
@@ -64,7 +64,7 @@ QIcon icon(const QString& name) { return makeIcon(name, std::nullopt); }
 QIcon icon(const QString& name, const QColor& color) { return makeIcon(name, color); }
 
 QStringList iconNames() {
-  initResources();
+  initIcons();
   QStringList names = QDir(QStringLiteral(":/icons")).entryList({QStringLiteral("*.svg")}, QDir::Files, QDir::Name);
   for (QString& name : names) name.chop(4);
   return names;

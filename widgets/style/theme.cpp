@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calib/core/error.h"
+#include "widgets/style/color_scale.h"
 
 // Static libraries drop resources nobody names, and Q_INIT_RESOURCE must stand outside of namespaces.
 static void initResources() { Q_INIT_RESOURCE(fieldtrue); }
@@ -51,11 +52,6 @@ Theme darkTheme() {
 const Theme*& current() {
   static const Theme* pointer = &Theme::of(false);
   return pointer;
-}
-
-QColor mixed(const QColor& a, const QColor& b, double share_of_b) {
-  const auto mix = [share_of_b](int x, int y) { return static_cast<int>(x + share_of_b * (y - x) + 0.5); };
-  return QColor(mix(a.red(), b.red()), mix(a.green(), b.green()), mix(a.blue(), b.blue()));
 }
 
 QColor disabled(const Theme& t) { return mixed(t.text_muted, t.surface, 0.4); }
@@ -138,6 +134,18 @@ void applyTheme(QApplication& application, bool dark) {
   application.setPalette(paletteOf(theme()));
   application.setStyleSheet(styleSheetOf(theme()));
   emit themeNotifier().themeChanged(dark);
+}
+
+void restyle(QWidget& widget) {
+  widget.style()->unpolish(&widget);
+  widget.style()->polish(&widget);
+}
+
+bool setStyled(QWidget& widget, const char* property, const QVariant& value) {
+  if (widget.property(property) == value) return false;
+  widget.setProperty(property, value);
+  restyle(widget);
+  return true;
 }
 
 bool systemPrefersDark() {

@@ -6,6 +6,8 @@
 #include <QObject>
 #include <QString>
 #include <QStringList>
+#include <QVariant>
+#include <QWidget>
 
 namespace fieldtrue::widgets {
 
@@ -41,6 +43,13 @@ ThemeNotifier& themeNotifier();
 /// Sets Fusion, the palette and the style sheet (`:/style/fieldtrue.qss`, with `@surface` and the like replaced by
 /// colours).
 void applyTheme(QApplication& application, bool dark);
+
+/// Draws a widget anew after a property that the style sheet asks for was set.
+void restyle(QWidget& widget);
+
+/// Sets such a property and, where that changes it, draws the widget anew.
+/// @return whether it was changed
+bool setStyled(QWidget& widget, const char* property, const QVariant& value);
 
 /// Whether the desktop's own palette is a dark one. Call before applyTheme.
 bool systemPrefersDark();

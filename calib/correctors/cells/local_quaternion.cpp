@@ -70,7 +70,7 @@ std::unique_ptr<OrientationModel> loadLocalQuaternion(const JsonReader& paramete
                                               weightRuleFrom(parameters), parameters["note"].text());
 }
 
-Setting weightSetting() {
+Setting rotationWeightSetting() {
   return declare::choice("weight", "Weights", {"linear", "quadratic", "log", "bryson_linear", "bryson_bump", "briggs"},
                          "linear", "How the corners of the cell share: linear, quadratic and log are Kindratenko's.");
 }
@@ -81,7 +81,7 @@ OrientationMethod localQuaternionOrientation() {
   return {.id = "local_quaternion",
           .label = "Local rotations (Kindratenko)",
           .source = "Kindratenko, Bennett 2000; survey by Kindratenko, section 4.1, weights of eq. 9-11 and 13",
-          .settings = {weightSetting(), lengthUnitSetting(), bumpEndSetting(), errorFrameSetting()},
+          .settings = {rotationWeightSetting(), lengthUnitSetting(), bumpEndSetting(), errorFrameSetting()},
           .fit = fitLocalQuaternion,
           .read = loadLocalQuaternion};
 }

@@ -3,6 +3,7 @@
 
 #include "calib/core/json_reader.h"
 #include "calib/core/statistics.h"
+#include "calib/core/units.h"
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_names.h"
@@ -13,11 +14,10 @@
 namespace fieldtrue::correctors {
 namespace {
 
-const std::string kLabel = "Euler polynomial";
-constexpr double kPi = 3.141592653589793;
+const std::string kEulerLabel = "Euler polynomial";
 /// Up to this angle errors are fitted as they are, as Kindratenko does; above, relative to their mean, which keeps
 /// azimuth and roll away from the jump at 180 degrees and elevation from the pole at 90.
-constexpr double kDirectLimit_rad = kPi / 3.0;
+constexpr double kDirectEulerLimit_rad = kPi / 3.0;
 /// Nearer to the pole azimuth and roll of neighbouring places have nothing to do with each other.
 constexpr double kPoleLimit_rad = 80.0 / 180.0 * kPi;
 
@@ -57,7 +57,7 @@ Result<void> checkPoles(const FitData& data, const std::vector<Eigen::Vector3d>&
     const double elevation_rad = std::abs(angles_rad[row].y());
     if (elevation_rad > kPoleLimit_rad)
       return fail(ErrorCode::kDegenerate,
-                  kLabel + ": the error at " + rowName(data, row) + " is turned " +
+                  kEulerLabel + ": the error at " + rowName(data, row) + " is turned " +
                       std::to_string(std::lround(elevation_rad / kPi * 180.0)) +
                       " degrees in elevation from the mean error; Euler angles mean nothing near 90, a method that "
                       "models quaternions or matrices is needed");
@@ -67,16 +67,16 @@ Result<void> checkPoles(const FitData& data, const std::vector<Eigen::Vector3d>&
 
 Result<std::unique_ptr<OrientationModel>> fitPolynomialEuler(const FitData& data, const Settings& settings,
                                                              const RunControl& control) {
-  FT_TRY_VOID(checkOrientations(data, kLabel));
+  FT_TRY_VOID(checkOrientations(data, kEulerLabel));
   const ErrorFrame frame = errorFrame(settings);
   const std::vector<Eigen::Quaterniond> q_error = errorRotations(data, frame);
   const bool direct = std::all_of(q_error.begin(), q_error.end(), [](const Eigen::Quaterniond& q) {
-    return angleBetween_rad(q, Eigen::Quaterniond::Identity()) < kDirectLimit_rad;
+    return angleBetween_rad(q, Eigen::Quaterniond::Identity()) < kDirectEulerLimit_rad;
   });
   const Eigen::Quaterniond q_reference = direct ? Eigen::Quaterniond::Identity() : canonical(meanRotation(q_error));
   std::vector<Eigen::Vector3d> angles_rad = eulerAngles_rad(q_error, q_reference);
   FT_TRY_VOID(checkPoles(data, angles_rad));
-  return fitChosenPolynomial({kLabel, data, std::move(angles_rad)}, settings, control)
+  return fitChosenPolynomial({kEulerLabel, data, std::move(angles_rad)}, settings, control)
       .map([&](ChosenPolynomial angles) -> std::unique_ptr<OrientationModel> {
         return std::make_unique<EulerErrorRotation>(frame, q_reference, std::move(angles));
       });

@@ -4,7 +4,14 @@
 #include <functional>
 #include <mutex>
 
+#include "calib/core/error.h"
+
 namespace fieldtrue::evaluation {
+
+/// What a comparison ends with once it is asked to stop.
+inline tl::unexpected<Error> comparisonStopped() {
+  return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
+}
 
 /// Adds up the shares of tasks that end on any thread, so that the fraction told never falls.
 class ProgressMeter {

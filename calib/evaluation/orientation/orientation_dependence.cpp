@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/orientation/orientation_models.h"
 #include "calib/evaluation/orientation/orientation_neighbours.h"
@@ -75,7 +76,7 @@ Result<OrientationDependence> orientationDependence(const CalibrationTable& tabl
   const bool hold_out_orientations = rows.n_groups >= kEnoughToHoldOut;
   const NestedErrors errors =
       has_visits ? nestedModelErrors(rows, hold_out_orientations, seed, control) : neighbourErrors(rows, seed);
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped on request");
+  if (control.stop.stop_requested()) return comparisonStopped();
   judge(errors, seed, dependence);
   dependence.text = answerText(dependence);
   if (dependence.by_neighbours)

@@ -6,12 +6,12 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::evaluation {
 namespace {
 
-constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
-constexpr double kAlike_rad = 10.0 / kDegreesPerRadian;
+constexpr double kAlike_rad = 10.0 / kDegPerRad;
 constexpr std::size_t kMostGroups = 8;
 
 /// Groups around orientations picked farthest from those picked before, until all are within the tolerance or there
@@ -55,7 +55,7 @@ Result<OrientationRows> orientationRows(const CalibrationTable& table) {
   std::map<int, std::size_t> number_of_place;
   for (std::size_t i = 0; i < data.size(); ++i) {
     const Eigen::Quaterniond q_error = data.q_tracked[i] * data.q_true[i].conjugate();
-    rows.error_deg.push_back(kDegreesPerRadian * rotationVector_rad(q_error));
+    rows.error_deg.push_back(kDegPerRad * rotationVector_rad(q_error));
     rows.place.push_back(number_of_place.try_emplace(data.node[i], number_of_place.size()).first->second);
   }
   rows.n_places = number_of_place.size();

@@ -7,6 +7,7 @@
 #include "calib/calibration/corrector.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
+#include "tests/calib/calibration/bent_table.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
@@ -18,14 +19,6 @@ using namespace fieldtrue::testing;
 using nlohmann::json;
 
 namespace {
-
-CalibrationTable bentTable() {
-  SyntheticOptions options;
-  options.reference_from_tracker = {{0.5, -0.2, 1.1}, rotationFromVector({0.3, -0.8, 1.7})};
-  options.smooth_distortion_m = 0.03;
-  options.orientation_error_rad = 0.15;
-  return syntheticTable(options, {.seed = 4, .position_sd_m = 0.001, .rotation_sd_rad = 0.002});
-}
 
 Result<Corrector> fitted(const std::string& position) {
   const CalibrationTable table = bentTable();

@@ -6,6 +6,7 @@
 #include "calib/calibration/checksum.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/file_io.h"
+#include "tests/calib/calibration/bent_table.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
@@ -18,12 +19,8 @@ using nlohmann::json;
 
 namespace {
 
-CalibrationTable bentTable() {
-  SyntheticOptions options;
-  options.reference_from_tracker = {{0.5, -0.2, 1.1}, rotationFromVector({0.3, -0.8, 1.7})};
-  options.smooth_distortion_m = 0.03;
-  options.orientation_error_rad = 0.15;
-  CalibrationTable table = syntheticTable(options, {.seed = 4, .position_sd_m = 0.001, .rotation_sd_rad = 0.002});
+CalibrationTable describedTable() {
+  CalibrationTable table = bentTable();
   table.metadata.tracker = "Fastrak \"long range\", room 3";
   table.metadata.jig_tolerance_m = 0.0013;
   table.metadata.other["operator"] = "J. Müller";
@@ -34,7 +31,7 @@ CalibrationTable bentTable() {
 }
 
 Corrector fitted(const std::string& position, const std::string& orientation) {
-  const CalibrationTable table = bentTable();
+  const CalibrationTable table = describedTable();
   return Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice(position, orientation).value(),
                         AlignMode::kRigid)
       .value();
@@ -100,7 +97,7 @@ class CorrectorFileTest : public QObject {
   }
 
   void keepsTheRowsAndMetadata() {
-    const CalibrationTable table = bentTable();
+    const CalibrationTable table = describedTable();
     const auto reloaded = Corrector::fromText(fitted("affine", "rigid").toText(), "room.ftcal.json");
     FT_VERIFY_OK(reloaded);
     const TableMetadata& metadata = reloaded->table().metadata;
@@ -223,7 +220,7 @@ class CorrectorFileTest : public QObject {
   }
 
   void metadataThatIsNotUtf8DoesNotStopIt() {
-    CalibrationTable table = bentTable();
+    CalibrationTable table = describedTable();
     table.metadata.rig = "M\xfcller's jig";
     const Corrector corrector =
         Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice("rigid", "none").value(), AlignMode::kRigid)

@@ -14,7 +14,7 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-const Pose kReferenceFromTracker{{0.5, -1.0, 0.8}, rotationFromVector({0.2, -0.4, 1.1})};
+const Pose kRoomFromTracker{{0.5, -1.0, 0.8}, rotationFromVector({0.2, -0.4, 1.1})};
 
 /// Nodes of a 3x3x3 grid that lies between the places of syntheticTable, and one far outside.
 std::vector<PlannedPlace> grid() {
@@ -52,11 +52,11 @@ class ResampledTableTest : public QObject {
   void aRigidTableStaysRigidInItsOwnFrame() {
     QFETCH(int, method);
     SyntheticOptions options;
-    options.reference_from_tracker = kReferenceFromTracker;
+    options.reference_from_tracker = kRoomFromTracker;
     const CalibrationTable table = syntheticTable(options);
     std::vector<PlannedPlace> places = grid();
     for (PlannedPlace& place : places)
-      place.reference_from_sensor.position_m = inverse(kReferenceFromTracker) * place.reference_from_sensor.position_m;
+      place.reference_from_sensor.position_m = inverse(kRoomFromTracker) * place.reference_from_sensor.position_m;
     const auto resampled =
         resampleTable(table, places, how(static_cast<correctors::RegridMethod>(method)), AlignMode::kRigid);
     FT_VERIFY_OK(resampled);
@@ -74,7 +74,7 @@ class ResampledTableTest : public QObject {
       const Eigen::Vector3d p_m = places[i].reference_from_sensor.position_m;
       for (int axis = 0; axis < 3; ++axis)
         FT_VERIFY_MATCH(sameBits(node.tracker_from_sensor.position_m[axis], p_m[axis]));
-      FT_VERIFY_MATCH(near(node.reference_from_sensor.position_m, kReferenceFromTracker * p_m, 1e-12));
+      FT_VERIFY_MATCH(near(node.reference_from_sensor.position_m, kRoomFromTracker * p_m, 1e-12));
     }
     QVERIFY(resampled->table.nodes.back().role == NodeRole::kSkipped);
   }

@@ -17,8 +17,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
-
 Eigen::Vector3d quadratic_m(const Eigen::Vector3d& p) {
   return {0.02 * p.x() * p.x() - 0.01 * p.y(), 0.03 * p.x() * p.z(), 0.02 * p.y() * p.y() + 0.01 * p.z() * p.x()};
 }

@@ -58,12 +58,7 @@ std::vector<Eigen::Vector3d> freshPoints(std::size_t count) {
   return inside_m;
 }
 
-Eigen::Vector3d wave_m(const Eigen::Vector3d& p) {
-  return 0.03 *
-         Eigen::Vector3d(std::sin(3.0 * p.x()), std::cos(2.0 * p.y() + p.z()), std::sin(p.x() * p.y() + 2.0 * p.z()));
-}
-
-Eigen::Vector3d cubic_m(const Eigen::Vector3d& p) {
+Eigen::Vector3d coupledCubic_m(const Eigen::Vector3d& p) {
   const double x = p.x(), y = p.y(), z = p.z();
   return 0.1 * Eigen::Vector3d(x * x * x - 2.0 * y * z, y * y * y + x * x * z, 0.5 * z * z * z - x * y + 0.2);
 }
@@ -144,12 +139,12 @@ class BakedLatticeTest : public QObject {
   }
 
   void cubicPolynomialsAreReproducedByAnyLattice() {
-    const auto lattice = bake(FormulaModel(cubic_m), 1e-3);
+    const auto lattice = bake(FormulaModel(coupledCubic_m), 1e-3);
     FT_VERIFY_OK(lattice);
     // The first spacing tried: a quarter of the longest side.
     QVERIFY((*lattice)->parts().spacing_m > 0.25);
     for (const Eigen::Vector3d& p_m : freshPoints(2000))
-      FT_VERIFY_MATCH(near((*lattice)->displacement_m(p_m), cubic_m(p_m), 3e-7));
+      FT_VERIFY_MATCH(near((*lattice)->displacement_m(p_m), coupledCubic_m(p_m), 3e-7));
   }
 
   void staysWithinTheBoundAtFreshPoints_data() {
@@ -226,7 +221,7 @@ class BakedLatticeTest : public QObject {
   }
 
   void jacobianIsTheSlopeOfTheCorrection() {
-    const FormulaModel model(cubic_m);
+    const FormulaModel model(coupledCubic_m);
     const auto lattice = bake(model, 1e-3);
     FT_VERIFY_OK(lattice);
     for (const Eigen::Vector3d& p_m : freshPoints(300))

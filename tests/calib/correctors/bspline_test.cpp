@@ -14,10 +14,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d linear_m(const Eigen::Vector3d& p) {
-  return {0.01 + 0.03 * p.x() - 0.02 * p.z(), -0.02 + 0.01 * p.x() + 0.05 * p.y(), 0.04 * p.z() - 0.03 * p.y()};
-}
-
 SplineProblem problemOf(const std::vector<Eigen::Vector3d>& p_m, const Displacement& displacement_m, double noise_m,
                         unsigned seed) {
   RandomGeometry random(seed);
@@ -42,8 +38,6 @@ SplineProblem usualProblem() {
       },
       0.001, 6);
 }
-
-Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
 
 }  // namespace
 

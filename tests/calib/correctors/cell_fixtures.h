@@ -12,10 +12,6 @@ inline Eigen::Vector3d bending_m(const Eigen::Vector3d& p) {
   return {0.03 * std::sin(2.0 * p.x() + p.y()), 0.04 * std::cos(1.5 * p.y() + p.z()), 0.02 * p.x() * p.z()};
 }
 
-inline Eigen::Vector3d linear_m(const Eigen::Vector3d& p) {
-  return {0.01 + 0.03 * p.x() - 0.02 * p.z(), -0.02 + 0.01 * p.x() + 0.05 * p.y(), 0.04 * p.z() - 0.03 * p.y()};
-}
-
 /// The data without one row.
 inline correctors::FitData without(correctors::FitData data, std::size_t row) {
   const auto drop = [row](auto& rows) {

@@ -12,13 +12,7 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
-
 Eigen::Quaterniond about(const Eigen::Vector3d& axis, double angle_rad) { return rotationFromVector(angle_rad * axis); }
-
-Eigen::Quaterniond smoothError(const Eigen::Vector3d& p) {
-  return rotationFromVector(0.15 * Eigen::Vector3d(std::sin(p.x()), p.y() * p.z(), std::cos(p.y())));
-}
 
 /// A cube of 200 mm at the origin, with the error rotation of each corner.
 FitData cubeWith(const std::array<Eigen::Quaterniond, 8>& q_error) {

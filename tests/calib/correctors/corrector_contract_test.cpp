@@ -30,8 +30,6 @@ Eigen::Vector3d affine_m(const Eigen::Vector3d& p) {
 
 Eigen::Vector3d rigid_m(const Eigen::Vector3d& p) { return kMotion * p - p; }
 
-Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
-
 Eigen::Quaterniond constantError(const Eigen::Vector3d&) { return rotationFromVector({0.3, -0.2, 0.1}); }
 
 Eigen::Quaterniond quadraticVectorPart(const Eigen::Vector3d& p) {
@@ -43,7 +41,7 @@ Eigen::Quaterniond quadraticEulerAngles(const Eigen::Vector3d& p) {
   return rotationFromEuler({0.1 - 0.2 * p.x() * p.y(), 0.1 * p.z() * p.z(), 0.15 * p.y() - 0.05 * p.x()});
 }
 
-Eigen::Quaterniond smoothError(const Eigen::Vector3d& p) {
+Eigen::Quaterniond turningError(const Eigen::Vector3d& p) {
   return rotationFromVector(0.2 *
                             Eigen::Vector3d(std::sin(2.0 * p.x()), std::cos(1.5 * p.y()), std::sin(p.z() + p.x())));
 }
@@ -87,10 +85,10 @@ const std::map<std::string, RotationRecovery> kOrientationRecoveries = {
     {"rigid", {constantError}},
     {"polynomial_euler", {quadraticEulerAngles}},
     {"polynomial_quaternion", {quadraticVectorPart}},
-    {"hmq_matrix", {smoothError, false}},
-    {"slerp_trilinear", {smoothError, false}},
-    {"tetrahedral_quaternion", {smoothError, false}},
-    {"local_quaternion", {smoothError, false}},
+    {"hmq_matrix", {turningError, false}},
+    {"slerp_trilinear", {turningError, false}},
+    {"tetrahedral_quaternion", {turningError, false}},
+    {"local_quaternion", {turningError, false}},
 };
 
 /// Methods that ask for a rectilinear grid in tracked space.
@@ -100,7 +98,7 @@ std::vector<Eigen::Vector3d> usualPlaces(const std::string& id = {}) {
   return shakenGrid({5, 5, 4}, 0.2, kNeedTrackedGrid.contains(id) ? 0.0 : 0.02);
 }
 
-FitData usualData(const std::string& id = {}) { return fitDataOf(usualPlaces(id), cubic_m, smoothError); }
+FitData usualData(const std::string& id = {}) { return fitDataOf(usualPlaces(id), cubic_m, turningError); }
 
 /// Bad data by name, and the codes a method may answer with. No code at all: it must fit and stay finite.
 struct BadCase {
@@ -116,13 +114,13 @@ FitData flattened(int dimension) {
   for (Eigen::Vector3d& p : places)
     p = Eigen::Vector3d(u * u.dot(p) +
                         (dimension == 2 ? Eigen::Vector3d(v * v.dot(p)) : Eigen::Vector3d(Eigen::Vector3d::Zero())));
-  FitData data = fitDataOf(places, affine_m, smoothError);
+  FitData data = fitDataOf(places, affine_m, turningError);
   data.dimension = dimension;
   return data;
 }
 
 FitData repeated() {
-  FitData data = fitDataOf(std::vector<Eigen::Vector3d>(40, Eigen::Vector3d(0.5, 0.1, 0.2)), cubic_m, smoothError);
+  FitData data = fitDataOf(std::vector<Eigen::Vector3d>(40, Eigen::Vector3d(0.5, 0.1, 0.2)), cubic_m, turningError);
   for (std::size_t i = 0; i < data.size(); ++i)
     data.p_true_m[i] += 0.1 * Eigen::Vector3d(std::sin(double(i)), std::cos(double(i)), double(i % 3));
   return data;
@@ -300,7 +298,8 @@ class CorrectorContractTest : public QObject {
     const auto model = fitOrientation(id.toStdString(), usualData());
     FT_VERIFY_OK(model);
     for (const double far_m : {0.0, 1.0, 1e3, 1e6})
-      FT_VERIFY_MATCH(near((*model)->correct({far_m, -far_m, 0.5 * far_m}, smoothError({0, 0, 0})).norm(), 1.0, 1e-12));
+      FT_VERIFY_MATCH(
+          near((*model)->correct({far_m, -far_m, 0.5 * far_m}, turningError({0, 0, 0})).norm(), 1.0, 1e-12));
   }
 
   void badPositionsGiveOneSentence_data() {

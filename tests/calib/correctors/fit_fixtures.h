@@ -3,11 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <random>
 #include <set>
 #include <vector>
 
+#include "calib/core/geometry.h"
 #include "calib/correctors/base/fit_data.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
@@ -16,6 +18,22 @@ namespace fieldtrue::testing {
 
 using Displacement = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
 using Rotation = std::function<Eigen::Quaterniond(const Eigen::Vector3d&)>;
+
+/// Error fields [m] and an error rotation of tests.
+inline Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
+
+inline Eigen::Vector3d linear_m(const Eigen::Vector3d& p) {
+  return {0.01 + 0.03 * p.x() - 0.02 * p.z(), -0.02 + 0.01 * p.x() + 0.05 * p.y(), 0.04 * p.z() - 0.03 * p.y()};
+}
+
+inline Eigen::Vector3d wave_m(const Eigen::Vector3d& p) {
+  return 0.03 *
+         Eigen::Vector3d(std::sin(3.0 * p.x()), std::cos(2.0 * p.y() + p.z()), std::sin(p.x() * p.y() + 2.0 * p.z()));
+}
+
+inline Eigen::Quaterniond smoothError(const Eigen::Vector3d& p) {
+  return rotationFromVector(0.15 * Eigen::Vector3d(std::sin(p.x()), p.y() * p.z(), std::cos(p.y())));
+}
 
 /// Tracked positions on a grid that is shaken a little, so that no two coordinates repeat [m].
 inline std::vector<Eigen::Vector3d> shakenGrid(const std::array<int, 3>& counts, double pitch_m, double shake_m,

@@ -15,11 +15,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d wave_m(const Eigen::Vector3d& p) {
-  return 0.03 *
-         Eigen::Vector3d(std::sin(3.0 * p.x()), std::cos(2.0 * p.y() + p.z()), std::sin(p.x() * p.y() + 2.0 * p.z()));
-}
-
 /// A grid on which some places were visited twice, one visit after the other at the end of the rows.
 FitData revisited() {
   FitData data = fitDataOf(shakenGrid({5, 4, 4}, 0.2, 0.02), wave_m);

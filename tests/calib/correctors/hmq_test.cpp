@@ -15,11 +15,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d wave_m(const Eigen::Vector3d& p) {
-  return 0.03 *
-         Eigen::Vector3d(std::sin(3.0 * p.x()), std::cos(2.0 * p.y() + p.z()), std::sin(p.x() * p.y() + 2.0 * p.z()));
-}
-
 /// Equations 16 to 18 written out with Eigen's own LU: f at a point, of any right-hand side.
 Eigen::VectorXd solveAndEvaluate(const std::vector<Eigen::Vector3d>& centers_m, const Eigen::MatrixXd& values,
                                  double r2_m2, const Eigen::Vector3d& p_m) {

@@ -45,7 +45,7 @@ double rmsError(const FeedForwardNetwork& network, const TrainingSet& set) {
   return std::sqrt(squares / static_cast<double>(set.input.size()));
 }
 
-Eigen::Vector3d bent_m(const Eigen::Vector3d& p) {
+Eigen::Vector3d curved_m(const Eigen::Vector3d& p) {
   return {0.05 * std::sin(2.0 * p.x() + p.y()), 0.04 * p.x() * p.z(), 0.03 * std::cos(3.0 * p.y())};
 }
 
@@ -162,13 +162,14 @@ class NeuralNetworkTest : public QObject {
   }
 
   void backPropagationStopsAtTheErrorAskedFor() {
-    const FitData data = fitDataOf(shakenGrid({5, 5, 4}, 0.2, 0.02), bent_m);
+    const FitData data = fitDataOf(shakenGrid({5, 5, 4}, 0.2, 0.02), curved_m);
     const auto coarse =
         fitPosition("neural_network", data, {{"training", "back_propagation"}, {"stop_error_m", "0.1"}});
     FT_VERIFY_OK(coarse);
     QCOMPARE((*coarse)->note(), std::string());
     double sum_m = 0.0;
-    for (const Eigen::Vector3d& p_m : data.p_tracked_m) sum_m += ((*coarse)->displacement_m(p_m) - bent_m(p_m)).norm();
+    for (const Eigen::Vector3d& p_m : data.p_tracked_m)
+      sum_m += ((*coarse)->displacement_m(p_m) - curved_m(p_m)).norm();
     QVERIFY(sum_m / static_cast<double>(data.size()) < 0.11);  // The last epoch went on below 0.1 m.
     const auto never = fitPosition("neural_network", data,
                                    {{"training", "back_propagation"}, {"stop_error_m", "1e-5"}, {"max_epochs", "20"}});
@@ -186,17 +187,17 @@ class NeuralNetworkTest : public QObject {
     // The field moves places by 57 mm RMS.
     QFETCH(QString, training);
     QFETCH(double, left_m);
-    const FitData data = fitDataOf(shakenGrid({5, 5, 4}, 0.2, 0.02), bent_m);
+    const FitData data = fitDataOf(shakenGrid({5, 5, 4}, 0.2, 0.02), curved_m);
     const auto model = fitPosition("neural_network", data, {{"training", training.toStdString()}});
     FT_VERIFY_OK(model);
     double squares_m2 = 0.0;
     for (const Eigen::Vector3d& p_m : data.p_tracked_m)
-      squares_m2 += ((*model)->displacement_m(p_m) - bent_m(p_m)).squaredNorm();
+      squares_m2 += ((*model)->displacement_m(p_m) - curved_m(p_m)).squaredNorm();
     QVERIFY(std::sqrt(squares_m2 / static_cast<double>(data.size())) < left_m);
   }
 
   void aSeedGivesOneNetworkWhateverTheThreads() {
-    const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), bent_m);
+    const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), curved_m);
     const PositionMethod& method = *findPositionMethod("neural_network").value();
     RunControl backwards;
     backwards.parallel_for = [](std::size_t count, const std::function<void(std::size_t)>& body) {
@@ -220,7 +221,7 @@ class NeuralNetworkTest : public QObject {
   }
 
   void reportsProgressAndStopsOnRequest() {
-    const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), bent_m);
+    const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), curved_m);
     const PositionMethod& method = *findPositionMethod("neural_network").value();
     for (const std::string& training : kTrainings) {
       const Settings settings = settingsOf(method, {{"training", training}, {"stop_error_m", "1e-5"}});
@@ -243,10 +244,10 @@ class NeuralNetworkTest : public QObject {
 
   void refusesWhatCannotBeTrained() {
     std::vector<Eigen::Vector3d> places_m = shakenGrid({3, 3, 3}, 0.2, 0.02);
-    const auto few = fitPosition("neural_network", fitDataOf(places_m, bent_m));
+    const auto few = fitPosition("neural_network", fitDataOf(places_m, curved_m));
     QVERIFY(!few && few.error().code == ErrorCode::kTooFewNodes);
     FT_VERIFY_MATCH(holdsAll(few.error().message, {"83 weights", "at least 28 places, got 27"}));
-    FT_VERIFY_OK(fitPosition("neural_network", fitDataOf(places_m, bent_m), {{"hidden", "7"}, {"starts", "1"}}));
+    FT_VERIFY_OK(fitPosition("neural_network", fitDataOf(places_m, curved_m), {{"hidden", "7"}, {"starts", "1"}}));
     // Targets that are not finite leave no finite weights.
     TrainingSet broken = singlePair();
     broken.target[0].x() = HUGE_VAL;

@@ -12,12 +12,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
-
-Eigen::Quaterniond smoothError(const Eigen::Vector3d& p) {
-  return rotationFromVector(0.15 * Eigen::Vector3d(std::sin(p.x()), p.y() * p.z(), std::cos(p.y())));
-}
-
 const std::vector<Eigen::Quaterniond> kTrueOrientations = {
     Eigen::Quaterniond::Identity(), rotationFromVector({1.0, 0.5, -2.0}), rotationFromVector({0.0, 3.1, 0.2}),
     rotationFromVector({-0.7, -0.7, 0.1})};

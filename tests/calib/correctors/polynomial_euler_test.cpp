@@ -14,8 +14,6 @@ namespace {
 
 constexpr double kDeg = std::numbers::pi / 180.0;
 
-Eigen::Vector3d nothing_m(const Eigen::Vector3d&) { return Eigen::Vector3d::Zero(); }
-
 /// Azimuth, elevation and roll of the error, polynomials of degree 2 of the position [rad].
 Eigen::Vector3d angles_rad(const Eigen::Vector3d& p) {
   return {0.1 + 0.05 * p.x() * p.y(), -0.08 * p.z() + 0.02 * p.x() * p.x(), 0.04 * p.y() - 0.03};

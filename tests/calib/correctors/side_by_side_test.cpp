@@ -11,7 +11,7 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d bent_m(const Eigen::Vector3d& p_m) {
+Eigen::Vector3d parabolic_m(const Eigen::Vector3d& p_m) {
   return {0.02 * p_m.x() * p_m.y(), -0.03 * p_m.z() * p_m.z(), 0.01 * std::sin(3.0 * p_m.x())};
 }
 
@@ -30,7 +30,7 @@ class SideBySideTest : public QObject {
   }
   void manyFitsAtOnceGiveTheSameBits() {
     QFETCH(QString, id);
-    const FitData data = fitDataOf(shakenGrid({4, 3, 3}, 0.2, 0.02), bent_m);
+    const FitData data = fitDataOf(shakenGrid({4, 3, 3}, 0.2, 0.02), parabolic_m);
     const nlohmann::json alone = fitPosition(id.toStdString(), data).value()->parameters();
     constexpr int kThreads = 4;
     const int repeats = id == "hmq" ? 2000 : 20;

@@ -15,11 +15,7 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-Eigen::Vector3d linear_m(const Eigen::Vector3d& p) {
-  return {0.01 + 0.03 * p.x() - 0.02 * p.z(), -0.02 + 0.01 * p.x() + 0.05 * p.y(), 0.04 * p.z() - 0.03 * p.y()};
-}
-
-Eigen::Vector3d wave_m(const Eigen::Vector3d& p) {
+Eigen::Vector3d ripple_m(const Eigen::Vector3d& p) {
   return 0.01 * Eigen::Vector3d(std::sin(3.0 * p.x()), std::cos(2.0 * p.y() + p.z()), std::sin(2.0 * p.z()));
 }
 
@@ -47,7 +43,7 @@ struct Method {
 
 FitData noisyWave(std::array<int, 3> counts = {5, 5, 4}) {
   RandomGeometry random(31);
-  FitData data = fitDataOf(shakenGrid(counts, 0.2, 0.02), wave_m);
+  FitData data = fitDataOf(shakenGrid(counts, 0.2, 0.02), ripple_m);
   for (Eigen::Vector3d& truth_m : data.p_true_m)
     truth_m += 0.0005 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
   return data;
@@ -101,7 +97,7 @@ class SmoothMethodsTest : public QObject {
     QFETCH(QString, text);
     // Half of the places are twenty times noisier; told so, a fit errs less at fresh positions.
     RandomGeometry random(77);
-    FitData data = fitDataOf(shakenGrid({7, 7, 6}, 0.17, 0.02), wave_m);
+    FitData data = fitDataOf(shakenGrid({7, 7, 6}, 0.17, 0.02), ripple_m);
     for (std::size_t i = 0; i < data.size(); ++i) {
       const double sd_m = i % 2 == 0 ? 2e-4 : 4e-3;
       data.p_true_m[i] += sd_m * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
@@ -115,8 +111,8 @@ class SmoothMethodsTest : public QObject {
     double with_squares = 0.0, without_squares = 0.0;
     for (int i = 0; i < 300; ++i) {
       const Eigen::Vector3d p_m(random.between(0.4, 1.4), random.between(-0.3, 0.7), random.between(-0.2, 0.6));
-      with_squares += ((*with)->displacement_m(p_m) - wave_m(p_m)).squaredNorm();
-      without_squares += ((*without)->displacement_m(p_m) - wave_m(p_m)).squaredNorm();
+      with_squares += ((*with)->displacement_m(p_m) - ripple_m(p_m)).squaredNorm();
+      without_squares += ((*without)->displacement_m(p_m) - ripple_m(p_m)).squaredNorm();
     }
     const double ratio = std::sqrt(with_squares / without_squares);
     QVERIFY2(ratio < 0.6, qPrintable(QString::number(ratio)));

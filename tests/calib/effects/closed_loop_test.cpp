@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "calib/effects/parameters.h"
 #include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
@@ -18,11 +19,10 @@ using fieldtrue::testing::RandomGeometry;
 
 namespace {
 
-nlohmann::json jsonOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 std::unique_ptr<field::CouplingDistortion> loopAt(const Eigen::Vector3d& center_m, const Eigen::Vector3d& normal,
                                                   double radius_m) {
-  return made("closed_loop", {{"center_m", jsonOf(center_m)}, {"normal", jsonOf(normal)}, {"radius_m", radius_m}});
+  return made("closed_loop",
+              {{"center_m", effects::listOf(center_m)}, {"normal", effects::listOf(normal)}, {"radius_m", radius_m}});
 }
 
 /// Law of Biot and Savart, summed over many straight pieces of a ring about the z axis; exact to (1/pieces)^2.
@@ -93,9 +93,10 @@ void ClosedLoopTest::isADipoleFarAway() {
   const Eigen::Vector3d p_m(-2.0, 3.0, 1.0);
   const double a_m3 = -std::pow(std::numbers::pi, 2) * 1.25e-4 / (std::log(8.0 * 0.05 / 0.001) - 2.0);
   const Eigen::Matrix3d polarizability_m3 = a_m3 * n * n.transpose();
-  const auto loop =
-      made("closed_loop",
-           {{"center_m", jsonOf(center_m)}, {"normal", jsonOf(n)}, {"radius_m", 0.05}, {"wire_radius_m", 0.001}});
+  const auto loop = made("closed_loop", {{"center_m", effects::listOf(center_m)},
+                                         {"normal", effects::listOf(n)},
+                                         {"radius_m", 0.05},
+                                         {"wire_radius_m", 0.001}});
   const Eigen::Matrix3d expected = field::dipoleField(p_m - center_m, 1.0 / (4.0 * std::numbers::pi)) *
                                    polarizability_m3 * field::dipoleField(center_m, 1.0);
   FT_VERIFY_MATCH(near((loop->fieldChange(p_m, 1.0, 0.0) - expected).norm() / expected.norm(), 0.0, 1e-3));

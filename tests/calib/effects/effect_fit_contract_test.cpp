@@ -21,8 +21,6 @@ using fieldtrue::testing::OwnedDesign;
 using fieldtrue::testing::RandomGeometry;
 using fieldtrue::testing::scatteredDesign;
 
-Q_DECLARE_METATYPE(const fieldtrue::effects::Effect*)
-
 namespace {
 
 /// The designs every way of fitting must stand.

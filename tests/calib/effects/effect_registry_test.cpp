@@ -17,8 +17,6 @@ using fieldtrue::testing::holdsAll;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
-Q_DECLARE_METATYPE(const fieldtrue::effects::Effect*)
-
 namespace {
 
 nlohmann::json defaultsOf(const Effect& effect) {

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "calib/effects/compact_metal.h"
+#include "calib/effects/parameters.h"
 #include "calib/effects/rows.h"
 #include "tests/calib/effects/effect_geometry.h"
 #include "tests/support/matchers.h"
@@ -16,8 +17,6 @@ using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
 namespace {
-
-nlohmann::json jsonOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 double apart(const field::CouplingDistortion& seen, const field::CouplingDistortion& expected,
              const Eigen::Vector3d& p_m) {
@@ -57,9 +56,9 @@ void FinitePlateTest::smallPlateIsItsPolarizability() {
     const Eigen::Vector3d n = random.direction();
     const Eigen::Vector3d center_m = random.between(2.0, 3.0) * random.direction();
     const Eigen::Vector3d p_m = center_m + random.between(2.0, 3.0) * random.direction();
-    const auto plate = made("finite_plate", {{"center_m", jsonOf(center_m)},
-                                             {"normal", jsonOf(n)},
-                                             {"side", jsonOf(n.unitOrthogonal())},
+    const auto plate = made("finite_plate", {{"center_m", effects::listOf(center_m)},
+                                             {"normal", effects::listOf(n)},
+                                             {"side", effects::listOf(n.unitOrthogonal())},
                                              {"length_m", side_m},
                                              {"width_m", side_m},
                                              {"material", material.toStdString()}});
@@ -82,9 +81,9 @@ void FinitePlateTest::isReciprocal() {
     const Eigen::Vector3d center_m = random.between(0.5, 1.0) * n;
     const Eigen::Vector3d p_m = random.between(0.5, 1.0) * n.unitOrthogonal() - 0.3 * n;
     const auto plateAt = [&](const Eigen::Vector3d& at_m) {
-      return made("finite_plate", {{"center_m", jsonOf(at_m)},
-                                   {"normal", jsonOf(n)},
-                                   {"side", jsonOf(n.unitOrthogonal())},
+      return made("finite_plate", {{"center_m", effects::listOf(at_m)},
+                                   {"normal", effects::listOf(n)},
+                                   {"side", effects::listOf(n.unitOrthogonal())},
                                    {"length_m", 0.8},
                                    {"width_m", 0.5},
                                    {"material", material.toStdString()}});

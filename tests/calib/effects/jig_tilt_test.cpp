@@ -14,7 +14,7 @@ using fieldtrue::testing::settingAt;
 namespace {
 
 /// Turned by 90 deg about Z: the rig's x axis points along the tracker's y, its y along -x.
-Pose turnedRig() { return {{1.0, 0.0, 0.5}, rotationFromVector({0.0, 0.0, 1.5707963267948966})}; }
+Pose raisedRig() { return {{1.0, 0.0, 0.5}, rotationFromVector({0.0, 0.0, 1.5707963267948966})}; }
 
 }  // namespace
 
@@ -29,8 +29,8 @@ class JigTiltTest : public QObject {
 // 0.02 * 0.5 = 10 mm; in the tracker's axes (-10, 11, 0) mm.
 void JigTiltTest::shearsByHeight() {
   const auto effect = effectOf("jig_tilt", {{"shear_rad", {0.01, 0.02, 0.03}}});
-  const Pose place = turnedRig() * Pose{{0.1, 0.2, 0.5}, Eigen::Quaterniond::Identity()};
-  const field::EffectResponse response = effect->at(settingAt(place, turnedRig()));
+  const Pose place = raisedRig() * Pose{{0.1, 0.2, 0.5}, Eigen::Quaterniond::Identity()};
+  const field::EffectResponse response = effect->at(settingAt(place, raisedRig()));
   FT_VERIFY_MATCH(near(response.shift_m, Eigen::Vector3d(-0.010, 0.011, 0.0), 1e-15));
   QCOMPARE(response.turn_rad.norm(), 0.0);
 }
@@ -39,9 +39,9 @@ void JigTiltTest::shearsByHeight() {
 // along (xz, yz, 1).
 void JigTiltTest::leansTheSensorWithItsPipe() {
   const auto effect = effectOf("jig_tilt", {{"shear_rad", {1e-4, -2e-4, 5e-3}}, {"turns_sensor", 1.0}});
-  const field::EffectResponse response = effect->at(settingAt(turnedRig(), turnedRig()));
-  const Eigen::Quaterniond actual = rotationFromVector(response.turn_rad) * turnedRig().orientation;
-  const Eigen::Vector3d axis_in_rig = turnedRig().orientation.conjugate() * (actual * Eigen::Vector3d::UnitZ());
+  const field::EffectResponse response = effect->at(settingAt(raisedRig(), raisedRig()));
+  const Eigen::Quaterniond actual = rotationFromVector(response.turn_rad) * raisedRig().orientation;
+  const Eigen::Vector3d axis_in_rig = raisedRig().orientation.conjugate() * (actual * Eigen::Vector3d::UnitZ());
   FT_VERIFY_MATCH(near(axis_in_rig, Eigen::Vector3d(1e-4, -2e-4, 1.0), 1e-7));
   QCOMPARE(response.shift_m.norm(), 0.0);
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "calib/effects/parameters.h"
 #include "calib/effects/registry.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
@@ -81,8 +82,6 @@ Eigen::VectorXd truthOf(const std::string& id, const nlohmann::json& parameters,
   return columnsOf(settings, responses, 1).col(0);
 }
 
-nlohmann::json jsonOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 }  // namespace
 
 class RoomSearchTest : public QObject {
@@ -135,7 +134,7 @@ void RoomSearchTest::someStartIsNearEveryBody() {
     const Eigen::Vector3d center_m = search.box_m().center() + random.pointInCube_m(1.5);
     const double nearest_m = search.nearestPlace_m(center_m);
     if (nearest_m < 0.35 || nearest_m > 0.9 || center_m.norm() < 0.35) continue;
-    const Eigen::VectorXd truth = truthOf("compact_metal", {{"center_m", jsonOf(center_m)}}, settings);
+    const Eigen::VectorXd truth = truthOf("compact_metal", {{"center_m", effects::listOf(center_m)}}, settings);
     shares.push_back(bestShare(*ways[0], settings, truth));
   }
   std::sort(shares.begin(), shares.end());
@@ -155,7 +154,7 @@ void RoomSearchTest::someStartIsNearEveryFloorAndWall() {
         rotationFromVector(Eigen::Vector3d(0.1 * random.direction())) * (search.trackerFromRig() * axis);
     const double distance_m = search.farthestAlong_m(toward) + random.between(0.15, 2.0);
     const Eigen::VectorXd truth =
-        truthOf("metal_plane", {{"toward", jsonOf(toward)}, {"distance_m", distance_m}}, settings);
+        truthOf("metal_plane", {{"toward", effects::listOf(toward)}, {"distance_m", distance_m}}, settings);
     const double share = bestShare(*ways[0], settings, truth);
     QVERIFY2(share > 0.7, qPrintable(QString::number(share)));
   }

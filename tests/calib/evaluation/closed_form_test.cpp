@@ -18,7 +18,7 @@ using namespace fieldtrue::testing;
 namespace {
 
 /// A turned, bent and noisy grid, with two visits a place, so that folds move the alignment and hold several rows out.
-CalibrationTable bentTable() {
+CalibrationTable weightedTable() {
   SyntheticOptions options;
   options.counts = {5, 4, 4};
   options.reference_from_tracker = {{0.5, -0.2, 1.1}, rotationFromVector({0.3, -0.8, 1.7})};
@@ -79,7 +79,7 @@ class ClosedFormTest : public QObject {
     options.validation = parseValidation(validate.toStdString()).value();
     options.align = rigid ? calibration::AlignMode::kRigid : calibration::AlignMode::kNone;
     options.with_surroundings = false;
-    const CalibrationTable table = bentTable();
+    const CalibrationTable table = weightedTable();
     const auto fast = compareMethods(table, options);
     FT_VERIFY_OK(fast);
     options.closed_form = false;
@@ -114,7 +114,7 @@ class ClosedFormTest : public QObject {
       options.position_methods = {{method.id, {}}};
       options.with_surroundings = false;
       options.validation = Validation{ValidationKind::kFolds, 3};
-      const auto comparison = compareMethods(bentTable(), options);
+      const auto comparison = compareMethods(weightedTable(), options);
       FT_VERIFY_OK(comparison);
       const MethodScore& score = comparison->position.front();
       if (score.skipped) continue;

@@ -3,24 +3,19 @@
 
 #include "calib/field/dipole_field.h"
 #include "calib/field/pose_solver.h"
+#include "tests/calib/field/couplings_at.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
 #include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::field;
+using fieldtrue::testing::couplingsAt;
+using fieldtrue::testing::kC;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
-namespace {
-
-constexpr double kC = 1.7;
-
-Eigen::Matrix3d couplingsAt(const Pose& tracker_from_sensor) {
-  return couplings(dipoleField(tracker_from_sensor.position_m, kC), tracker_from_sensor.orientation);
-}
-
-}  // namespace
+namespace {}  // namespace
 
 class IteratedSolverTest : public QObject {
   Q_OBJECT

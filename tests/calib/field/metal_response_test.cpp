@@ -27,8 +27,6 @@ Excitation pulsed(double delay_s) { return {true, 0.0, delay_s}; }
 
 }  // namespace
 
-Q_DECLARE_METATYPE(fieldtrue::field::Metal)
-
 class MetalResponseTest : public QObject {
   Q_OBJECT
  private slots:

@@ -10,7 +10,6 @@ using namespace fieldtrue;
 using namespace fieldtrue::field;
 using fieldtrue::testing::near;
 
-Q_DECLARE_METATYPE(fieldtrue::field::Metal)
 Q_DECLARE_METATYPE(std::optional<double>)
 Q_DECLARE_METATYPE(fieldtrue::field::Excitation)
 

@@ -6,22 +6,19 @@
 #include <limits>
 
 #include "calib/field/dipole_field.h"
+#include "tests/calib/field/couplings_at.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"
 #include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::field;
+using fieldtrue::testing::couplingsAt;
+using fieldtrue::testing::kC;
 using fieldtrue::testing::near;
 using fieldtrue::testing::RandomGeometry;
 
 namespace {
-
-constexpr double kC = 2.5;
-
-Eigen::Matrix3d couplingsAt(const Pose& tracker_from_sensor) {
-  return couplings(dipoleField(tracker_from_sensor.position_m, kC), tracker_from_sensor.orientation);
-}
 
 double misfit(const Eigen::Matrix3d& S, const Pose& pose) { return (S - couplingsAt(pose)).norm(); }
 

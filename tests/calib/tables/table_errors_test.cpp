@@ -12,12 +12,12 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-auto nodesOf(const std::string& text) {
+auto badNodesOf(const std::string& text) {
   std::istringstream in(text);
   return readNodeTable(in, "bad.nodes.csv");
 }
 
-auto samplesOf(const std::string& text) {
+auto badSamplesOf(const std::string& text) {
   std::istringstream in(text);
   return readSampleTable(in, "bad.samples.csv");
 }
@@ -106,8 +106,8 @@ class TableErrorsTest : public QObject {
     QFETCH(QByteArray, column);
     QFETCH(QByteArray, value);
     QFETCH(QByteArray, says);
-    FT_VERIFY_OK(nodesOf(nodeText("", "").toStdString()));
-    const auto reading = nodesOf(nodeText(column, value).toStdString());
+    FT_VERIFY_OK(badNodesOf(nodeText("", "").toStdString()));
+    const auto reading = badNodesOf(nodeText(column, value).toStdString());
     QVERIFY(!reading);
     QVERIFY(reading.error().code == ErrorCode::kBadInput);
     FT_VERIFY_MATCH(holdsAll(reading.error().message, {"bad.nodes.csv, line 4, column " + column + ": ", says}));
@@ -164,7 +164,7 @@ class TableErrorsTest : public QObject {
   void badFile() {
     QFETCH(QByteArray, text);
     QFETCH(QByteArray, says);
-    const auto reading = nodesOf(text.toStdString());
+    const auto reading = badNodesOf(text.toStdString());
     QVERIFY(!reading);
     QVERIFY(reading.error().code == ErrorCode::kBadInput);
     FT_VERIFY_MATCH(holdsAll(reading.error().message, {"bad.nodes.csv", says}));
@@ -196,7 +196,7 @@ class TableErrorsTest : public QObject {
   void badSamples() {
     QFETCH(QByteArray, text);
     QFETCH(QByteArray, says);
-    const auto reading = samplesOf(text.toStdString());
+    const auto reading = badSamplesOf(text.toStdString());
     QVERIFY(!reading);
     FT_VERIFY_MATCH(holdsAll(reading.error().message, {"bad.samples.csv", says}));
   }
@@ -213,7 +213,7 @@ class TableErrorsTest : public QObject {
     const std::string text = out.str();
     std::size_t errors = 0;
     for (std::size_t length = 0; length < text.size(); ++length) {
-      const auto reading = nodesOf(text.substr(0, length));
+      const auto reading = badNodesOf(text.substr(0, length));
       errors += reading ? 0 : 1;
       if (!reading) {
         QVERIFY(!reading.error().message.empty());
@@ -233,7 +233,7 @@ class TableErrorsTest : public QObject {
     const std::string text = kSampleHead.toStdString() + row + "\n" + row + "D\n" + row + "\n";
     std::size_t errors = 0;
     for (std::size_t length = 0; length < text.size(); ++length) {
-      const auto reading = samplesOf(text.substr(0, length));
+      const auto reading = badSamplesOf(text.substr(0, length));
       errors += reading ? 0 : 1;
       if (!reading) continue;
       for (const SampleRow& seen : reading->table.rows) {

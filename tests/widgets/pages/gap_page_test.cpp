@@ -16,6 +16,7 @@
 
 #include "tests/support/matchers.h"
 #include "tests/widgets/gap_fixture.h"
+#include "tests/widgets/pages/window_driver.h"
 #include "tests/widgets/window_test.h"
 #include "widgets/shell/main_window.h"
 #include "widgets/style/theme.h"
@@ -28,8 +29,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-constexpr int kWaitMs = 120000;
-
 /// Runs until it is stopped, as a long diagnosis would.
 Result<gap::GapReport> runUntilStopped(const CalibrationTable&, const SampleTable*, const simulation::Scene*,
                                        const RunControl& control) {
@@ -38,13 +37,6 @@ Result<gap::GapReport> runUntilStopped(const CalibrationTable&, const SampleTabl
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   return fail(ErrorCode::kCancelled, "stopped");
-}
-
-template <class T>
-T* find(QWidget& page, const char* name) {
-  T* widget = page.findChild<T*>(QString::fromLatin1(name));
-  if (!widget) qFatal("no widget named %s", name);
-  return widget;
 }
 
 const GapBarChart& chart(GapPage& page, const char* id) {

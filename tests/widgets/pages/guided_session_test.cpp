@@ -41,8 +41,6 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kPlaces = 5 * 5 * 4;
-constexpr int kWaitMs = 120000;
-
 }  // namespace
 
 class GuidedSessionTest : public testing::WindowDriver {

@@ -29,7 +29,6 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kWaitMs = 120000;
 const Eigen::Vector3d kWrong_m{0.0, 0.36, 0.48};  ///< 0.6 m long.
 
 bool isWholeIn(const QLabel& label) {

@@ -25,8 +25,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-constexpr int kWaitMs = 120000;
-
 struct Recorded {
   double plan_per_reading = 1.0;  ///< 1000: the plan was made in millimetres.
   bool has_two_sensors = false;   ///< The second half of the places with another sensor than the first.

@@ -9,14 +9,23 @@
 
 namespace fieldtrue::testing {
 
+/// The longest that a slow machine may take for what a page does in the background.
+constexpr int kWaitMs = 240000;
+
+/// A widget by its name, which must be there.
+template <class T>
+T* find(QWidget& in, const char* name) {
+  T* widget = in.findChild<T*>(QString::fromLatin1(name));
+  if (!widget) qFatal("no widget named %s", name);
+  return widget;
+}
+
 /// What tests of the whole window share: the window, a folder of their own, and widgets by their names.
 class WindowDriver : public QObject {
  protected:
   template <class T>
   T* find(const char* name) {
-    T* widget = window_->findChild<T*>(QString::fromLatin1(name));
-    if (!widget) qFatal("no widget named %s", name);
-    return widget;
+    return testing::find<T>(*window_, name);
   }
   void click(const char* name) { QTest::mouseClick(find<QWidget>(name), Qt::LeftButton); }
   bool onPage(const QString& name) { return find<QWidget>(qPrintable(name))->isVisible(); }

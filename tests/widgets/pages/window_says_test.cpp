@@ -34,7 +34,6 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kWaitMs = 240000;
 constexpr double kPitch_m = 0.2;
 
 /// Where the tracker says that a place is, from where it is.

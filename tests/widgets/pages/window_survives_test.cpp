@@ -15,6 +15,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/silent_port.h"
 #include "tests/support/synthetic.h"
+#include "tests/widgets/pages/window_driver.h"
 #include "tests/widgets/window_test.h"
 #include "widgets/pages/compare_page.h"
 #include "widgets/pages/gap_page.h"
@@ -27,15 +28,6 @@ using namespace fieldtrue;
 using namespace fieldtrue::widgets;
 
 namespace {
-
-constexpr int kWaitMs = 60000;
-
-template <class T>
-T* find(QWidget& in, const char* name) {
-  T* widget = in.findChild<T*>(QString::fromLatin1(name));
-  if (!widget) qFatal("no widget named %s", name);
-  return widget;
-}
 
 std::unique_ptr<MainWindow> openWindow() {
   auto window = std::make_unique<MainWindow>();

@@ -31,7 +31,6 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kTextSize = 12;
 constexpr double kLetter_px = 6.9;  ///< Mean width of a bold letter.
 constexpr double kMostLabelShare = 0.45;
 constexpr std::size_t kFewestLetters = 8;
@@ -63,12 +62,6 @@ Bounds boundsOf(const std::vector<ChartLine>& lines) {
   bounds.y_high *= 1.3;
   bounds.x_high *= 1.03;
   return bounds;
-}
-
-void setText(vtkTextProperty* text, const QColor& color, bool bold) {
-  setFont(text, bold);
-  text->SetFontSize(kTextSize);
-  text->SetColor(rgb(color).data());
 }
 
 }  // namespace
@@ -148,7 +141,7 @@ void CurveLabels::paintNames(vtkContext2D* painter) const {
   const double x = chart->GetAxis(vtkAxis::BOTTOM)->GetPoint2()[0] + 6.0 * ratio;
   for (std::size_t k = 0; k < shown.size(); ++k) {
     vtkTextProperty* text = painter->GetTextProp();
-    setText(text, seriesColor((*lines)[shown[k]].color, *theme), true);
+    setChartText(text, seriesColor((*lines)[shown[k]].color, *theme), true);
     text->SetOpacity(1.0);
     text->SetJustificationToLeft();
     text->SetVerticalJustificationToCentered();
@@ -289,8 +282,8 @@ void CurveScene::styleAxis(int axis, const QString& title, const std::vector<dou
   }
   item->SetBehavior(vtkAxis::FIXED);
   item->SetCustomTickPositions(positions, names);
-  setText(item->GetLabelProperties(), theme_->text_muted, false);
-  setText(item->GetTitleProperties(), theme_->text, true);
+  setChartText(item->GetLabelProperties(), theme_->text_muted);
+  setChartText(item->GetTitleProperties(), theme_->text, true);
   item->SetTitle(title.toStdString());
   for (vtkPen* pen : {item->GetPen(), item->GetGridPen()}) {
     pen->SetColorF(theme_->line.redF(), theme_->line.greenF(), theme_->line.blueF());

@@ -47,13 +47,13 @@ std::array<unsigned char, 3> bytes(const QColor& color) {
           static_cast<unsigned char>(color.blue())};
 }
 
-void setText(vtkTextProperty* text, const QColor& color, bool bold = false) {
+}  // namespace
+
+void setChartText(vtkTextProperty* text, const QColor& color, bool bold) {
   setFont(text, bold);
   text->SetFontSize(kTextSize);
   text->SetColor(rgb(color).data());
 }
-
-}  // namespace
 
 QColor seriesColor(std::size_t series, const Theme& theme) {
   if (series == 0) return theme.dark ? QColor(0x84, 0x91, 0x9e) : QColor(0x8b, 0x97, 0xa3);
@@ -141,7 +141,7 @@ void HistogramScene::rebuild() {
   chart_->SetBarWidthFraction(static_cast<float>(kBarShare));
   chart_->SetShowLegend(names_.size() > 1);
   vtkChartLegend* legend = chart_->GetLegend();
-  setText(legend->GetLabelProperties(), theme_->text);
+  setChartText(legend->GetLabelProperties(), theme_->text);
   legend->SetSymbolWidth(static_cast<int>(14 * ratio_));
   legend->SetPadding(static_cast<int>(6 * ratio_));
   legend->GetPen()->SetLineType(vtkPen::NO_PEN);
@@ -157,8 +157,8 @@ void HistogramScene::rebuild() {
 
 void HistogramScene::styleAxis(int axis, const QString& title) {
   vtkAxis* item = chart_->GetAxis(axis);
-  setText(item->GetLabelProperties(), theme_->text_muted);
-  setText(item->GetTitleProperties(), theme_->text, true);
+  setChartText(item->GetLabelProperties(), theme_->text_muted);
+  setChartText(item->GetTitleProperties(), theme_->text, true);
   item->SetTitle(title.toStdString());
   const auto [red, green, blue] = bytes(theme_->line);
   for (vtkPen* pen : {item->GetPen(), item->GetGridPen()}) {

@@ -11,6 +11,7 @@
 class vtkChartXY;
 class vtkContextActor;
 class vtkRenderer;
+class vtkTextProperty;
 
 namespace fieldtrue::widgets {
 
@@ -25,6 +26,9 @@ Histogram histogramOf(const std::vector<std::vector<double>>& values_mm);
 
 /// The colour of the n-th series of every chart: 0 is before correction, then the methods, all different.
 QColor seriesColor(std::size_t series, const Theme& theme);
+
+/// The font, size and colour of words in charts.
+void setChartText(vtkTextProperty* text, const QColor& color, bool bold = false);
 
 /// What HistogramView and renderPicture draw.
 class HistogramScene {

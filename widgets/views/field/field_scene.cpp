@@ -10,6 +10,7 @@
 
 #include "calib/core/error.h"
 #include "calib/core/number_text.h"
+#include "calib/core/units.h"
 #include "widgets/style/color_scale.h"
 #include "widgets/style/units.h"
 #include "widgets/views/host/mesh.h"
@@ -24,8 +25,7 @@ constexpr double kArcInner = 0.17;
 constexpr double kArcOuter = 0.27;
 constexpr double kNeedleRadius = 0.008;
 constexpr double kLargestArc_rad = 1.9 * std::numbers::pi;
-constexpr double kRad = std::numbers::pi / 180.0;
-constexpr double kArcStep_rad = 10.0 * kRad;
+constexpr double kArcStep_rad = 10.0 * kRadPerDeg;
 
 double length_mm(const FieldArrow& arrow) { return 1000.0 * arrow.error_m.norm(); }
 
@@ -222,7 +222,7 @@ void FieldScene::updateArcs(const Eigen::Matrix3d& world_from_view) {
     const double maximum_deg = angleScaleMax_deg();
     for (const FieldArrow& arrow : field_.arrows) {
       if (!arrow.angle_deg || !std::isfinite(*arrow.angle_deg)) continue;
-      const double angle_rad = std::min(kLargestArc_rad, magnification_ * *arrow.angle_deg * kRad);
+      const double angle_rad = std::min(kLargestArc_rad, magnification_ * *arrow.angle_deg * kRadPerDeg);
       const int steps = std::max(1, static_cast<int>(std::ceil(angle_rad / kArcStep_rad)));
       mesh.setColor(magnitudeColor(*arrow.angle_deg / maximum_deg));
       mesh.addSector(arrow.from_m, world_from_view.col(0), world_from_view.col(1), kArcInner * pitch, kArcOuter * pitch,

@@ -6,10 +6,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "calib/core/units.h"
+
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kPerspective_rad = 28.0 * kPi / 180.0;
 constexpr double kNearlyParallel_rad = 5.0 * kPi / 180.0;
 constexpr double kOperatorTurn_rad = 24.0 * kPi / 180.0;

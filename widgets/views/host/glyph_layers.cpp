@@ -14,12 +14,12 @@
 #include <algorithm>
 #include <numbers>
 
+#include "calib/core/units.h"
 #include "widgets/views/host/mesh.h"
 
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kEdgeSize = 1.28;        ///< Of the edge's shape, against the mark's.
 constexpr double kEdgeBehind = 0.2;       ///< Radii.
 constexpr double kFullLength = 9.0;       ///< Shaft radii from which an arrow has its full thickness.

@@ -19,9 +19,9 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr double kHeadShare = 0.35;
-constexpr double kHeadLength = 7.0;  ///< Shaft radii.
-constexpr double kHeadRadius = 2.6;  ///< Shaft radii.
+constexpr double kSolidHeadShare = 0.35;
+constexpr double kSolidHeadLength = 7.0;  ///< Shaft radii.
+constexpr double kSolidHeadRadius = 2.6;  ///< Shaft radii.
 
 Eigen::Vector3d onCircle(const std::array<Eigen::Vector3d, 2>& uv, double angle_rad) {
   return std::cos(angle_rad) * uv[0] + std::sin(angle_rad) * uv[1];
@@ -97,10 +97,10 @@ void Mesh::addCone(const Eigen::Vector3d& base, const Eigen::Vector3d& tip, doub
 void Mesh::addArrow(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double shaft_radius_m) {
   const double length = (to - from).norm();
   if (length <= 0.0) return;
-  const double head = std::min(kHeadShare * length, kHeadLength * shaft_radius_m);
+  const double head = std::min(kSolidHeadShare * length, kSolidHeadLength * shaft_radius_m);
   const Eigen::Vector3d neck = to - head * (to - from) / length;
   addCylinder(from, neck, shaft_radius_m);
-  addCone(neck, to, kHeadRadius * shaft_radius_m);
+  addCone(neck, to, kSolidHeadRadius * shaft_radius_m);
 }
 
 void Mesh::addBall(const Eigen::Vector3d& center, double radius_m, int sides) {
