@@ -16,87 +16,87 @@ namespace {
 constexpr int kVersion = 1;
 
 /// Components that could not be estimated are null.
-Eigen::Vector3d vectorFrom(const JsonReader& json) {
-  const std::vector<double> components = json.list([](const JsonReader& entry) { return entry.numberOrNan(); });
-  if (components.size() != 3) json.refuse("a list of 3 numbers");
+Eigen::Vector3d vectorFrom(const JsonReader& reader) {
+  const std::vector<double> components = reader.list([](const JsonReader& entry) { return entry.numberOrNan(); });
+  if (components.size() != 3) reader.refuse("a list of 3 numbers");
   return Eigen::Vector3d(components.data());
 }
 
-GapVerdict verdictFrom(const JsonReader& json) {
+GapVerdict verdictFrom(const JsonReader& reader) {
   std::vector<std::string> known;
   for (const GapVerdict verdict :
        {GapVerdict::kNoGap, GapVerdict::kExplained, GapVerdict::kPartlyExplained, GapVerdict::kUnexplained}) {
-    if (json.raw() == idOf(verdict)) return verdict;
+    if (reader.raw() == idOf(verdict)) return verdict;
     known.emplace_back(idOf(verdict));
   }
-  json.oneOf(known);
+  reader.oneOf(known);
   return GapVerdict::kUnexplained;
 }
 
-GapReport::Input inputFrom(const JsonReader& json) {
+GapReport::Input inputFrom(const JsonReader& reader) {
   GapReport::Input input;
-  input.places = json["places"].integer();
-  input.rows = json["rows"].integer();
-  input.samples = json["samples"].integer();
-  input.orientations = json["orientations"].integer();
-  input.position_only = json["position_only"].flag();
+  input.places = reader["places"].integer();
+  input.rows = reader["rows"].integer();
+  input.samples = reader["samples"].integer();
+  input.orientations = reader["orientations"].integer();
+  input.position_only = reader["position_only"].flag();
   return input;
 }
 
-Eigen::Vector3d turnFrom(const JsonReader& json) {
-  if (json.isNull()) return Eigen::Vector3d::Zero();
-  return kRadPerDeg * vectorFrom(json);
+Eigen::Vector3d turnFrom(const JsonReader& reader) {
+  if (reader.isNull()) return Eigen::Vector3d::Zero();
+  return kRadPerDeg * vectorFrom(reader);
 }
 
-GapNode nodeFrom(const JsonReader& json) {
+GapNode nodeFrom(const JsonReader& reader) {
   GapNode node;
-  node.node = json["node"].integer();
-  node.visit = json["visit"].integer();
-  node.place_m = vectorFrom(json["place_m"]);
-  node.before_m = kMPerMm * vectorFrom(json["before_mm"]);
-  node.after_m = kMPerMm * vectorFrom(json["after_mm"]);
-  node.before_rad = turnFrom(json["before_deg"]);
-  node.after_rad = turnFrom(json["after_deg"]);
-  node.excess = json["excess"].numberOrNan();
-  node.is_flagged = json["flagged"].flag();
+  node.node = reader["node"].integer();
+  node.visit = reader["visit"].integer();
+  node.place_m = vectorFrom(reader["place_m"]);
+  node.before_m = kMPerMm * vectorFrom(reader["before_mm"]);
+  node.after_m = kMPerMm * vectorFrom(reader["after_mm"]);
+  node.before_rad = turnFrom(reader["before_deg"]);
+  node.after_rad = turnFrom(reader["after_deg"]);
+  node.excess = reader["excess"].numberOrNan();
+  node.is_flagged = reader["flagged"].flag();
   return node;
 }
 
-std::vector<GapBin> binsFrom(const JsonReader& json, const char* low_key, const char* high_key) {
-  return json.list([&](const JsonReader& bin) {
+std::vector<GapBin> binsFrom(const JsonReader& reader, const char* low_key, const char* high_key) {
+  return reader.list([&](const JsonReader& bin) {
     return GapBin{bin[low_key].numberOrNan(), bin[high_key].numberOrNan(), bin["rms_mm"].numberOrNan(),
                   bin["floor_mm"].numberOrNan()};
   });
 }
 
-void readWhere(const JsonReader& json, GapReport& report) {
-  report.nodes = json["nodes"].list(nodeFrom);
-  const JsonReader hotspot = json["hotspot"];
+void readWhere(const JsonReader& reader, GapReport& report) {
+  report.nodes = reader["nodes"].list(nodeFrom);
+  const JsonReader hotspot = reader["hotspot"];
   if (!hotspot.isNull()) report.hotspot = Hotspot{vectorFrom(hotspot["center_m"]), hotspot["radius_m"].numberOrNan()};
-  report.channels = json["channels"].list([](const JsonReader& channel) {
+  report.channels = reader["channels"].list([](const JsonReader& channel) {
     return GapChannel{channel["name"].text(), channel["unit"].text(), channel["rms"].numberOrNan(),
                       channel["floor"].numberOrNan()};
   });
-  report.by_range = binsFrom(json["by_range"], "low_m", "high_m");
-  report.by_layer = binsFrom(json["by_layer"], "layer", "layer");
-  report.by_time = binsFrom(json["by_time"], "t_start_s", "t_end_s");
-  const JsonReader origin = json["origin"];
+  report.by_range = binsFrom(reader["by_range"], "low_m", "high_m");
+  report.by_layer = binsFrom(reader["by_layer"], "layer", "layer");
+  report.by_time = binsFrom(reader["by_time"], "t_start_s", "t_end_s");
+  const JsonReader origin = reader["origin"];
   report.origin = {origin["room"].numberOrNan(), origin["transmitter"].numberOrNan(), origin["sensor"].numberOrNan(),
                    origin["jig_or_time"].numberOrNan()};
 }
 
-void readGap(const JsonReader& json, GapReport& report) {
-  report.position_rms_mm = json["position_rms_mm"].numberOrNan();
-  report.orientation_rms_deg = json["orientation_rms_deg"].optionalNumber();
-  report.floor_position_mm = json["floor_position_mm"].numberOrNan();
-  report.floor_orientation_deg = json["floor_orientation_deg"].optionalNumber();
-  report.ratio_to_floor = json["ratio_to_floor"].numberOrNan();
-  report.p_value = json["p_value"].numberOrNan();
+void readGap(const JsonReader& reader, GapReport& report) {
+  report.position_rms_mm = reader["position_rms_mm"].numberOrNan();
+  report.orientation_rms_deg = reader["orientation_rms_deg"].optionalNumber();
+  report.floor_position_mm = reader["floor_position_mm"].numberOrNan();
+  report.floor_orientation_deg = reader["floor_orientation_deg"].optionalNumber();
+  report.ratio_to_floor = reader["ratio_to_floor"].numberOrNan();
+  report.p_value = reader["p_value"].numberOrNan();
 }
 
-Shrinkage shrinkageFrom(const JsonReader& json) {
-  return {json["before_mm"].numberOrNan(), json["after_mm"].numberOrNan(), json["fraction"].numberOrNan(),
-          json["low90"].optionalNumber(), json["high90"].optionalNumber()};
+Shrinkage shrinkageFrom(const JsonReader& reader) {
+  return {reader["before_mm"].numberOrNan(), reader["after_mm"].numberOrNan(), reader["fraction"].numberOrNan(),
+          reader["low90"].optionalNumber(), reader["high90"].optionalNumber()};
 }
 
 std::vector<Estimate> parametersFrom(const JsonReader& candidate) {
@@ -110,67 +110,67 @@ std::vector<Estimate> parametersFrom(const JsonReader& candidate) {
   return estimates;
 }
 
-void readCandidate(const JsonReader& json, GapCandidate& candidate) {
-  candidate.effect = json["effect"].text();
-  candidate.equivalents = json["class"].texts();
-  candidate.probability = json["probability"].numberOrNan();
-  candidate.bic_gain = json["bic_gain"].numberOrNan();
-  candidate.parameters = parametersFrom(json);
-  if (const JsonReader location = json["location_m"]; !location.isNull()) candidate.location_m = vectorFrom(location);
-  if (const JsonReader covariance = json["location_covariance_m2"]; !covariance.isNull())
+void readCandidate(const JsonReader& reader, GapCandidate& candidate) {
+  candidate.effect = reader["effect"].text();
+  candidate.equivalents = reader["class"].texts();
+  candidate.probability = reader["probability"].numberOrNan();
+  candidate.bic_gain = reader["bic_gain"].numberOrNan();
+  candidate.parameters = parametersFrom(reader);
+  if (const JsonReader location = reader["location_m"]; !location.isNull()) candidate.location_m = vectorFrom(location);
+  if (const JsonReader covariance = reader["location_covariance_m2"]; !covariance.isNull())
     candidate.location_covariance_m2 = covariance.matrix3();
-  candidate.material = json["material"].optionalText();
-  candidate.shrinkage = shrinkageFrom(json["shrinkage"]);
-  candidate.is_plausible = json["plausible"].flag();
-  candidate.doubt = json["doubt"].text();
-  candidate.scene_parameters = json["scene_parameters"].raw();
+  candidate.material = reader["material"].optionalText();
+  candidate.shrinkage = shrinkageFrom(reader["shrinkage"]);
+  candidate.is_plausible = reader["plausible"].flag();
+  candidate.doubt = reader["doubt"].text();
+  candidate.scene_parameters = reader["scene_parameters"].raw();
 }
 
-GapCandidate candidateFrom(const JsonReader& json) {
+GapCandidate candidateFrom(const JsonReader& reader) {
   GapCandidate candidate;
-  readCandidate(json, candidate);
+  readCandidate(reader, candidate);
   return candidate;
 }
 
-SelectedEffect selectedFrom(const JsonReader& json) {
+SelectedEffect selectedFrom(const JsonReader& reader) {
   SelectedEffect selected;
-  readCandidate(json, selected);
-  selected.credit_fraction = json["credit_fraction"].numberOrNan();
+  readCandidate(reader, selected);
+  selected.credit_fraction = reader["credit_fraction"].numberOrNan();
   return selected;
 }
 
-void readLists(const JsonReader& json, GapReport& report) {
-  report.smallest_detectable = json["smallest_detectable"].list([](const JsonReader& item) {
+void readLists(const JsonReader& reader, GapReport& report) {
+  report.smallest_detectable = reader["smallest_detectable"].list([](const JsonReader& item) {
     return SmallestDetectable{item["effect"].text(), item["parameter"].text(), item["value"].numberOrNan(),
                               item["unit"].text()};
   });
-  report.findings = json["findings"].list([](const JsonReader& item) {
+  report.findings = reader["findings"].list([](const JsonReader& item) {
     return recording::GapFinding{item["effect"].text(), item["text"].text(), item["nodes"].integers()};
   });
-  report.candidates = json["candidates"].list(candidateFrom);
-  report.selected = json["selected"].list(selectedFrom);
-  report.sequence = json["sequence"].list([](const JsonReader& item) {
+  report.candidates = reader["candidates"].list(candidateFrom);
+  report.selected = reader["selected"].list(selectedFrom);
+  report.sequence = reader["sequence"].list([](const JsonReader& item) {
     return GapStep{item["effect"].text(), item["excess_mm"].numberOrNan(), item["low90_mm"].optionalNumber(),
                    item["high90_mm"].optionalNumber()};
   });
-  report.predictions = json["predictions"].list([](const JsonReader& item) {
+  report.predictions = reader["predictions"].list([](const JsonReader& item) {
     return Prediction{item["effect"].text(), item["node"].integer(), item["now_mm"].numberOrNan(),
                       item["then_mm"].numberOrNan(), item["then_sd_mm"].numberOrNan()};
   });
 }
 
-void readRemaining(const JsonReader& json, GapReport& report) {
-  report.remaining_position_rms_mm = json["position_rms_mm"].numberOrNan();
-  report.remaining_fraction = json["fraction_of_start"].numberOrNan();
-  report.remaining_where = json["where"].integers();
+void readRemaining(const JsonReader& reader, GapReport& report) {
+  report.remaining_position_rms_mm = reader["position_rms_mm"].numberOrNan();
+  report.remaining_fraction = reader["fraction_of_start"].numberOrNan();
+  report.remaining_where = reader["where"].integers();
 }
 
-Isolability isolabilityFrom(const JsonReader& json) {
+Isolability isolabilityFrom(const JsonReader& reader) {
   Isolability isolability;
-  isolability.pairs = json["pairs"].list([](const JsonReader& pair) {
+  isolability.pairs = reader["pairs"].list([](const JsonReader& pair) {
     return IsolabilityPair{pair["a"].text(), pair["b"].text(), pair["r2"].numberOrNan()};
   });
-  isolability.warnings = json["warnings"].texts();
+  isolability.warnings = reader["warnings"].texts();
   return isolability;
 }
 

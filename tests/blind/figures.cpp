@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/blind/generate_session.h"
 #include "tests/blind/judgement.h"
 
 namespace blind {
@@ -14,7 +15,6 @@ using Sessions = std::vector<const Session*>;
 using Test = std::function<bool(const Session&)>;
 
 constexpr double kAllowance = 0.03;
-constexpr std::array<double, 4> kLevels = {0.35, 0.7, 1.4, 2.8};
 const std::array<std::string, 4> kLevelNames = {"rho 0.35", "rho 0.7", "rho 1.4", "rho 2.8"};
 
 Sessions where(const Sessions& sessions, const Test& test) {

@@ -106,7 +106,6 @@ std::vector<SessionWish> drawWishes(const Options& options, Random& random) {
     double share;
   };
   constexpr Share kShares[] = {{"none", 0.25}, {"single", 0.45}, {"pairs", 0.12}, {"off", 0.15}, {"signals", 0.03}};
-  constexpr double kLevels[] = {0.35, 0.7, 1.4, 2.8};
   std::vector<std::string> shelves;
   double upto = 0;
   for (const Share& share : kShares) {

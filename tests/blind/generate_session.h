@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,6 +17,9 @@ struct GeneratedSession {
   std::string samples_csv;
   nlohmann::json truth;
 };
+
+/// Gaps to noise that are asked for.
+inline constexpr std::array<double, 4> kLevels = {0.35, 0.7, 1.4, 2.8};
 
 struct SessionWish {
   std::string shelf;            ///< none, single, pairs, off, signals
