@@ -53,7 +53,9 @@ void addMethods(Answer& answer, const std::string& kind, const Rows& rows) {
   auto& list = answer.json[kind] = nlohmann::json::array();
   for (const auto& row : rows) {
     list.push_back(rowJson(row));
+    list.back()["reading"] = row.reading;
     answer.text += "  " + row.id + "  " + row.label + (row.source.empty() ? "" : "  [" + row.source + "]") + "\n";
+    if (!row.reading.empty()) answer.text += "      Read as: " + row.reading + "\n";
     answer.text += settingsLines(row.settings);
   }
 }

@@ -157,6 +157,17 @@ class CliChainTest : public QObject {
     }
   }
 
+  void methodsTellHowUnclearSourcesAreRead() {
+    const json listed = runCli({"methods", "--json"}).json();
+    std::map<std::string, std::string> readings;
+    for (const json& row : listed.at("position")) readings[row.at("id")] = row.at("reading");
+    FT_VERIFY_MATCH(holdsAll(readings.at("trilinear"), {"mean of the level", "16 nearest", "largest pitch"}));
+    QCOMPARE(readings.at("local_briggs"), readings.at("trilinear"));
+    FT_VERIFY_MATCH(holdsAll(readings.at("hmq"), {"origin", "transmitter"}));
+    QVERIFY(readings.at("polynomial").empty());
+    QVERIFY(runCli({"methods"}).out.contains("Read as: "));
+  }
+
   void heldOutRigidErrorIsReproduced() {
     const double expected_mm = leaveOneOutRigid_mm(table_.nodes);
     QVERIFY(expected_mm > 0.1);

@@ -45,7 +45,7 @@ void writeFoldBack(HtmlWriter& html, const evaluation::FoldBack& fold_back, cons
   html.element("p", fold_back.text, {{"id", "fold-back"}});
   std::vector<std::string> folded;
   for (const evaluation::FoldBackCell& cell : fold_back.cells)
-    if (!cell.one_to_one) folded.push_back(cellText(cell, names));
+    if (!cell.one_to_one || cell.is_near_fold) folded.push_back(cellText(cell, names));
   writeList(html, folded);
 }
 

@@ -65,6 +65,8 @@ struct CorrectionMethod {
   MethodOrigin origin = MethodOrigin::kSurvey;
   /// What the automatic choice tries of it; empty = nothing.
   std::vector<AutomaticTry> tries = {};
+  /// How the source is read where a sentence of it leaves more than one way; empty where none does.
+  std::string reading = {};
 
   /// @error kBadInput when the JSON is not what the method stores
   Result<std::unique_ptr<Model>> load(const nlohmann::json& parameters) const {

@@ -35,7 +35,8 @@ PositionMethod localBriggsPosition() {
           .fit = fitLocalBriggs,
           .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
-          .tries = {{"", simplicity::kInterpolating}}};
+          .tries = {{"", simplicity::kInterpolating}},
+          .reading = trackedGridReading()};
 }
 
 }  // namespace fieldtrue::correctors

@@ -1,6 +1,7 @@
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
+#include "calib/correctors/cells/tracked_grid.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -19,7 +20,8 @@ PositionMethod localBumpPosition() {
           .fit = fitLocalBump,
           .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
-          .tries = {{"", simplicity::kInterpolating}}};
+          .tries = {{"", simplicity::kInterpolating}},
+          .reading = trackedGridReading()};
 }
 
 }  // namespace fieldtrue::correctors

@@ -2,6 +2,7 @@
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
+#include "calib/correctors/cells/tracked_grid.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -27,7 +28,8 @@ PositionMethod localKindratenkoPosition() {
           .fit = fitLocalKindratenko,
           .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
-          .tries = {{"", simplicity::kInterpolating}}};
+          .tries = {{"", simplicity::kInterpolating}},
+          .reading = trackedGridReading()};
 }
 
 }  // namespace fieldtrue::correctors

@@ -1,6 +1,7 @@
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
+#include "calib/correctors/cells/tracked_grid.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -20,7 +21,8 @@ PositionMethod localLinearPosition() {
           .fit = fitLocalLinear,
           .read = loadLocalPosition,
           .origin = MethodOrigin::kSurvey,
-          .tries = {{"", simplicity::kInterpolating}}};
+          .tries = {{"", simplicity::kInterpolating}},
+          .reading = trackedGridReading()};
 }
 
 }  // namespace fieldtrue::correctors

@@ -211,7 +211,8 @@ Result<TrackedGrid> resampledGrid(const Places& places, RegridMethod regrid, con
   options.pitch_m = 0.0;
   std::string counts;
   for (const std::vector<double>& axis_m : levels_m) {
-    options.pitch_m += (axis_m.back() - axis_m.front()) / static_cast<double>(axis_m.size() - 1) / 3.0;
+    options.pitch_m =
+        std::max(options.pitch_m, (axis_m.back() - axis_m.front()) / static_cast<double>(axis_m.size() - 1));
     counts += (counts.empty() ? "" : " x ") + std::to_string(axis_m.size());
   }
   std::size_t n_missing = 0;
@@ -231,6 +232,16 @@ std::vector<Setting> resampleSettings() {
           declare::number(
               "width_pitches", "Width of Livingston's kernel", {0.1, 3.0, "pitches"}, 1.0,
               "SD of the Gaussian kernel of resample=livingston; its width is not published, one pitch is ours.")};
+}
+
+std::string trackedGridReading() {
+  return "Tracked places never form a rectilinear grid to the last digit: each within " +
+         std::to_string(static_cast<int>(100.0 * kRectilinearTolerance)) +
+         " % of the pitch of its level counts as standing at the mean of the level. With resample=briggs the "
+         "surrounding tetrahedron is sought among the " +
+         std::to_string(Regridder::kTetrahedronCandidates) +
+         " nearest places, then twice and four times as many; with livingston the kernel's cut-off is three of the "
+         "largest pitch.";
 }
 
 Result<TrackedGrid> trackedGrid(const FitData& data, const Settings& settings, const std::string& method) {

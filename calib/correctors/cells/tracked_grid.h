@@ -11,6 +11,9 @@ namespace fieldtrue::correctors {
 /// `resample`: none (default), briggs, livingston or czernuszenko; and `width_pitches` of Livingston's kernel.
 std::vector<Setting> resampleSettings();
 
+/// How the survey's grid in tracked space is read, for the rows of the methods that need one.
+std::string trackedGridReading();
+
 /// Error vectors at the nodes of a grid that is rectilinear in tracked space, along the tracker's axes.
 struct TrackedGrid {
   HexahedralCells cells;             ///< Boxes along the axes.

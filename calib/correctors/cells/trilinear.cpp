@@ -65,7 +65,8 @@ PositionMethod trilinearPosition() {
       .fit = fitTrilinear,
       .read = loadTrilinear,
       .origin = MethodOrigin::kSurvey,
-      .tries = {{"", simplicity::kInterpolating}}};
+      .tries = {{"", simplicity::kInterpolating}},
+      .reading = trackedGridReading()};
 }
 
 }  // namespace fieldtrue::correctors

@@ -101,7 +101,10 @@ PositionMethod hmqPosition() {
           .origin = MethodOrigin::kSurvey,
           .tries = {{"r2_cm2=10", simplicity::kInterpolating},
                     {"r2_cm2=100", simplicity::kInterpolating},
-                    {"r2_cm2=1000", simplicity::kInterpolating}}};
+                    {"r2_cm2=1000", simplicity::kInterpolating}},
+          .reading =
+              "The sum of multiquadrics is the true position itself, not its difference to the tracked one, and "
+              "has no constant term, so it depends on where the origin is: here the transmitter, as tracked."};
 }
 
 }  // namespace fieldtrue::correctors

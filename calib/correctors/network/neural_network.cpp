@@ -91,6 +91,12 @@ struct Trained {
   std::string note;
 };
 
+/// From one that smooths to one too light to, or the one asked for.
+std::vector<double> penaltiesOf(const Settings& settings) {
+  if (std::holds_alternative<std::string>(settings.at("weight_penalty"))) return {1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
+  return {numberSetting(settings, "weight_penalty")};
+}
+
 Result<Trained> train(const TrainingSet& set, const Settings& settings, double unit_m, const RunControl& control) {
   const FeedForwardNetwork layers(static_cast<int>(integerSetting(settings, "hidden")), kSecondHidden);
   const auto seed = static_cast<std::uint64_t>(integerSetting(settings, "seed"));
@@ -98,7 +104,7 @@ Result<Trained> train(const TrainingSet& set, const Settings& settings, double u
     LevenbergMarquardtOptions options;
     options.n_starts = static_cast<int>(integerSetting(settings, "starts"));
     options.max_iterations = static_cast<int>(integerSetting(settings, "max_iterations"));
-    options.weight_penalty = numberSetting(settings, "weight_penalty");
+    options.weight_penalties = penaltiesOf(settings);
     options.seed = seed;
     return trainByLevenbergMarquardt(layers, set, options, control).map([](FeedForwardNetwork network) {
       return Trained{std::move(network), {}};
@@ -148,13 +154,15 @@ std::vector<Setting> neuralNetworkSettings() {
                        "Nodes of the first hidden layer; 7 or 8 are published."),
       declare::choice("training", "Training", {"levenberg_marquardt", "back_propagation"}, "levenberg_marquardt",
                       "Least squares from several starts, or the published back-propagation of one pair at a time."),
-      declare::integer("starts", "Starts", {1, 20}, 4, "Random starts of levenberg_marquardt; the best one is kept."),
+      declare::integer("starts", "Starts", {1, 20}, 4,
+                       "Random starts of levenberg_marquardt; the one that foretells left-out places best is kept."),
       declare::integer("max_iterations", "Most iterations", {1, 2000}, 150,
                        "levenberg_marquardt ends after so many at the latest."),
-      declare::number(
-          "weight_penalty", "Weight penalty", {0.0, 1.0}, 1e-7,
+      declare::autoNumber(
+          "weight_penalty", "Weight penalty", {0.0, 1.0}, "auto",
           "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "
-          "keeps weights from running away and is too light to smooth; 0 = none."),
+          "keeps weights from running away; 0 = none, auto = of 1e-4 to 1e-8 the one that foretells left-out places "
+          "best."),
       declare::number("learning_rate", "Learning rate", {0.001, 1.0}, 0.05,
                       "Of back_propagation; 0.01 to 0.1 are published."),
       declare::number("momentum", "Momentum", {0.0, 0.99}, 0.5,

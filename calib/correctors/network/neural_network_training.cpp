@@ -59,34 +59,57 @@ class Watch : public ceres::IterationCallback {
   int n_planned_;
 };
 
-/// Where one start ends.
+/// Where one start ends with one penalty.
 struct Ending {
   FeedForwardNetwork::Weights weights;
-  double cost = HUGE_VAL;
+  double held_out = HUGE_VAL;  ///< Mean square of the error at each pair without it, to first order.
 };
 
-Ending trainFrom(const FeedForwardNetwork& start, const TrainingSet& set, const LevenbergMarquardtOptions& options,
+double heldOutError(const FeedForwardNetwork& network, const TrainingSet& set, double weight_penalty) {
+  const std::size_t n_pairs = set.input.size();
+  const Eigen::Index n_weights = network.weights().size();
+  std::vector<FeedForwardNetwork::WeightJacobian> jacobians(n_pairs);
+  std::vector<Eigen::Vector3d> errors(n_pairs);
+  Eigen::MatrixXd normal =
+      weight_penalty * static_cast<double>(n_pairs) * Eigen::MatrixXd::Identity(n_weights, n_weights);
+  for (std::size_t i = 0; i < n_pairs; ++i) {
+    errors[i] = network.outputWithWeightJacobian(set.input[i], jacobians[i]) - set.target[i];
+    normal.noalias() += jacobians[i].transpose() * jacobians[i];
+  }
+  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < n_pairs; ++i) {
+    const Eigen::Matrix3d hat = jacobians[i] * factor.solve(jacobians[i].transpose());
+    sum += (Eigen::Matrix3d::Identity() - hat).partialPivLu().solve(errors[i]).squaredNorm();
+  }
+  return std::isfinite(sum) ? sum / static_cast<double>(n_pairs) : HUGE_VAL;
+}
+
+Ending trainFrom(const FeedForwardNetwork& start, const TrainingSet& set, double weight_penalty, int max_iterations,
                  Watch& watch) {
   Ending ending{start.weights(), HUGE_VAL};
   ceres::Problem problem;
   for (std::size_t i = 0; i < set.input.size(); ++i)
     problem.AddResidualBlock(new PairCost(start, set.input[i], set.target[i]), nullptr, ending.weights.data());
-  if (options.weight_penalty > 0.0) {
+  if (weight_penalty > 0.0) {
     const auto n_weights = ending.weights.size();
-    const double factor = std::sqrt(options.weight_penalty * static_cast<double>(set.input.size()));
+    const double factor = std::sqrt(weight_penalty * static_cast<double>(set.input.size()));
     problem.AddResidualBlock(
         new ceres::NormalPrior(factor * ceres::Matrix::Identity(n_weights, n_weights), ceres::Vector::Zero(n_weights)),
         nullptr, ending.weights.data());
   }
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = options.max_iterations;
+  solver.max_num_iterations = max_iterations;
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
   solver.callbacks.push_back(&watch);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
-  if (summary.IsSolutionUsable()) ending.cost = summary.final_cost;
+  if (!summary.IsSolutionUsable()) return ending;
+  FeedForwardNetwork network = start;
+  network.setWeights(ending.weights);
+  ending.held_out = heldOutError(network, set, weight_penalty);
   return ending;
 }
 
@@ -104,20 +127,26 @@ void shuffle(std::vector<std::size_t>& order, std::mt19937_64& generator) {
 Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& network, const TrainingSet& set,
                                                      const LevenbergMarquardtOptions& options,
                                                      const RunControl& control) {
-  FT_CHECK(set.input.size() == set.target.size() && !set.input.empty() && options.n_starts > 0);
-  std::vector<Ending> endings(static_cast<std::size_t>(options.n_starts));
+  FT_CHECK(set.input.size() == set.target.size() && !set.input.empty() && options.n_starts > 0 &&
+           !options.weight_penalties.empty());
+  const std::size_t n_penalties = options.weight_penalties.size();
+  const int n_planned = options.n_starts * static_cast<int>(n_penalties) * options.max_iterations;
+  std::vector<Ending> endings(static_cast<std::size_t>(options.n_starts) * n_penalties);
   std::atomic<int> n_done = 0;
-  control.parallel_for(endings.size(), [&](std::size_t k) {
-    if (control.stop.stop_requested()) return;
+  control.parallel_for(static_cast<std::size_t>(options.n_starts), [&](std::size_t k) {
     FeedForwardNetwork start = network;
     start.setRandomWeights(1000003 * options.seed + k);
-    Watch watch(control, n_done, options.n_starts * options.max_iterations);
-    endings[k] = trainFrom(start, set, options, watch);
+    Watch watch(control, n_done, n_planned);
+    for (std::size_t penalty = 0; penalty < n_penalties && !control.stop.stop_requested(); ++penalty) {
+      Ending& ending = endings[k * n_penalties + penalty];
+      ending = trainFrom(start, set, options.weight_penalties[penalty], options.max_iterations, watch);
+      if (std::isfinite(ending.held_out)) start.setWeights(ending.weights);
+    }
   });
   if (control.stop.stop_requested()) return stopped();
   const auto best = std::min_element(endings.begin(), endings.end(),
-                                     [](const Ending& a, const Ending& b) { return a.cost < b.cost; });
-  if (!std::isfinite(best->cost))
+                                     [](const Ending& a, const Ending& b) { return a.held_out < b.held_out; });
+  if (!std::isfinite(best->held_out))
     return fail(ErrorCode::kDegenerate, "The training of the network failed from each of its " +
                                             std::to_string(options.n_starts) + " starts; try another seed");
   FeedForwardNetwork trained = network;

@@ -23,6 +23,8 @@ constexpr std::size_t kProbes = 4000;
 /// A measured cell counts as folded when its determinant is below zero by more than this many SDs of what jig and
 /// noise make of it: with nine points in hundreds of cells two SDs would be chance.
 constexpr double kSignificant = 3.0;
+/// A determinant below this is near a fold: readings fill a fifth of the space that the places do.
+constexpr double kNearFold = 0.2;
 
 /// A cell of the grid: places at its eight corners, corner c at (c & 1, c >> 1 & 1, c >> 2).
 using Corners = std::array<std::size_t, 8>;
@@ -158,9 +160,11 @@ GridVerdict judgeGrid(const correctors::FitData& data, const Pose& reference_fro
     }
     cell.size_m =
         std::cbrt(std::abs(trilinearJacobian(corners, places.p_true_m, Eigen::Vector3d::Constant(0.5)).determinant()));
-    cell.determinant = std::abs(worst->determinant) > 1e-12 ? 1.0 / worst->determinant : 0.0;
+    cell.determinant = worst->determinant;
     cell.condition = conditionOf(worst->tracked_from_true);
     cell.one_to_one = !is_folded;
+    cell.is_near_fold = worst->determinant > 0.0 && worst->determinant < kNearFold &&
+                        worst->determinant + kSignificant * worst->sd < 1.0;
     verdict.n_doubtful += !is_folded && worst->determinant <= 0.0;
     verdict.cells.push_back(std::move(cell));
   }
@@ -178,9 +182,10 @@ std::vector<FoldBackCell> judgeCorrector(const calibration::Corrector& corrector
     FoldBackCell cell;
     cell.center_m = corrector.correctPosition_m(p_tracked_m);
     cell.size_m = lattice.step_m;
-    cell.determinant = jacobian.determinant();
+    cell.determinant = 1.0 / jacobian.determinant();
     cell.condition = conditionOf(jacobian);
-    cell.one_to_one = cell.determinant > 0.0;
+    cell.one_to_one = jacobian.determinant() > 0.0;
+    cell.is_near_fold = cell.one_to_one && cell.determinant < kNearFold;
     cells.push_back(std::move(cell));
   }
   return cells;
@@ -200,9 +205,17 @@ std::string sentence(const FoldBack& fold_back, std::size_t n_grid, std::size_t 
   const std::string doubtful = n_doubtful == 0 ? std::string()
                                                : "; " + countText(n_doubtful, "cell folds", "cells fold") +
                                                      " by no more than jig tolerance and noise explain";
-  if (fold_back.n_folded == 0)
-    return "The field does not fold back (" + looked_at + ", worst condition " +
-           fixedText(fold_back.worst_condition, 1) + ")" + doubtful + ".";
+  const std::string figures = looked_at + ", smallest determinant " +
+                              significantText(fold_back.smallest_determinant, 2) + ", worst condition " +
+                              fixedText(fold_back.worst_condition, 1);
+  if (fold_back.n_folded == 0 && fold_back.n_near_fold > 0) {
+    const auto nearest = std::find_if(fold_back.cells.begin(), fold_back.cells.end(),
+                                      [](const FoldBackCell& cell) { return cell.is_near_fold; });
+    return "The field does not fold back but comes near to it at " + std::to_string(fold_back.n_near_fold) + " of " +
+           std::to_string(fold_back.cells.size()) + " (" + figures + "), nearest " + whereText(*nearest, names) +
+           ": readings hardly change with the place there, and the correction multiplies their noise" + doubtful + ".";
+  }
+  if (fold_back.n_folded == 0) return "The field does not fold back (" + figures + ")" + doubtful + ".";
   const auto folded_cells = static_cast<std::size_t>(
       std::count_if(fold_back.cells.begin(), fold_back.cells.begin() + static_cast<std::ptrdiff_t>(n_grid),
                     [](const FoldBackCell& cell) { return !cell.one_to_one; }));
@@ -230,7 +243,10 @@ FoldBack foldBackOf(const calibration::Corrector& corrector) {
   // Worst first, so that whoever lists cells names the worst.
   for (std::vector<FoldBackCell>* cells : {&grid.cells, &probes})
     std::stable_sort(cells->begin(), cells->end(), [](const FoldBackCell& a, const FoldBackCell& b) {
-      return a.one_to_one != b.one_to_one ? !a.one_to_one : a.condition > b.condition;
+      const auto ease = [](const FoldBackCell& cell) {
+        return cell.one_to_one + (cell.one_to_one && !cell.is_near_fold);
+      };
+      return ease(a) != ease(b) ? ease(a) < ease(b) : a.condition > b.condition;
     });
   FoldBack fold_back;
   fold_back.cells = std::move(grid.cells);
@@ -239,6 +255,7 @@ FoldBack foldBackOf(const calibration::Corrector& corrector) {
   bool is_first = true;
   for (const FoldBackCell& cell : fold_back.cells) {
     fold_back.n_folded += !cell.one_to_one;
+    fold_back.n_near_fold += cell.is_near_fold;
     fold_back.worst_condition = std::max(fold_back.worst_condition, cell.condition);
     fold_back.smallest_determinant =
         is_first ? cell.determinant : std::min(fold_back.smallest_determinant, cell.determinant);
@@ -248,22 +265,33 @@ FoldBack foldBackOf(const calibration::Corrector& corrector) {
   return fold_back;
 }
 
+namespace {
+
+json toJson(const FoldBackCell& cell) {
+  return {{"center_m", {cell.center_m.x(), cell.center_m.y(), cell.center_m.z()}},
+          {"size_m", cell.size_m},
+          {"determinant", cell.determinant},
+          {"condition", std::isfinite(cell.condition) ? json(cell.condition) : json(nullptr)},
+          {"nodes", cell.nodes}};
+}
+
+}  // namespace
+
 json toJson(const FoldBack& fold_back) {
   json folded = json::array();
+  json near = json::array();
   for (const FoldBackCell& cell : fold_back.cells) {
-    if (cell.one_to_one) continue;
-    folded.push_back({{"center_m", {cell.center_m.x(), cell.center_m.y(), cell.center_m.z()}},
-                      {"size_m", cell.size_m},
-                      {"determinant", cell.determinant},
-                      {"condition", std::isfinite(cell.condition) ? json(cell.condition) : json(nullptr)},
-                      {"nodes", cell.nodes}});
+    if (!cell.one_to_one) folded.push_back(toJson(cell));
+    if (cell.is_near_fold) near.push_back(toJson(cell));
   }
   return {
       {"n_judged", fold_back.cells.size()},
       {"n_folded", fold_back.n_folded},
       {"worst_condition", std::isfinite(fold_back.worst_condition) ? json(fold_back.worst_condition) : json(nullptr)},
       {"smallest_determinant", fold_back.smallest_determinant},
+      {"n_near_fold", fold_back.n_near_fold},
       {"folded", std::move(folded)},
+      {"near_fold", std::move(near)},
       {"text", fold_back.text}};
 }
 

@@ -13,10 +13,13 @@ namespace fieldtrue::evaluation {
 struct FoldBackCell {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  ///< True position, reference frame [m].
   double size_m = 0.0;                                 ///< Edge of the cube it stands for.
-  double determinant = 1.0;  ///< Of d true / d tracked; 0 or below: the field folds back and no correction is unique.
-  double condition = 1.0;    ///< Ratio of its largest to smallest singular value.
+  /// Of d tracked / d true: 0 or below, the field folds back and no correction is unique; far below 1, readings hardly
+  /// change with the place and the correction multiplies their noise.
+  double determinant = 1.0;
+  double condition = 1.0;  ///< Ratio of its largest to smallest singular value.
   bool one_to_one = true;
-  std::vector<int> nodes;  ///< Places at the corners of the cell, where it is a cell of the grid.
+  bool is_near_fold = false;  ///< One to one, but its determinant is small, by more than jig and noise explain.
+  std::vector<int> nodes;     ///< Places at the corners of the cell, where it is a cell of the grid.
 };
 
 /// Whether the tracked position determines the true one over the volume.
@@ -24,9 +27,10 @@ struct FoldBackCell {
 struct FoldBack {
   std::vector<FoldBackCell> cells;
   int n_folded = 0;
+  int n_near_fold = 0;
   double worst_condition = 1.0;
-  double smallest_determinant = 1.0;
-  std::string text;  ///< One sentence, with the worst cell named.
+  double smallest_determinant = 1.0;  ///< Of the cells.
+  std::string text;                   ///< One sentence, with the worst cell named.
 };
 
 /// Grid cells judged by the measured nodes themselves (sign of the Jacobian of true to tracked at the eight corners and

@@ -128,7 +128,7 @@ class NeuralNetworkTest : public QObject {
     options.n_starts = 1;
     const TrainingSet set = taughtBy(teacher, 100);
     const auto free_weights = trainByLevenbergMarquardt(FeedForwardNetwork(8, 4), set, options, {});
-    options.weight_penalty = 1e-2;
+    options.weight_penalties = {1e-2};
     const auto held = trainByLevenbergMarquardt(FeedForwardNetwork(8, 4), set, options, {});
     FT_VERIFY_OK(free_weights);
     FT_VERIFY_OK(held);
