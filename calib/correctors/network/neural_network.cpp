@@ -93,7 +93,7 @@ struct Trained {
 
 /// From one that smooths to one too light to, or the one asked for.
 std::vector<double> penaltiesOf(const Settings& settings) {
-  if (std::holds_alternative<std::string>(settings.at("weight_penalty"))) return {1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
+  if (std::holds_alternative<std::string>(settings.at("weight_penalty"))) return {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7};
   return {numberSetting(settings, "weight_penalty")};
 }
 
@@ -161,7 +161,7 @@ std::vector<Setting> neuralNetworkSettings() {
       declare::autoNumber(
           "weight_penalty", "Weight penalty", {0.0, 1.0}, "auto",
           "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "
-          "keeps weights from running away; 0 = none, auto = of 1e-4 to 1e-8 the one that foretells left-out places "
+          "keeps weights from running away; 0 = none, auto = of 1e-2 to 1e-7 the one that foretells left-out places "
           "best."),
       declare::number("learning_rate", "Learning rate", {0.001, 1.0}, 0.05,
                       "Of back_propagation; 0.01 to 0.1 are published."),
