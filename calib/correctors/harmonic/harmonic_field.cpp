@@ -12,6 +12,8 @@ namespace fieldtrue::correctors {
 namespace {
 
 constexpr const char* kName = "The harmonic field";
+/// Share of the box's longest side by which it reaches beyond the places.
+constexpr double kMargin = 0.05;
 
 /// The box of tracked positions in which the model is evaluated: beyond it the sources are near and nothing is known.
 struct TrackedBox {
@@ -40,7 +42,8 @@ class HarmonicField : public PositionModel {
 
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
     const Eigen::Vector3d inside_m = box_.nearest_m(p_tracked_m);
-    const Eigen::Vector3d in_field_m = p_tracked_m + (field_.truePosition_m(inside_m) - inside_m);
+    const Eigen::Vector3d in_field_m =
+        p_tracked_m + (field_.truePosition_m(inside_m) - inside_m) + goneOn_m(inside_m, p_tracked_m - inside_m);
     return truth_from_field_ * in_field_m - p_tracked_m;
   }
 
@@ -72,6 +75,20 @@ class HarmonicField : public PositionModel {
   }
 
  private:
+  /// How the displacement in the field's frame goes on beyond the box: along its slope at the face, so that there is no
+  /// kink, and ever more slowly, since the slope holds near the face only.
+  Eigen::Vector3d goneOn_m(const Eigen::Vector3d& face_m, const Eigen::Vector3d& beyond_m) const {
+    constexpr double kStep_m = 1e-4;
+    const double distance_m = beyond_m.norm();
+    if (distance_m == 0.0) return Eigen::Vector3d::Zero();
+    const double reach_m = kMargin * (box_.high_m - box_.low_m).maxCoeff();
+    const Eigen::Vector3d step_m = kStep_m / distance_m * beyond_m;
+    const Eigen::Vector3d slope =
+        (field_.truePosition_m(face_m + step_m) - field_.truePosition_m(face_m - step_m) - 2.0 * step_m) /
+        (2.0 * kStep_m);
+    return distance_m * reach_m / (reach_m + distance_m) * slope;
+  }
+
   DisturbedField field_;
   Pose field_from_truth_;
   Pose truth_from_field_;
@@ -111,7 +128,7 @@ Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Se
     box.low_m = box.low_m.cwiseMin(p_m);
     box.high_m = box.high_m.cwiseMax(p_m);
   }
-  const double margin_m = 0.05 * (box.high_m - box.low_m).maxCoeff();
+  const double margin_m = kMargin * (box.high_m - box.low_m).maxCoeff();
   box.low_m.array() -= margin_m;
   box.high_m.array() += margin_m;
   const HarmonicOptions options{numberSetting(settings, "least_gain"),

@@ -132,6 +132,7 @@ class HarmonicFieldTest : public QObject {
   void seesNoMetalInNoise();
   void knowsItsUncertainty();
   void doesNoHarmToAnotherTracker();
+  void goesOnBeyondItsBoxWithoutAKink();
   void isRigidWithoutSources();
   void stops();
 };
@@ -301,6 +302,37 @@ void HarmonicFieldTest::doesNoHarmToAnotherTracker() {
     without_m2 += ((*rigid)->displacement_m(p_m) - bend_m(p_m)).squaredNorm();
   }
   QVERIFY2(with_m2 < 1.1 * without_m2, qPrintable(QString("%1 of it left").arg(std::sqrt(with_m2 / without_m2))));
+}
+
+// One-sided slopes at points of every face, each by a fourth-order difference, agree; further out the displacement
+// levels off.
+void HarmonicFieldTest::goesOnBeyondItsBoxWithoutAKink() {
+  const FitData data = roomData(cabinet().get(), 0.001, 3);
+  const auto model = fitPosition("harmonic_field", data);
+  FT_VERIFY_OK(model);
+  const nlohmann::json parameters = (*model)->parameters();
+  const auto bound_m = [&](const char* key, Eigen::Index axis) {
+    return parameters.at(key).at(static_cast<std::size_t>(axis)).get<double>();
+  };
+  constexpr double kStep_m = 2e-4;
+  double largest_slope = 0.0;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    for (const double way : {-1.0, 1.0}) {
+      Eigen::Vector3d face_m(1.3, 0.1, 0.05);
+      face_m[axis] = bound_m(way < 0.0 ? "low_m" : "high_m", axis);
+      const Eigen::Vector3d out = way * Eigen::Vector3d::Unit(axis);
+      const auto at_m = [&](double distance_m) -> Eigen::Vector3d {
+        return (*model)->displacement_m(face_m + distance_m * out);
+      };
+      const auto slope = [&](double h_m) -> Eigen::Vector3d {
+        return (-11.0 * at_m(0.0) + 18.0 * at_m(h_m) - 9.0 * at_m(2.0 * h_m) + 2.0 * at_m(3.0 * h_m)) / (6.0 * h_m);
+      };
+      largest_slope = std::max(largest_slope, slope(-kStep_m).norm());
+      FT_VERIFY_MATCH(near(slope(kStep_m), slope(-kStep_m), 2e-4));
+      QVERIFY((at_m(1.0) - at_m(0.0)).norm() <= 0.06 * 1.1 * slope(-kStep_m).norm() + 1e-4);
+    }
+  }
+  QVERIFY(largest_slope > 0.02);  // There is something to have a kink.
 }
 
 void HarmonicFieldTest::isRigidWithoutSources() {
