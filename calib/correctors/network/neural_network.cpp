@@ -91,9 +91,10 @@ struct Trained {
   std::string note;
 };
 
-/// From one that smooths to one too light to, or the one asked for.
+/// From one too light to smooth to one that does, or the one asked for. The other way round the strong ones lead
+/// astray: they end where the network says next to nothing.
 std::vector<double> penaltiesOf(const Settings& settings) {
-  if (std::holds_alternative<std::string>(settings.at("weight_penalty"))) return {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7};
+  if (std::holds_alternative<std::string>(settings.at("weight_penalty"))) return {1e-7, 1e-6, 1e-5, 1e-4, 1e-3};
   return {numberSetting(settings, "weight_penalty")};
 }
 
@@ -156,12 +157,12 @@ std::vector<Setting> neuralNetworkSettings() {
                       "Least squares from several starts, or the published back-propagation of one pair at a time."),
       declare::integer("starts", "Starts", {1, 20}, 4,
                        "Random starts of levenberg_marquardt; the one that foretells left-out places best is kept."),
-      declare::integer("max_iterations", "Most iterations", {1, 2000}, 150,
-                       "levenberg_marquardt ends after so many at the latest."),
+      declare::integer("max_iterations", "Most iterations", {1, 2000}, 200,
+                       "levenberg_marquardt ends after so many at the latest, for each penalty."),
       declare::autoNumber(
           "weight_penalty", "Weight penalty", {0.0, 1.0}, "auto",
           "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "
-          "keeps weights from running away; 0 = none, auto = of 1e-2 to 1e-7 the one that foretells left-out places "
+          "keeps weights from running away; 0 = none, auto = of 1e-7 to 1e-3 the one that foretells left-out places "
           "best."),
       declare::number("learning_rate", "Learning rate", {0.001, 1.0}, 0.05,
                       "Of back_propagation; 0.01 to 0.1 are published."),
