@@ -198,7 +198,8 @@ class LatticeBaker {
                 "A lattice cannot follow this correction within " + lengthText(max_deviation_m_) +
                     ": at the finest that 32 MB hold, " + sizeText(lattice.parts()) + ", it is off by up to " +
                     lengthText(deviation_m) +
-                    "; ask for a larger deviation, or bake a method that does not jump or bend between its cells");
+                    " at the points looked at, and a fifth of the bound is kept for what lies between them; ask for a "
+                    "larger deviation, or bake a method that does not jump or bend between its cells");
   }
 
   const PositionModel& model_;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
@@ -86,7 +87,7 @@ class HarmonicField : public PositionModel {
     const Eigen::Vector3d slope =
         (field_.truePosition_m(face_m + step_m) - field_.truePosition_m(face_m - step_m) - 2.0 * step_m) /
         (2.0 * kStep_m);
-    return distance_m * reach_m / (reach_m + distance_m) * slope;
+    return distance_m / std::hypot(1.0, distance_m / reach_m) * slope;
   }
 
   DisturbedField field_;
