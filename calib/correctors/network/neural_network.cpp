@@ -157,8 +157,9 @@ std::vector<Setting> neuralNetworkSettings() {
                       "Least squares from several starts, or the published back-propagation of one pair at a time."),
       declare::integer("starts", "Starts", {1, 20}, 4,
                        "Random starts of levenberg_marquardt; the one that foretells left-out places best is kept."),
-      declare::integer("max_iterations", "Most iterations", {1, 2000}, 200,
-                       "levenberg_marquardt ends after so many at the latest, for each penalty."),
+      declare::integer(
+          "max_iterations", "Most iterations", {1, 2000}, 200,
+          "levenberg_marquardt ends after so many at the latest, and after a quarter with each further penalty."),
       declare::autoNumber(
           "weight_penalty", "Weight penalty", {0.0, 1.0}, "auto",
           "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "

@@ -126,6 +126,9 @@ void shuffle(std::vector<std::size_t>& order, std::mt19937_64& generator) {
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[generator() % i]);
 }
 
+/// Of the iterations of a start's first penalty, what a further one has: it begins where the one before ended.
+constexpr int kFurtherShare = 4;
+
 }  // namespace
 
 Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& network, const TrainingSet& set,
@@ -134,7 +137,9 @@ Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& n
   FT_CHECK(set.input.size() == set.target.size() && !set.input.empty() && options.n_starts > 0 &&
            !options.weight_penalties.empty());
   const std::size_t n_penalties = options.weight_penalties.size();
-  const int n_planned = options.n_starts * static_cast<int>(n_penalties) * options.max_iterations;
+  const int further_iterations = std::max(1, options.max_iterations / kFurtherShare);
+  const int n_planned =
+      options.n_starts * (options.max_iterations + static_cast<int>(n_penalties - 1) * further_iterations);
   std::vector<Ending> endings(static_cast<std::size_t>(options.n_starts) * n_penalties);
   std::atomic<int> n_done = 0;
   control.parallel_for(static_cast<std::size_t>(options.n_starts), [&](std::size_t k) {
@@ -143,7 +148,8 @@ Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& n
     Watch watch(control, n_done, n_planned);
     for (std::size_t penalty = 0; penalty < n_penalties && !control.stop.stop_requested(); ++penalty) {
       Ending& ending = endings[k * n_penalties + penalty];
-      ending = trainFrom(start, set, options.weight_penalties[penalty], options.max_iterations, watch);
+      ending = trainFrom(start, set, options.weight_penalties[penalty],
+                         penalty == 0 ? options.max_iterations : further_iterations, watch);
       if (std::isfinite(ending.held_out)) start.setWeights(ending.weights);
     }
   });

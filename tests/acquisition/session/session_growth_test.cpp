@@ -91,8 +91,8 @@ class SessionGrowthTest : public QObject {
     const double ratio = usual(late_s) / usual(early_s);
     qInfo("a place after %d costs %.2f ms, one of the first %.2f ms", kTaken, 1e3 * usual(late_s),
           1e3 * usual(early_s));
-#ifdef __SANITIZE_ADDRESS__
-    const double most = 4.0;  // Its allocator looks through a heap that grows with the session.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    const double most = 4.0;  // Their allocator looks through a heap that grows with the session.
 #else
     const double most = 1.5;
 #endif
