@@ -81,7 +81,8 @@ std::string surroundingsText(const evaluation::Comparison& comparison) {
 }
 
 void appendNotes(std::string& text, const std::string& who, const std::vector<std::string>& notes) {
-  for (const std::string& note : notes) text += (who.empty() ? "" : who + ": ") + note + "\n";
+  const std::string lead = who.empty() ? "" : who + ": ";
+  for (const std::string& note : notes) text.append(lead).append(note).append("\n");
 }
 
 }  // namespace

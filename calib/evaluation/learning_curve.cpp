@@ -53,7 +53,7 @@ std::vector<Draw> drawParts(const HeldOutJob& job, const std::vector<int>& pool,
   IndexSource source(job.seed + 1);
   std::vector<Draw> draws;
   for (const double share : kShares) {
-    const auto n_places = static_cast<std::size_t>(share * static_cast<double>(pool.size()) + 0.5);
+    const auto n_places = static_cast<std::size_t>(std::lround(share * static_cast<double>(pool.size())));
     if (n_places == 0 || (!points.empty() && points.back().n_places == static_cast<int>(n_places))) continue;
     points.push_back({static_cast<int>(n_places)});
     for (std::size_t d = 0; d < (n_places == pool.size() ? 1 : kDraws); ++d) {

@@ -43,9 +43,10 @@ void FeedForwardNetwork::setRandomWeights(std::uint64_t seed) {
     for (Eigen::Index i = 0; i < count; ++i) weights_[start + i] = uniform.within(half_width);
   };
   constexpr double kLogistic = 4.0;
-  fill(0, secondStart(), kLogistic * std::sqrt(6.0 / (3 + n_first_)));
-  fill(secondStart(), thirdStart() - secondStart(), kLogistic * std::sqrt(6.0 / (n_first_ + n_second_)));
-  fill(thirdStart(), weights_.size() - thirdStart(), std::sqrt(6.0 / (n_second_ + 3)));
+  fill(0, secondStart(), kLogistic * std::sqrt(6.0 / static_cast<double>(3 + n_first_)));
+  fill(secondStart(), thirdStart() - secondStart(),
+       kLogistic * std::sqrt(6.0 / static_cast<double>(n_first_ + n_second_)));
+  fill(thirdStart(), weights_.size() - thirdStart(), std::sqrt(6.0 / static_cast<double>(n_second_ + 3)));
 }
 
 void FeedForwardNetwork::setWeights(const Weights& weights) {
@@ -82,9 +83,10 @@ Eigen::Vector3d FeedForwardNetwork::outputWithWeightJacobian(const Eigen::Vector
   const Eigen::MatrixXd to_first =
       to_second * layer(secondStart(), n_second_, n_first_) * slopeOf(a.first).matrix().asDiagonal();
   jacobian.setZero(3, weights_.size());
-  for (int node = 0; node < n_first_; ++node) jacobian.middleCols<3>(3 * node) = to_first.col(node) * x.transpose();
+  for (Eigen::Index node = 0; node < n_first_; ++node)
+    jacobian.middleCols<3>(3 * node) = to_first.col(node) * x.transpose();
   jacobian.middleCols(3 * n_first_, n_first_) = to_first;
-  for (int node = 0; node < n_second_; ++node)
+  for (Eigen::Index node = 0; node < n_second_; ++node)
     jacobian.middleCols(secondStart() + node * n_first_, n_first_) = to_second.col(node) * a.first.transpose();
   jacobian.middleCols(secondStart() + n_first_ * n_second_, n_second_) = to_second;
   for (int k = 0; k < 3; ++k) {

@@ -37,8 +37,8 @@ class FeedForwardNetwork {
 
   const Weights& weights() const { return weights_; }
   void setWeights(const Weights& weights);
-  int firstHidden() const { return n_first_; }
-  int secondHidden() const { return n_second_; }
+  int firstHidden() const { return static_cast<int>(n_first_); }
+  int secondHidden() const { return static_cast<int>(n_second_); }
 
   nlohmann::json toJson() const;
   static FeedForwardNetwork fromJson(const JsonReader& json);
@@ -53,15 +53,17 @@ class FeedForwardNetwork {
     Eigen::VectorXd second;
   };
 
-  Layer layer(Eigen::Index start, int rows, int columns) const { return {weights_.data() + start, rows, columns}; }
-  Biases biases(Eigen::Index start, int count) const { return {weights_.data() + start, count}; }
+  Layer layer(Eigen::Index start, Eigen::Index rows, Eigen::Index columns) const {
+    return {weights_.data() + start, rows, columns};
+  }
+  Biases biases(Eigen::Index start, Eigen::Index count) const { return {weights_.data() + start, count}; }
   Eigen::Index secondStart() const { return 4 * n_first_; }
-  Eigen::Index thirdStart() const { return secondStart() + (n_first_ + 1) * n_second_; }
+  Eigen::Index thirdStart() const { return secondStart() + n_second_ * (n_first_ + 1); }
   Activity activity(const Eigen::Vector3d& x) const;
   Eigen::Vector3d outputOf(const Activity& activity) const;
 
-  int n_first_ = 0;
-  int n_second_ = 0;
+  Eigen::Index n_first_ = 0;
+  Eigen::Index n_second_ = 0;
   Weights weights_;
 };
 

@@ -118,7 +118,7 @@ Result<Trained> train(const TrainingSet& set, const Settings& settings, double u
   options.max_epochs = static_cast<int>(integerSetting(settings, "max_epochs"));
   options.stop_error = stop_error_m / unit_m;
   options.seed = seed;
-  return trainByBackPropagation(layers, set, options, control).map([&](BackPropagationResult result) {
+  return trainByBackPropagation(layers, set, options, control).map([&](const BackPropagationResult& result) {
     return Trained{result.network, unfinishedNote(result, unit_m * result.mean_error, stop_error_m)};
   });
 }

@@ -100,7 +100,7 @@ class SessionGrowthTest : public QObject {
     // The window is told of the place, not of the session.
     QCOMPARE(n_tables, 0);
     QCOMPARE(n_places, 41);
-    QCOMPARE(n_samples, std::size_t{41 * 60});
+    QCOMPARE(n_samples, std::size_t{2460});
   }
 };
 
