@@ -109,8 +109,8 @@ def complaints(files, compiled, checks):
     together = ",-readability-duplicate-include" if len(files) > 1 else ""
     with Unit(files, compiled) as unit:
         if len(files) == 1 or unit.run("clang++-14", "-fsyntax-only", "-w", *unit.flags, unit.path)[0] == 0:
-            status, output = unit.run("clang-tidy-14", "--quiet", f"--config-file={ROOT}/.clang-tidy", f"--checks={checks}{together}",
-                                      "--warnings-as-errors=*", unit.path, "--", *unit.flags)
+            status, output = unit.run("clang-tidy-14", "--quiet", f"--config-file={ROOT}/.clang-tidy",
+                                      f"--checks={checks}{together}", "--warnings-as-errors=*", unit.path, "--", *unit.flags)
             return [(files, (output or f"clang-tidy ended with status {status}") if status else "")]
     half = len(files) // 2
     return complaints(files[:half], compiled, checks) + complaints(files[half:], compiled, checks)

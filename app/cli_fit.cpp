@@ -1,6 +1,5 @@
 #include <QDateTime>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <string>
 

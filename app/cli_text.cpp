@@ -1,7 +1,6 @@
 #include "app/cli_text.h"
 
 #include <algorithm>
-#include <numbers>
 #include <optional>
 
 #include "app/cli_values.h"

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <numbers>
 
 #include "calib/core/file_io.h"
 #include "calib/core/units.h"

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <numbers>
 
 #include "calib/core/units.h"
 #include "calib/effects/metal_body.h"

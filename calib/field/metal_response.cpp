@@ -1,7 +1,6 @@
 #include "calib/field/metal_response.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "calib/core/error.h"
 #include "calib/core/units.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "calib/core/file_io.h"
 #include "calib/core/units.h"

@@ -1,7 +1,6 @@
 #include "calib/gap/report_json.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "calib/core/file_io.h"
 #include "calib/core/units.h"

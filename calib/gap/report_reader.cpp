@@ -1,7 +1,5 @@
 #include "calib/gap/report_reader.h"
 
-#include <numbers>
-
 #include "calib/core/file_io.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/json_text.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numbers>
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"

@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <QTest>
 #include <algorithm>
-#include <numbers>
 
 #include "calib/effects/parameters.h"
 #include "calib/effects/registry.h"

@@ -12,7 +12,6 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
-#include <numbers>
 
 #include "calib/core/units.h"
 #include "widgets/views/host/mesh.h"
