@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "app/cli_barrier.h"
-#include "calib/core/exception_barrier.h"
 #include "calib/core/thread_pool.h"
 
 namespace fieldtrue::cli {
@@ -66,7 +65,7 @@ class Application : public QCoreApplication {
   using QCoreApplication::QCoreApplication;
 
   bool notify(QObject* receiver, QEvent* event) override {
-    const Result<bool> handled = withBarrier(kNoHalfFile, [&] { return QCoreApplication::notify(receiver, event); });
+    const Result<bool> handled = commandBarrier([&] { return QCoreApplication::notify(receiver, event); });
     if (handled) return *handled;
     if (!thrownInEvent()) thrownInEvent() = handled.error().message;
     quit();
@@ -194,7 +193,7 @@ int CommandLine::run(int argc, char** argv) {
   const CLI::App& command = *app_.get_subcommands().front();
   const std::string who = std::string(kProgram) + " " + command.get_name();
   if (const std::string clash = writtenOver(command); !clash.empty()) return complain(who, {kWrongUsage, clash});
-  const Result<int> status = withBarrier(kNoHalfFile, [&] { return finish(who, run_(), common_.json); });
+  const Result<int> status = commandBarrier([&] { return finish(who, run_(), common_.json); });
   return status ? *status : complain(who, {kNotPossible, status.error().message});
 }
 
@@ -213,5 +212,5 @@ int main(int argc, char** argv) {
   fieldtrue::cli::addGapCommands(line);
   fieldtrue::cli::addListCommands(line);
   fieldtrue::cli::addGuideCommand(line);
-  return line.run(argc, argv);
+  return fieldtrue::cli::endProgram(line.run(argc, argv));
 }

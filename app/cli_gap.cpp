@@ -14,7 +14,6 @@
 #include "app/cli_pictures.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
-#include "calib/core/exception_barrier.h"
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/report_json.h"
@@ -83,7 +82,7 @@ Result<T> stoppable(RunControl control, Work work) {
   std::optional<Result<T>> result;
   const EndRequest end_request([&source] { source.request_stop(); });
   std::thread worker([&] {
-    result = withBarrier(kNoHalfFile, [&] { return work(control); });
+    result = commandBarrier([&] { return work(control); });
     QMetaObject::invokeMethod(QCoreApplication::instance(), &QCoreApplication::quit, Qt::QueuedConnection);
   });
   QCoreApplication::exec();
