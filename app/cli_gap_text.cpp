@@ -19,8 +19,6 @@ constexpr double kSmallestProbability = 5e-4;
 /// Pairs less alike than this are told apart without trouble.
 constexpr double kSmallestR2 = 0.1;
 
-std::string millimetres(double value_mm) { return std::isfinite(value_mm) ? fixedText(value_mm, 2) + " mm" : "-"; }
-
 std::string percent(double fraction) { return std::isfinite(fraction) ? fixedText(100.0 * fraction, 0) + " %" : "-"; }
 
 std::string interval(const std::optional<double>& low, const std::optional<double>& high, double factor, int decimals) {

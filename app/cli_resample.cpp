@@ -1,8 +1,8 @@
 #include <algorithm>
-#include <cstdio>
 #include <string>
 
 #include "app/cli.h"
+#include "app/cli_text.h"
 #include "app/cli_values.h"
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/resampled_table.h"
@@ -30,12 +30,6 @@ Read<std::vector<PlannedPlace>> readGrid(const acquisition::Plan& plan) {
   if (plan.orientations > 1 || plan.reseat > 1)
     return wrongUsage("a resampled table has one row a grid node: leave orientations and reseat out of the plan");
   return places(plan);
-}
-
-std::string millimetres(double value_mm) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f mm", value_mm);
-  return text;
 }
 
 Answer answerOf(const ResampleOptions& options, const calibration::ResampledTable& resampled,

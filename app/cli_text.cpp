@@ -1,10 +1,12 @@
 #include "app/cli_text.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "app/cli_values.h"
 #include "calib/calibration/alignment.h"
+#include "calib/core/number_text.h"
 #include "calib/core/units.h"
 #include "calib/correctors/method_label.h"
 #include "calib/evaluation/error_stats.h"
@@ -85,6 +87,8 @@ void appendNotes(std::string& text, const std::string& who, const std::vector<st
 }
 
 }  // namespace
+
+std::string millimetres(double value_mm) { return std::isfinite(value_mm) ? fixedText(value_mm, 2) + " mm" : "-"; }
 
 std::string alignedColumns(const std::vector<std::vector<std::string>>& rows) {
   std::vector<std::size_t> widths;

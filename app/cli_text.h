@@ -15,6 +15,9 @@ namespace fieldtrue::cli {
 /// A row of one cell is printed as it is.
 std::string alignedColumns(const std::vector<std::vector<std::string>>& rows);
 
+/// "1.25 mm"; "-" for a figure that there is not.
+std::string millimetres(double value_mm);
+
 /// In-sample figures of a fit.
 std::string fitText(const calibration::Corrector& corrector, calibration::AlignMode align, std::size_t n_unused);
 

@@ -18,7 +18,7 @@ namespace fieldtrue::acquisition {
 namespace {
 
 /// Over a quarter of an hour of unread records: the host has gone without stopping the stream.
-constexpr qsizetype kAbandonedBytes = 4 * 1024 * 1024;
+constexpr qsizetype kAbandonedBytes = qsizetype{4} << 20;
 
 }  // namespace
 

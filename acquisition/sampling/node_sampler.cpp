@@ -32,7 +32,7 @@ std::string times(int count) {
 
 }  // namespace
 
-NodeSampler::NodeSampler(SamplerOptions options) : options_(std::move(options)) {
+NodeSampler::NodeSampler(const SamplerOptions& options) : options_(options) {
   FT_CHECK(options_.samples_per_node >= 1 && options_.block >= 1 && options_.time_limit_s > 0.0);
 }
 
@@ -128,7 +128,7 @@ std::string NodeSampler::timeLimitReason() const {
   return text;
 }
 
-std::string suspicionOf(const NodeStatistics& statistics, int restarts, std::vector<NeighbourTake> neighbours) {
+std::string suspicionOf(const NodeStatistics& statistics, int restarts, const std::vector<NeighbourTake>& neighbours) {
   std::vector<std::string> reasons;
   const std::size_t rejected = statistics.rejections.size();
   const std::size_t total = statistics.n_used + rejected;

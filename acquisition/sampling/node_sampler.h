@@ -27,7 +27,7 @@ enum class TakeState { kIdle, kCollecting, kDone, kFailed };
 /// without end.
 class NodeSampler {
  public:
-  explicit NodeSampler(SamplerOptions options = {});
+  explicit NodeSampler(const SamplerOptions& options = {});
   void start();  ///< Begins a take, dropping what was collected.
   void cancel();
   TakeState add(const Sample& sample);
@@ -73,6 +73,7 @@ struct NeighbourTake {
 /// samples left out, motion that made it start over, and an SD more than 3 times what the neighbours lead one to expect
 /// (their SD, raised with the fourth power of the range when the new place is farther out).
 /// @param neighbours the nearest finished takes; fewer than 3 are not compared
-std::string suspicionOf(const NodeStatistics& statistics, int restarts, std::vector<NeighbourTake> neighbours = {});
+std::string suspicionOf(const NodeStatistics& statistics, int restarts,
+                        const std::vector<NeighbourTake>& neighbours = {});
 
 }  // namespace fieldtrue::acquisition

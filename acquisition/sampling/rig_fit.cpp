@@ -26,7 +26,7 @@ constexpr int kTrims = 6;
 
 using Points = std::vector<Eigen::Vector3d>;
 
-Eigen::Vector3d middle(std::vector<Eigen::Vector3d> values) {
+Eigen::Vector3d middle(const std::vector<Eigen::Vector3d>& values) {
   Eigen::Vector3d result;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> along;
