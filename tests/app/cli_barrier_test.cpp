@@ -40,6 +40,9 @@ class CliBarrierTest : public QObject {
     process.setProcessEnvironment(environment);
     if (limit_bytes > 0)
       process.setChildProcessModifier([limit_bytes] {
+        // ctest takes the stack's limit away, and without one addresses are given out in another way.
+        const rlimit stack{8 << 20, RLIM_INFINITY};
+        ::setrlimit(RLIMIT_STACK, &stack);
         const rlimit limit{limit_bytes, limit_bytes};
         ::setrlimit(RLIMIT_AS, &limit);
       });
