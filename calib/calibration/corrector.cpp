@@ -136,7 +136,7 @@ void Corrector::correct(std::span<const Pose> tracker_from_sensor, std::span<Pos
   position_->correct(p_m, p_m);
   std::size_t next = 0;
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
-    const Pose tracked = tracker_from_sensor[i];
+    const Pose& tracked = tracker_from_sensor[i];
     const bool is_covered = next < covered.size() && covered[next] == i;
     const Eigen::Vector3d p_true_m = is_covered ? p_m[next++] : tracked.position_m;
     const Eigen::Quaterniond q_true = orientation_->covers(tracked.position_m)

@@ -101,7 +101,7 @@ std::vector<FitParameter> vectorParameters(const std::string& prefix, const std:
   const std::string ending = unit.empty() ? "" : "_" + unit;
   std::vector<FitParameter> parameters;
   for (const char* axis : {"_x", "_y", "_z"})
-    parameters.push_back({prefix + axis + ending, unit, -plausible, plausible});
+    parameters.push_back({std::string(prefix).append(axis).append(ending), unit, -plausible, plausible});
   return parameters;
 }
 

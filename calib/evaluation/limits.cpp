@@ -89,7 +89,8 @@ const MethodScore* bestScore(const Comparison& comparison) {
 
 /// Errors of what the verdict recommends.
 const std::vector<double>& recommendedErrors(const Comparison& comparison) {
-  return comparison.verdict.apply_position ? bestScore(comparison)->place_errors : comparison.before_place_mm;
+  const MethodScore* best = bestScore(comparison);
+  return best != nullptr && comparison.verdict.apply_position ? best->place_errors : comparison.before_place_mm;
 }
 
 std::vector<bool> nearHoles(const Comparison& comparison, const HeldOutJob& job) {

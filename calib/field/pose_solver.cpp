@@ -45,7 +45,7 @@ tl::expected<PoseSolution, SolveError> solvePose(const Eigen::Matrix3d& coupling
   if (signal > signalAt(limits.nearest_m, dipole_constant_m3)) return tl::make_unexpected(SolveError::kSaturated);
 
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(couplings, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d d = svd.singularValues();
+  const Eigen::Vector3d& d = svd.singularValues();
   if (d[0] - d[1] < kSmallestGap * d[0]) return tl::make_unexpected(SolveError::kAmbiguous);
   const Eigen::Matrix3d& P = svd.matrixU();
   const Eigen::Matrix3d& Q = svd.matrixV();

@@ -83,7 +83,7 @@ Eigen::Vector3d solvedPosition_m(const Eigen::Matrix3d& field, const Eigen::Vect
 
 PositionDerivative solvedPositionDerivative(const Eigen::Matrix3d& field, const Eigen::Vector3d& near_m) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(field, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d d = svd.singularValues();
+  const Eigen::Vector3d& d = svd.singularValues();
   const Eigen::Matrix3d& P = svd.matrixU();
   const Eigen::Matrix3d& Q = svd.matrixV();
   const double s = field.determinant() < 0.0 ? -1.0 : 1.0;

@@ -85,7 +85,7 @@ class ProjectedFit {
     Eigen::Map<Eigen::VectorXd> left(residuals, NumResiduals());
     if (!theta.allFinite() || !fit_.allows(theta)) {
       left.setConstant(kHuge);
-      if (jacobian != nullptr) Eigen::Map<Eigen::VectorXd>(jacobian, NumResiduals() * NumParameters()).setZero();
+      if (jacobian != nullptr) Eigen::Map<Eigen::MatrixXd>(jacobian, NumResiduals(), NumParameters()).setZero();
       return true;
     }
     left = solved(theta).left;

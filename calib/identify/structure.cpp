@@ -125,8 +125,9 @@ class BasisBuilder {
   static std::vector<field::EffectResponse> ofTransmitter(const field::SensorSetting& s) {
     const Eigen::Matrix3d G = field::dipoleField(s.tracker_from_sensor.position_m, 1.0);
     std::vector<field::EffectResponse> list(9);
+    std::size_t next = 0;
     for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) list[static_cast<std::size_t>(3 * a + b)].field_per_m3.col(b) = G.col(a);
+      for (int b = 0; b < 3; ++b) list[next++].field_per_m3.col(b) = G.col(a);
     return list;
   }
 
@@ -134,9 +135,9 @@ class BasisBuilder {
     const Eigen::Matrix3d G = field::dipoleField(s.tracker_from_sensor.position_m, 1.0);
     const Eigen::Matrix3d R = s.tracker_from_sensor.orientation.toRotationMatrix();
     std::vector<field::EffectResponse> list(9);
+    std::size_t next = 0;
     for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b)
-        list[static_cast<std::size_t>(3 * a + b)].field_per_m3 = R.col(a) * (R.col(b).transpose() * G);
+      for (int b = 0; b < 3; ++b) list[next++].field_per_m3 = R.col(a) * (R.col(b).transpose() * G);
     return list;
   }
 

@@ -204,7 +204,7 @@ Eigen::VectorXd robustWeights(const Eigen::VectorXd& left, Eigen::Index n_rows, 
   constexpr double kMedianOfChiSquare3 = 2.366;
   constexpr double kFullWeightBelow = 12.0;  // In squared scales.
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(left.size());
-  for (int part = 0; part < channels / 3; ++part) {
+  for (Eigen::Index part = 0; part < channels / 3; ++part) {
     std::vector<double> d2;
     for (Eigen::Index i = 0; i < n_rows; ++i) d2.push_back(left.segment<3>(i * channels + 3 * part).squaredNorm());
     std::vector<double> sorted = d2;

@@ -25,20 +25,14 @@ const char* shapeOf(int dimension) {
 /// The grid as an array: number of the place at each index, -1 where there is none.
 class Lattice {
  public:
-  explicit Lattice(const Index& counts)
-      : counts_(counts),
-        place_(static_cast<std::size_t>(counts[0]) * static_cast<std::size_t>(counts[1]) *
-                   static_cast<std::size_t>(counts[2]),
-               -1) {}
+  explicit Lattice(const Index& counts) : counts_(counts), place_(numberOf({counts[0], 0, 0}), -1) {}
 
-  int& at(const Index& index) {
-    return place_[static_cast<std::size_t>((index[0] * counts_[1] + index[1]) * counts_[2] + index[2])];
-  }
+  int& at(const Index& index) { return place_[numberOf(index)]; }
   /// @return -1 outside as well
   int find(const Index& index) const {
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (index[axis] < 0 || index[axis] >= counts_[axis]) return -1;
-    return place_[static_cast<std::size_t>((index[0] * counts_[1] + index[1]) * counts_[2] + index[2])];
+    return place_[numberOf(index)];
   }
   std::optional<std::array<int, 8>> box(const Index& low, const Index& steps) const {
     std::array<int, 8> corners{};
@@ -52,6 +46,14 @@ class Lattice {
   }
 
  private:
+  /// Of an index among all, the last axis fastest.
+  std::size_t numberOf(const Index& index) const {
+    std::size_t number = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      number = number * static_cast<std::size_t>(counts_[axis]) + static_cast<std::size_t>(index[axis]);
+    return number;
+  }
+
   Index counts_;
   std::vector<int> place_;
 };

@@ -34,7 +34,7 @@ Eigen::Matrix3d DisturbedField::trackedJacobian(const Eigen::Vector3d& p_true_m)
 
 Eigen::Vector3d DisturbedField::truePosition_m(const Eigen::Vector3d& p_tracked_m) const {
   if (sources_.empty()) return p_tracked_m;
-  constexpr int kMostSteps = 60;
+  constexpr int kMostQuasiNewtonSteps = 60;
   constexpr double kNear = 1e-11;        // Of the range: 30 pm at 3 m.
   constexpr double kLongestStep = 0.25;  // Of the range: a longer one may end beyond a source.
   const double range_m = p_tracked_m.norm();
@@ -43,7 +43,7 @@ Eigen::Vector3d DisturbedField::truePosition_m(const Eigen::Vector3d& p_tracked_
   Eigen::Vector3d miss_m = p_tracked_m - trackedPosition_m(p_m);
   Eigen::Vector3d best_m = p_m;
   double least_m = miss_m.norm();
-  for (int i = 0; i < kMostSteps && least_m > kNear * range_m; ++i) {
+  for (int i = 0; i < kMostQuasiNewtonSteps && least_m > kNear * range_m; ++i) {
     Eigen::Vector3d step_m = true_by_tracked * miss_m;
     const double length_m = step_m.norm();
     if (!(length_m > 0.0) || !std::isfinite(length_m)) break;
