@@ -50,7 +50,7 @@ TrackerSimulator::~TrackerSimulator() = default;
 
 Result<TrackerSimulator> TrackerSimulator::make(const Scene& scene, std::uint64_t seed) {
   FT_TRY(TrackerPhysics physics, TrackerPhysics::make(scene, seed));
-  return TrackerSimulator(std::unique_ptr<State>(new State{std::move(physics), seed, {}}));
+  return TrackerSimulator(std::make_unique<State>(State{std::move(physics), seed, {}}));
 }
 
 Sample TrackerSimulator::measure(const Pose& reference_from_sensor, double time_s, int sensor) {

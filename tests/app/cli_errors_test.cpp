@@ -55,7 +55,7 @@ class CliErrorsTest : public QObject {
     QTest::addColumn<QString>("arguments");  // separated by blanks; @ stands for the folder
     QTest::addColumn<int>("status");
     QTest::addColumn<QList<QByteArray>>("fragments");
-    const auto row = [](const char* name, const char* arguments, int status, QList<QByteArray> fragments) {
+    const auto row = [](const char* name, const char* arguments, int status, const QList<QByteArray>& fragments) {
       QTest::newRow(name) << arguments << status << fragments;
     };
     row("no command", "", 2, {"subcommand"});

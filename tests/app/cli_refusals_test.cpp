@@ -56,7 +56,7 @@ class CliRefusalsTest : public QObject {
   void isToldInOneLine_data() {
     QTest::addColumn<QString>("arguments");  // separated by blanks; @ stands for the folder
     QTest::addColumn<QList<QByteArray>>("fragments");
-    const auto row = [](const char* name, const char* arguments, QList<QByteArray> fragments) {
+    const auto row = [](const char* name, const char* arguments, const QList<QByteArray>& fragments) {
       QTest::newRow(name) << arguments << fragments;
     };
     for (const char* deep : {"huge", "cut", "over"}) {
@@ -124,7 +124,7 @@ class CliRefusalsTest : public QObject {
   void goesOnWhereAsked_data() {
     QTest::addColumn<QString>("arguments");
     QTest::addColumn<QList<QByteArray>>("remarks");
-    const auto row = [](const char* name, const char* arguments, QList<QByteArray> remarks) {
+    const auto row = [](const char* name, const char* arguments, const QList<QByteArray>& remarks) {
       QTest::newRow(name) << arguments << remarks;
     };
     const QList<QByteArray> forced{"true-mm.nodes.csv", "1000", "all the same"};

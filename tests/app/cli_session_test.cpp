@@ -25,7 +25,7 @@ bool damageIndex(QByteArray& file) {
     constexpr unsigned char kIndexLeaf = 0x0a;
     const int n_cells = two(page + 3);
     if (byte(page) != kIndexLeaf || n_cells < 8) continue;
-    const qsizetype cell = page + two(page + 8 + 2 * (n_cells / 2));
+    const qsizetype cell = page + two(page + 8 + qsizetype{2} * (n_cells / 2));
     // Place, id and row id, of one byte each.
     if (byte(cell + 1) != 4 || byte(cell + 2) != 1 || byte(cell + 3) != 1 || byte(cell + 4) != 1) continue;
     file[cell + 7] = 0x7f;

@@ -96,7 +96,7 @@ void DeviceRegistryTest::goodTexts() {
 void DeviceRegistryTest::badTexts_data() {
   QTest::addColumn<QByteArray>("text");
   QTest::addColumn<QList<QByteArray>>("fragments");
-  const auto row = [](const char* text, QList<QByteArray> fragments) {
+  const auto row = [](const char* text, const QList<QByteArray>& fragments) {
     QTest::newRow(text) << QByteArray(text) << fragments;
   };
   row("", {"simulated"});

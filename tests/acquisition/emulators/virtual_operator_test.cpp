@@ -56,7 +56,8 @@ void VirtualOperatorTest::tremblesOnTheWay() {
   auto person = exact(1.0);
   person.guideTo(kPlace, 0.0);
   double early_m = 0.0, late_m = 0.0;
-  for (double t = 1.0; t < 1.2; t += 0.005) {
+  for (int step = 0; step < 40; ++step) {
+    const double t = 1.0 + 0.005 * step;
     early_m = std::max(early_m, (person.poseAt(t).position_m - kPlace.position_m).norm());
     late_m = std::max(late_m, (person.poseAt(t + 0.6).position_m - kPlace.position_m).norm());
   }
@@ -107,7 +108,7 @@ void VirtualOperatorTest::placesWithTheRigsTolerance() {
 void VirtualOperatorTest::repeatedCallsOnTheWayChangeNothing() {
   auto once = exact(1.0), often = exact(1.0);
   once.guideTo(kPlace, 1.0);
-  for (double t = 1.0; t < 1.9; t += 0.1) often.guideTo(kPlace, t);
+  for (int tenth = 10; tenth < 19; ++tenth) often.guideTo(kPlace, 0.1 * tenth);
   FT_VERIFY_MATCH(sameBits(once.poseAt(1.7), often.poseAt(1.7)));
 }
 

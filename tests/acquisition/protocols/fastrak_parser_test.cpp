@@ -12,7 +12,7 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-FastrakStreamSettings settingsOf(FastrakFormat format, std::vector<int> items, int stations = 1) {
+FastrakStreamSettings settingsOf(FastrakFormat format, const std::vector<int>& items, int stations = 1) {
   FastrakStreamSettings settings;
   settings.format = format;
   for (int i = 0; i < stations; ++i) settings.items[static_cast<std::size_t>(i)] = items;

@@ -96,7 +96,7 @@ void FastrakRecordsTest::poseInEveryForm_data() {
   QTest::addColumn<bool>("binary");
   QTest::addColumn<bool>("centimetres");
   QTest::addColumn<double>("rotation_tolerance_rad");
-  const auto row = [](const char* name, std::string_view text, std::vector<int> items, bool binary, bool cm,
+  const auto row = [](const char* name, std::string_view text, const std::vector<int>& items, bool binary, bool cm,
                       double tolerance) {
     QTest::newRow(name) << QByteArray::fromStdString(bytes(text)) << items << binary << cm << tolerance;
   };
@@ -208,7 +208,7 @@ void FastrakRecordsTest::missingReadings_data() {
   QTest::addColumn<std::vector<int>>("items");
   QTest::addColumn<bool>("binary");
   QTest::addColumn<QByteArray>("status");
-  const auto row = [](const char* name, std::string_view text, std::vector<int> items, bool binary,
+  const auto row = [](const char* name, std::string_view text, const std::vector<int>& items, bool binary,
                       const char* status) {
     QTest::newRow(name) << QByteArray::fromStdString(bytes(text)) << items << binary << QByteArray(status);
   };

@@ -107,7 +107,7 @@ class OrientationDependenceTest : public QObject {
     QTest::addColumn<Room>("room");
     QTest::addColumn<QByteArray>("answer");
     QTest::addColumn<bool>("by_neighbours");
-    const auto add = [](const char* name, int places, std::vector<Eigen::Quaterniond> turned, ErrorLaw law,
+    const auto add = [](const char* name, int places, const std::vector<Eigen::Quaterniond>& turned, ErrorLaw law,
                         const char* answer, bool by_neighbours) {
       QTest::newRow(name) << Room{places, std::move(turned), std::move(law)} << QByteArray(answer) << by_neighbours;
     };

@@ -116,7 +116,7 @@ void SceneTest::refusesWithOneSentence_data() {
   QTest::addColumn<QList<QByteArray>>("fragments");
   const int bad = static_cast<int>(ErrorCode::kBadInput);
   const int newer = static_cast<int>(ErrorCode::kNewerVersion);
-  const auto row = [](const char* name, const char* json, int code, QList<QByteArray> fragments) {
+  const auto row = [](const char* name, const char* json, int code, const QList<QByteArray>& fragments) {
     QTest::newRow(name) << QByteArray(json) << code << fragments;
   };
   row("unknown key", R"({"trakcer": {}})", bad, {"lab: trakcer is not known", "did you mean tracker?"});

@@ -118,7 +118,7 @@ MarkLayer::MarkLayer(vtkRenderer* renderer, Symbol symbol)
   if (isFilled(symbol)) edge_ = makeGlyphs(renderer, shapeOf(symbol));
 }
 
-MarkLayer::Glyphs MarkLayer::makeGlyphs(vtkRenderer* renderer, vtkSmartPointer<vtkPolyData> unit_shape) {
+MarkLayer::Glyphs MarkLayer::makeGlyphs(vtkRenderer* renderer, vtkPolyData* unit_shape) {
   Glyphs glyphs;
   glyphs.unit_shape = unit_shape;
   glyphs.placed_shape = vtkSmartPointer<vtkPolyData>::New();

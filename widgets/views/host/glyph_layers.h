@@ -37,7 +37,7 @@ class MarkLayer {
     vtkSmartPointer<vtkGlyph3DMapper> mapper;
     vtkSmartPointer<vtkActor> actor;
   };
-  Glyphs makeGlyphs(vtkRenderer* renderer, vtkSmartPointer<vtkPolyData> unit_shape);
+  Glyphs makeGlyphs(vtkRenderer* renderer, vtkPolyData* unit_shape);
 
   vtkSmartPointer<vtkPolyData> points_;
   Glyphs fill_, edge_;
