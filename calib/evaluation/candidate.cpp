@@ -3,12 +3,11 @@
 #include <algorithm>
 
 #include "calib/calibration/alignment.h"
+#include "calib/core/units.h"
 #include "calib/correctors/base/method.h"
 
 namespace fieldtrue::evaluation {
 namespace {
-
-constexpr double kDegreesPerRadian = 57.29577951308232;
 
 RowScore positionScore(const Eigen::Vector3d& p_corrected_m, const Node& node,
                        const calibration::Alignment& alignment) {
@@ -23,7 +22,7 @@ RowScore orientationScore(const Eigen::Quaterniond& q_corrected, const Node& nod
   const Eigen::Quaterniond reference_from_mount =
       alignment.reference_from_tracker.orientation * q_corrected * alignment.sensor_from_mount;
   RowScore score;
-  score.error = kDegreesPerRadian * angleBetween_rad(reference_from_mount, node.reference_from_sensor.orientation);
+  score.error = kDegPerRad * angleBetween_rad(reference_from_mount, node.reference_from_sensor.orientation);
   return score;
 }
 

@@ -82,10 +82,11 @@ void BlindControlsTest::placesAreShuffledWhole() {
   QCOMPARE(after.rows[2][4], after.rows[3][4]);
   std::multiset<std::string> places_before;
   std::multiset<std::string> places_after;
-  for (std::size_t row : {0, 1, 2, 4}) {
+  for (const std::size_t row : {0U, 1U, 2U, 4U}) {
     places_before.insert(before.rows[row][4]);
     places_after.insert(after.rows[row][4]);
-    for (std::size_t column : {0, 7, 8, 9, 10, 13}) QCOMPARE(after.rows[row][column], before.rows[row][column]);
+    for (const std::size_t column : {0U, 7U, 8U, 9U, 10U, 13U})
+      QCOMPARE(after.rows[row][column], before.rows[row][column]);
   }
   QCOMPARE(places_after, places_before);
 }

@@ -93,10 +93,9 @@ void BlindRecordingTest::seatingHasTheTailsItSays() {
 }
 
 void BlindRecordingTest::driftWarmsUpAndWanders() {
-  const Kind* drift = nullptr;
-  for (const Kind& kind : catalogueKinds())
-    if (kind.id == "gain_drift") drift = &kind;
-  QVERIFY(drift != nullptr);
+  const std::vector<Kind>& kinds = catalogueKinds();
+  const auto drift = std::find_if(kinds.begin(), kinds.end(), [](const Kind& kind) { return kind.id == "gain_drift"; });
+  QVERIFY(drift != kinds.end());
   Random random(9);
   const Setup setup = drawSetup(random);
   double sum_half = 0, sum_end = 0, sum_rough = 0;

@@ -52,10 +52,11 @@ std::string faultOf(const json& report) {
     if (!(share >= 0 && share <= 1)) return "probability of " + id;
     probability += share;
     for (const auto& [name, parameter] : candidate["parameters"].items()) {
-      if (!parameter.contains("low90") || !parameter.contains("high90")) return id + "." + name + " has no interval";
+      if (!parameter.contains("low90") || !parameter.contains("high90"))
+        return std::string(id).append(".").append(name).append(" has no interval");
       if (parameter["low90"].is_number() && parameter["high90"].is_number() &&
           parameter["low90"].get<double>() > parameter["high90"].get<double>())
-        return "interval of " + id + "." + name;
+        return std::string("interval of ").append(id).append(".").append(name);
     }
   }
   if (named.count("none") == 0) return "none is no candidate";

@@ -73,7 +73,7 @@ void addShare(World& world, const std::shared_ptr<Scatterer>& metal, double shar
   world.metal.emplace_back(share, *metal);
 }
 
-Drawn shareOf(std::string id, std::string kind, std::shared_ptr<Scatterer> metal, json fixed) {
+Drawn shareOf(std::string id, std::string kind, const std::shared_ptr<Scatterer>& metal, json fixed) {
   Drawn drawn{std::move(id), std::move(kind), 0.15, 1.0, nullptr, nullptr};
   drawn.apply = [metal](World& world, double share) { addShare(world, metal, share); };
   drawn.describe = [fixed = std::move(fixed)](double share, json& effect) {

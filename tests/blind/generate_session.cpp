@@ -50,7 +50,7 @@ const Kind& pick(const std::vector<Kind>& kinds, const Setup& setup, Random& ran
   double total = 0;
   for (const Kind& kind : kinds) total += kind.fits(setup) ? kind.weight : 0;
   double at = uniform(random, 0, total);
-  const Kind* last = nullptr;
+  const Kind* last = &kinds.front();
   for (const Kind& kind : kinds) {
     if (!kind.fits(setup)) continue;
     last = &kind;

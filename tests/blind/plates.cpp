@@ -48,7 +48,8 @@ Scatterer MeshedSheet::solve(const Vector3d& center_m, const Quaterniond& attitu
   Eigen::MatrixXcd driven(count, 3);
   Scatterer scatterer;
   for (int a = 0; a < count; ++a) {
-    const double x = (a / cells_y_ - 0.5 * (cells_x_ - 1)), y = (a % cells_y_ - 0.5 * (cells_y_ - 1));
+    const int column = a / cells_y_, row = a % cells_y_;
+    const double x = column - 0.5 * (cells_x_ - 1), y = row - 0.5 * (cells_y_ - 1);
     const Vector3d at_m = center_m + 2 * x * half_x + 2 * y * half_y;
     scatterer.at_m.push_back(at_m);
     driven.row(a) =
@@ -68,9 +69,11 @@ Scatterer solvePermeableSheet(int cells_x, int cells_y, double cell_m, double th
   Eigen::Matrix<double, 3, 2> along;
   along << u, v;
   Scatterer scatterer;
-  for (int a = 0; a < count; ++a)
-    scatterer.at_m.push_back(
-        center_m + cell_m * ((a / cells_y - 0.5 * (cells_x - 1)) * u + (a % cells_y - 0.5 * (cells_y - 1)) * v));
+  for (int a = 0; a < count; ++a) {
+    const int column = a / cells_y, row = a % cells_y;
+    scatterer.at_m.push_back(center_m +
+                             cell_m * ((column - 0.5 * (cells_x - 1)) * u + (row - 0.5 * (cells_y - 1)) * v));
+  }
   // A cell of a flat sheet: susceptibility times volume over 4 pi, less the field of its own square,
   // 9.0336 / cell^3 / 2 being the planar lattice sum of the in-plane dipole field.
   const double volume_m3 = cell_m * cell_m * thickness_m;
