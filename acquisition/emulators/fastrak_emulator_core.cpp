@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "calib/core/units.h"
+
 namespace fieldtrue::acquisition {
 namespace {
 
@@ -112,7 +114,6 @@ Pose FastrakEmulatorCore::reported(int station, const Pose& tracker_from_sensor)
 char FastrakEmulatorCore::errorOf(const Sample& sample, int station, const Pose& pose) const {
   if (!sample.status.empty()) return sample.status.size() == 1 ? sample.status[0] : 'k';
   if (source_->recorded()) return ' ';
-  constexpr double kDegPerRad = 57.295779513082320877;
   if (!within(pose.position_m / metresPer(setup_.unit), numbers('V', station))) return 'x';
   return within(eulerFromRotation_rad(pose.orientation) * kDegPerRad, numbers('Q', station)) ? ' ' : 'y';
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/core/units.h"
+
 namespace fieldtrue::acquisition {
 namespace {
 
@@ -125,7 +127,6 @@ Result<FastrakLayout> fastrakLayout(std::span<const int> items, FastrakFormat fo
 }
 
 FastrakRecord recordOfPose(int station, char error, const Pose& tracker_from_sensor, bool stylus_pressed) {
-  constexpr double kDegPerRad = 57.295779513082320877;
   FastrakRecord record;
   record.station = station;
   record.error = error;

@@ -6,6 +6,7 @@
 
 #include "acquisition/sampling/shift_test.h"
 #include "acquisition/sampling/stillness.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::acquisition {
 
@@ -15,7 +16,6 @@ constexpr double kSuspiciousRejectedShare = 0.1;
 constexpr double kSuspiciousSpreadRatio = 3.0;
 constexpr std::size_t kMinNeighbours = 3;
 constexpr double kMinSpread_m = 1e-4;  ///< An SD below this is never suspicious.
-constexpr double kRadToDeg = 57.29577951308232;
 
 std::string format(const char* pattern, double value) {
   char text[96];
@@ -92,7 +92,7 @@ std::optional<std::string> NodeSampler::motion() const {
   const Shift shift = largestShift(positions_m, options_.block, options_.still_floor_m, options_.still_sigmas);
   if (shift.moved()) return "moved " + millimetres(shift.size);
   const Shift turn = largestShift(turns_rad, options_.block, options_.still_floor_rad, options_.still_sigmas);
-  if (turn.moved()) return "turned " + format("%.1f degrees", turn.size * kRadToDeg);
+  if (turn.moved()) return "turned " + format("%.1f degrees", turn.size * kDegPerRad);
   return std::nullopt;
 }
 

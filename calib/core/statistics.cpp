@@ -23,7 +23,6 @@ constexpr double kFinestRotation_rad = 1e-6;
 /// Readings printed with two decimals of a degree differ by this much without any outlier.
 constexpr double kSmallestRotationSd_rad = 2e-4;
 constexpr double kMissingMark = 1e20;
-constexpr double kRadToDeg = 57.29577951308232;
 
 bool hasFinitePose(const Sample& sample) {
   const Pose& pose = sample.tracker_from_sensor;
@@ -110,7 +109,7 @@ void rejectOutliers(std::span<const Sample> samples, double quantum_m, double th
           {i, RejectionReason::kPositionOutlier, phrase(distances_m[k] * 1e3, limit_m * 1e3, "mm")});
     } else if (angles_rad[k] > limit_rad) {
       screened.rejections.push_back(
-          {i, RejectionReason::kRotationOutlier, phrase(angles_rad[k] * kRadToDeg, limit_rad * kRadToDeg, "deg")});
+          {i, RejectionReason::kRotationOutlier, phrase(angles_rad[k] * kDegPerRad, limit_rad * kDegPerRad, "deg")});
     } else {
       left.push_back(i);
     }

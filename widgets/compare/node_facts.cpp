@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "calib/core/statistics.h"
+#include "calib/core/units.h"
 #include "widgets/style/unit_texts.h"
 
 namespace fieldtrue::widgets {
 namespace {
-
-constexpr double kDeg = 57.29577951308232;
 
 QString roleText(NodeRole role) {
   switch (role) {
@@ -25,7 +24,7 @@ QString roleText(NodeRole role) {
 
 /// Azimuth, elevation and roll as the trackers name them.
 QString turnText(const Eigen::Quaterniond& orientation) {
-  const Eigen::Vector3d angles_deg = kDeg * eulerFromRotation_rad(orientation);
+  const Eigen::Vector3d angles_deg = kDegPerRad * eulerFromRotation_rad(orientation);
   return QObject::tr("azimuth %1\u00b0   elevation %2\u00b0   roll %3\u00b0")
       .arg(angles_deg.x(), 0, 'f', 1)
       .arg(angles_deg.y(), 0, 'f', 1)
@@ -124,7 +123,7 @@ std::vector<Fact> nodeFacts(const Node& node, const SampleTable& samples) {
                                   .arg(threeFigures(node.n_effective)));
   add(QObject::tr("SD"), scatterText(node));
   if (node.sd_rot_rad)
-    add(QObject::tr("SD of turn"), QObject::tr("%1\u00b0 a sample").arg(threeFigures(*node.sd_rot_rad * kDeg)));
+    add(QObject::tr("SD of turn"), QObject::tr("%1\u00b0 a sample").arg(threeFigures(*node.sd_rot_rad * kDegPerRad)));
   const auto drift = takeDrift(samples, node.node, node.visit, node.sensor, node.n_effective);
   add(QObject::tr("Drift"), drift ? driftText(*drift) : QObject::tr("the samples are not at hand"));
   return facts;

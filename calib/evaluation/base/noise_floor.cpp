@@ -3,6 +3,8 @@
 #include <cmath>
 #include <map>
 
+#include "calib/core/units.h"
+
 namespace fieldtrue::evaluation {
 namespace {
 
@@ -39,10 +41,9 @@ NoiseFloor noiseFloor(std::span<const Node> nodes, const TableMetadata& metadata
     position_m2.add(node.node, sample_m2 + 3.0 * tolerance_m * tolerance_m);
     if (node.has_orientation) orientation_rad2.add(node.node, sample_rad2 + 3.0 * tolerance_rad * tolerance_rad);
   }
-  constexpr double kDegreesPerRadian = 57.29577951308232;
   NoiseFloor floor;
   floor.position_mm = 1000.0 * std::sqrt(position_m2.value());
-  floor.orientation_deg = kDegreesPerRadian * std::sqrt(orientation_rad2.value());
+  floor.orientation_deg = kDegPerRad * std::sqrt(orientation_rad2.value());
   const bool from_jig = metadata.jig_tolerance_m || metadata.jig_tolerance_rad;
   floor.from = from_samples && from_jig ? "samples and jig tolerance"
                : from_samples           ? "samples"
