@@ -27,7 +27,7 @@ QStringList withXmlLog(const QStringList& given, const QString& xml_path) {
     if (k > 0 && formats.contains(given[k])) {
       format = given[k].mid(1);
     } else if (k > 0 && given[k] == "-o" && k + 1 < given.size()) {
-      const QString target = given[++k];
+      const QString& target = given[++k];
       if (target.contains(',')) {
         named_format = true;
         kept << "-o" << target;

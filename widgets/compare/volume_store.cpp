@@ -30,7 +30,7 @@ const VolumeField* VolumeStore::get(const VolumeKey& key) {
 
 VolumeStore::Sampling VolumeStore::samplingOf(const VolumeKey& key, QString* why) {
   if (key.quantity == VolumeQuantity::kExpectedError && !key.difference)
-    return [this, errors_mm = heldOutErrors_mm(*comparison_, key.a), comparison = *comparison_, table = table_,
+    return [errors_mm = heldOutErrors_mm(*comparison_, key.a), comparison = *comparison_, table = table_,
             lattice = lattice_](const RunControl& control) {
       return heldOutVolume(comparison, table, errors_mm, lattice, control);
     };

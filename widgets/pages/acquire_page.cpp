@@ -153,7 +153,7 @@ QWidget* AcquirePage::makeBanner() {
 }
 
 QPushButton* AcquirePage::addAction(const QString& name, const QString& label, const QString& icon_name,
-                                    const QString& keys, std::function<void()> action) {
+                                    const QString& keys, const std::function<void()>& action) {
   auto* button = new QPushButton(icon(icon_name), label, this);
   button->setObjectName(name);
   button->setFocusPolicy(Qt::TabFocus);
@@ -163,7 +163,7 @@ QPushButton* AcquirePage::addAction(const QString& name, const QString& label, c
   return button;
 }
 
-void AcquirePage::addShortcut(const QKeySequence& keys, std::function<void()> action) {
+void AcquirePage::addShortcut(const QKeySequence& keys, const std::function<void()>& action) {
   auto* shortcut = new QShortcut(keys, this);
   shortcut->setContext(Qt::WindowShortcut);
   shortcut->setAutoRepeat(false);

@@ -33,8 +33,8 @@ class AcquirePage : public QWidget {
   QWidget* makeInspector();
   QWidget* makeEmpty();
   QPushButton* addAction(const QString& name, const QString& label, const QString& icon_name, const QString& keys,
-                         std::function<void()> action);
-  void addShortcut(const QKeySequence& keys, std::function<void()> action);
+                         const std::function<void()>& action);
+  void addShortcut(const QKeySequence& keys, const std::function<void()>& action);
   void onSession();
   void onStatus(const acquisition::AcquisitionStatus& status);
   void showPlace(const acquisition::AcquisitionStatus& status);

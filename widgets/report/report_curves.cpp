@@ -102,9 +102,10 @@ void drawCurve(HtmlWriter& html, const Axes& axes, const evaluation::LearningCur
   std::string middle;
   for (const evaluation::LearningPoint& point : curve.points) {
     const std::string x = px(axes.x(point.n_places));
-    upper += x + "," + px(axes.y(point.high)) + " ";
-    lower = x + "," + px(axes.y(point.low)) + " " + lower;
-    middle += x + "," + px(axes.y(point.rms)) + " ";
+    const auto at = [&](double rms) { return std::string(x).append(",").append(px(axes.y(rms))).append(" "); };
+    upper += at(point.high);
+    lower.insert(0, at(point.low));
+    middle += at(point.rms);
   }
   html.element("polygon", "", {{"points", upper + lower}, {"fill", color}, {"fill-opacity", "0.12"}});
   html.element("polyline", "", {{"points", middle}, {"fill", "none"}, {"stroke", color}, {"stroke-width", "2"}});

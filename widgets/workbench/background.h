@@ -69,7 +69,7 @@ class BackgroundJobs {
   /// @param done takes the work's Result, or Result of its value, on the owner's thread
   /// @param progress takes the fraction done, on the owner's thread
   template <class Work, class Done>
-  void run(Work work, Done done, std::function<void(double)> progress = {}) {
+  void run(Work work, Done done, const std::function<void(double)>& progress = {}) {
     RunControl control;
     control.parallel_for = threadedFor(0);
     control.stop = stop_.get_token();

@@ -471,7 +471,7 @@ void Workbench::setGapReport(std::optional<gap::GapReport> report) {
   emit gapReportChanged();
 }
 
-void Workbench::showMessage(Message message) { emit messageShown(message); }
+void Workbench::showMessage(const Message& message) { emit messageShown(message); }
 
 QString Workbench::sessionFolder() {
   const QString folder =

@@ -108,7 +108,7 @@ class Workbench : public QObject {
 
   /// @param page its id, "acquire"; kept in the session so that it opens where it was
   void goToPage(const QString& page);
-  void showMessage(Message message);
+  void showMessage(const Message& message);
   /// What was said of a condition, or of one within it, is no longer so.
   void endCondition(const QString& condition) { emit conditionEnded(condition); }
 

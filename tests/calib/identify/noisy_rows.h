@@ -40,7 +40,8 @@ inline std::vector<Node> noisyNodes(const NoisyRows& options, unsigned seed) {
       node.node = place;
       node.visit = turn;
       node.reference_from_sensor.position_m =
-          Eigen::Vector3d(0.6, -0.3, -0.3) + kCubePitch_m * Eigen::Vector3d(place / (n * n), place / n % n, place % n);
+          Eigen::Vector3d(0.6, -0.3, -0.3) +
+          kCubePitch_m * Eigen::Vector3i(place / (n * n), place / n % n, place % n).cast<double>();
       node.reference_from_sensor.orientation = turns[static_cast<std::size_t>(turn)];
       node.tracker_from_sensor = node.reference_from_sensor;
       if (options.change) {

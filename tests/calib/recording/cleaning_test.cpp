@@ -142,7 +142,7 @@ class CleaningTest : public QObject {
     SyntheticOptions options = grid({n, n, n}, around);
     options.smooth_distortion_m = distortion_m;
     const CalibrationTable good = syntheticTable(options, noise());
-    for (const std::uint64_t seed : {1, 2, 3}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
       CalibrationTable table = good;
       const std::vector<std::size_t> rows = chosenRows(table.nodes.size(), fraction, seed);
       QVERIFY(!rows.empty());

@@ -125,7 +125,7 @@ class PictureRequestTest : public QObject {
   void aPictureOfNoKnownKindIsRefused() {
     QByteArray bytes = toBytes(std::vector{histogramRequest()});
     const qsizetype kind_at =
-        bytes.indexOf("fieldtrue pictures") + std::string("fieldtrue pictures " FIELDTRUE_VERSION).size() + 4;
+        bytes.indexOf("fieldtrue pictures") + QByteArray("fieldtrue pictures " FIELDTRUE_VERSION).size() + 4;
     QCOMPARE(bytes.mid(kind_at, 4), QByteArray("\0\0\0\1", 4));
     bytes[kind_at + 3] = 3;
     QVERIFY(!requestsFromBytes(bytes));

@@ -38,6 +38,8 @@
 #include "widgets/views/field/scale_strip.h"
 
 namespace fieldtrue::widgets {
+using testing::kWaitMs;
+
 namespace {
 
 constexpr int kPlaces = 5 * 5 * 4;

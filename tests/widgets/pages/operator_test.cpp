@@ -27,6 +27,8 @@
 #include "widgets/views/room/room_view.h"
 
 namespace fieldtrue::widgets {
+using testing::kWaitMs;
+
 namespace {
 
 const Eigen::Vector3d kWrong_m{0.0, 0.36, 0.48};  ///< 0.6 m long.

@@ -107,7 +107,7 @@ class PageModelsTest : public QObject {
     ErrorField before;
     for (int i = 0; i < 20; ++i) {
       FieldArrow arrow;
-      arrow.from_m = Eigen::Vector3d(0.1 * (i % 5), 0.1 * (i / 5), 0.0);
+      arrow.from_m = 0.1 * Eigen::Vector3i(i % 5, i / 5, 0).cast<double>();
       arrow.error_m = Eigen::Vector3d(0.0, 0.0, 0.0041);
       before.arrows.push_back(arrow);
     }

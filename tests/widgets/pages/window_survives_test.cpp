@@ -150,7 +150,7 @@ class WindowSurvivesTest : public QObject {
     int runs = 0;
     GapPage page(window->workbench(), [&runs](auto&&...) -> Result<gap::GapReport> {
       if (++runs == 1) throw std::bad_alloc();
-      FT_CHECK(!"reached");
+      FT_CHECK(false);
       return fail(ErrorCode::kCancelled, "");
     });
     testing::SyntheticOptions options;

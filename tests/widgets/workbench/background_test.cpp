@@ -46,7 +46,7 @@ class BackgroundTest : public QObject {
         &receiver,
         [memory]() -> Result<int> {
           if (memory) throw std::bad_alloc();
-          FT_CHECK(!"reached");
+          FT_CHECK(false);
           return 1;
         },
         [&](Result<int> result) { got = std::move(result); });
@@ -167,7 +167,7 @@ class BackgroundTest : public QObject {
     QPushButton button;
     int clicks = 0;
     connect(&button, &QPushButton::clicked, this, [&] {
-      if (++clicks == 1) FT_CHECK(!"reached");
+      if (++clicks == 1) FT_CHECK(false);
     });
     button.show();
     QTest::mouseClick(&button, Qt::LeftButton);

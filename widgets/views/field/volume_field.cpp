@@ -81,8 +81,8 @@ std::size_t VolumeField::size() const {
 
 Eigen::Vector3d VolumeField::point_m(std::size_t index) const {
   const auto nx = static_cast<std::size_t>(count[0]), ny = static_cast<std::size_t>(count[1]);
-  const Eigen::Vector3d steps(static_cast<double>(index % nx), static_cast<double>(index / nx % ny),
-                              static_cast<double>(index / (nx * ny)));
+  const std::size_t layer = index / (nx * ny), row = index / nx % ny;
+  const Eigen::Vector3d steps(static_cast<double>(index % nx), static_cast<double>(row), static_cast<double>(layer));
   return low_m + steps.cwiseProduct(step_m);
 }
 

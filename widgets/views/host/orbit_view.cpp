@@ -75,9 +75,9 @@ void OrbitView::linkCamera(OrbitView* other) {
   other->requestRender();
 }
 
-void OrbitView::observeCamera(vtkSmartPointer<vtkCamera> camera) {
+void OrbitView::observeCamera(const vtkSmartPointer<vtkCamera>& camera) {
   if (camera_observer_ != 0) camera_->RemoveObserver(camera_observer_);
-  camera_ = std::move(camera);
+  camera_ = camera;
   renderer()->SetActiveCamera(camera_);
   camera_observer_ = camera_->AddObserver(vtkCommand::ModifiedEvent, this, &OrbitView::cameraModified);
 }

@@ -56,7 +56,7 @@ class OrbitView : public VtkHost {
 
  private:
   std::optional<int> pointAt(const QPointF& position) const;
-  void observeCamera(vtkSmartPointer<vtkCamera> camera);
+  void observeCamera(const vtkSmartPointer<vtkCamera>& camera);
   void cameraModified();
   ViewFrame frame() const;
   void fitPreset();

@@ -89,7 +89,7 @@ class Pencil {
     painter_->DrawRect(device(x), device(y), device(width), device(height));
   }
 
-  void polygon(std::vector<Eigen::Vector2d> corners) const {
+  void polygon(const std::vector<Eigen::Vector2d>& corners) const {
     std::vector<float> xy;
     for (const Eigen::Vector2d& corner : corners) {
       xy.push_back(device(corner.x()));

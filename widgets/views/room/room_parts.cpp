@@ -126,7 +126,7 @@ void JigPart::build(const std::optional<Pose>& reference_from_sensor, const Scen
     mesh.setColor(theme.dark ? QColor(0xc3, 0xcd, 0xd6) : QColor(0xb4, 0xbe, 0xc8));
     mesh.addCylinder(base.position_m, place, 0.035 * pitch);
     mesh.setColor(theme.accent);
-    Pose head = *reference_from_sensor;
+    const Pose& head = *reference_from_sensor;
     mesh.addBox(head, Eigen::Vector3d(0.07, 0.05, 0.04) * pitch);
   }
   setShape(actor_, mesh.polyData());
