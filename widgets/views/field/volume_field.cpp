@@ -105,14 +105,15 @@ double VolumeField::valueAt(const Eigen::Vector3d& at_m) const {
   double value = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     double weight = 1.0;
-    std::array<int, 3> at{};
+    std::array<std::size_t, 3> at{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const bool upper = (corner >> axis & 1) != 0;
       weight *= upper ? share[axis] : 1.0 - share[axis];
-      at[axis] = cell[axis] + (upper ? 1 : 0);
+      at[axis] = static_cast<std::size_t>(cell[axis]) + (upper ? 1U : 0U);
     }
     if (weight <= 0.0) continue;
-    value += weight * values_mm[static_cast<std::size_t>((at[2] * count[1] + at[1]) * count[0] + at[0])];
+    const auto nx = static_cast<std::size_t>(count[0]), ny = static_cast<std::size_t>(count[1]);
+    value += weight * values_mm[(at[2] * ny + at[1]) * nx + at[0]];
   }
   return value;
 }
