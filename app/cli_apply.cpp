@@ -14,6 +14,7 @@
 #include "calib/calibration/corrector.h"
 #include "calib/core/file_io.h"
 #include "calib/core/trimmed.h"
+#include "calib/core/units.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/tables/line_reader.h"
 
@@ -22,9 +23,9 @@ namespace fieldtrue::cli {
 namespace {
 
 constexpr std::size_t kBatch = 4096;
-constexpr std::array<const char*, 9> kAppended = {"x_corrected_m", "y_corrected_m", "z_corrected_m",
-                                                  "qw_corrected",  "qx_corrected",  "qy_corrected",
-                                                  "qz_corrected",  "uncertainty_m", "covered"};
+constexpr std::array<const char*, 10> kAppended = {
+    "x_corrected_m", "y_corrected_m", "z_corrected_m", "qw_corrected", "qx_corrected",
+    "qy_corrected",  "qz_corrected",  "uncertainty_m", "covered",      "nearest_orientation_deg"};
 
 /// The fields of one line; commas inside double quotes do not separate.
 std::vector<std::string_view> splitFields(std::string_view line) {
@@ -59,7 +60,10 @@ struct PendingRow {
 class TableCorrector {
  public:
   TableCorrector(const calibration::Corrector& corrector, std::istream& in, std::string name)
-      : corrector_(corrector), lines_(in, std::move(name)), units_(corrector.region(), trackedPositions(corrector)) {}
+      : corrector_(corrector),
+        orientations_seen_(corrector.orientationsSeen()),
+        lines_(in, std::move(name)),
+        units_(corrector.region(), trackedPositions(corrector)) {}
 
   /// Copies the table with the corrected columns appended.
   Result<void> run(std::ostream& out) {
@@ -89,6 +93,8 @@ class TableCorrector {
   std::size_t n_rows() const { return n_rows_; }
   std::size_t n_outside() const { return n_outside_; }
   std::size_t n_lost() const { return n_lost_; }
+  /// The correction takes orientation and the table has none.
+  bool isPositionOnly() const { return corrector_.takesOrientation() && columns_ && !columns_->orientation; }
 
  private:
   static std::vector<Eigen::Vector3d> trackedPositions(const calibration::Corrector& corrector) {
@@ -203,12 +209,15 @@ class TableCorrector {
   void flush(std::ostream& out) {
     std::vector<Pose> corrected(poses_.size());
     corrector_.correct(poses_, corrected);
+    if (isPositionOnly())
+      for (std::size_t i = 0; i < poses_.size(); ++i)
+        corrected[i].position_m = corrector_.correctPosition_m(poses_[i].position_m);
     for (const PendingRow& row : rows_) {
       out << row.text;
       if (row.pose) {
-        writeCorrected(out, poses_[*row.pose].position_m, corrected[*row.pose]);
+        writeCorrected(out, poses_[*row.pose], corrected[*row.pose]);
       } else {
-        out << ",,,,,,,,,0";
+        out << ",,,,,,,,,0,";
         ++n_lost_;
       }
       out << '\n';
@@ -218,7 +227,7 @@ class TableCorrector {
     poses_.clear();
   }
 
-  void writeCorrected(std::ostream& out, const Eigen::Vector3d& p_tracked_m, const Pose& corrected) {
+  void writeCorrected(std::ostream& out, const Pose& tracked, const Pose& corrected) {
     for (const double value : corrected.position_m) out << ',' << formatNumber(value);
     if (columns_->orientation) {
       const Eigen::Quaterniond q = canonical(corrected.orientation);
@@ -227,13 +236,24 @@ class TableCorrector {
       out << ",,,,";
     }
     out << ',';
-    if (const auto uncertainty_m = corrector_.uncertainty_m(p_tracked_m)) out << formatNumber(*uncertainty_m);
-    const bool covered = corrector_.covers(p_tracked_m);
+    const auto uncertainty_m =
+        columns_->orientation ? corrector_.uncertaintyAt_m(tracked) : corrector_.uncertainty_m(tracked.position_m);
+    if (uncertainty_m) out << formatNumber(*uncertainty_m);
+    const bool covered = corrector_.covers(tracked.position_m);
     if (!covered) ++n_outside_;
-    out << ',' << (covered ? 1 : 0);
+    out << ',' << (covered ? 1 : 0) << ',';
+    if (columns_->orientation && !orientations_seen_.empty()) out << formatNumber(nearestOrientation_deg(tracked));
+  }
+
+  double nearestOrientation_deg(const Pose& tracked) const {
+    double nearest_rad = kPi;
+    for (const Eigen::Quaterniond& seen : orientations_seen_)
+      nearest_rad = std::min(nearest_rad, angleBetween_rad(seen, tracked.orientation));
+    return kDegPerRad * nearest_rad;
   }
 
   const calibration::Corrector& corrector_;
+  std::vector<Eigen::Quaterniond> orientations_seen_;
   LineReader lines_;
   recording::ReadingUnits units_;
   std::string line_;
@@ -281,6 +301,10 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
   answer.text = std::to_string(table.n_rows()) + " rows written to " + options.out + "; " +
                 std::to_string(table.n_outside()) + " outside the calibrated region (covered = 0), " +
                 std::to_string(table.n_lost()) + " without a pose\n";
+  if (table.isPositionOnly())
+    answer.remarks.push_back(options.in + " has no orientations (qw, qx, qy, qz), on which this correction depends: " +
+                             "positions are corrected as for the mean of the " +
+                             std::to_string(corrector->orientationsSeen().size()) + " orientations it was fitted on");
   if (const auto units = table.checkUnits(); !units)
     answer.remarks.push_back(options.in + ": " + units.error().message + "; used all the same");
   return answer;

@@ -110,13 +110,18 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
   corrector.report_ = reportOf(table_.nodes, corrector);
   corrector.report_.notes = report_.notes;
   corrector.report_.notes.push_back(corrector.position_->note());
+  if (position_->takesOrientation())
+    corrector.report_.notes.push_back("Baked as the mean over the " + std::to_string(orientationsSeen().size()) +
+                                      " orientations it was fitted on: a lattice takes no orientation.");
   return corrector;
 }
 
 Pose Corrector::correct(const Pose& tracker_from_sensor) const {
   const Eigen::Vector3d& p_tracked_m = tracker_from_sensor.position_m;
   Pose corrected;
-  corrected.position_m = correctPosition_m(p_tracked_m);
+  corrected.position_m = p_tracked_m;
+  if (position_->covers(p_tracked_m)) corrected.position_m += position_->displacementAt_m(tracker_from_sensor);
+  corrected.position_m = alignment_.reference_from_tracker * corrected.position_m;
   const Eigen::Quaterniond q_true = orientation_->covers(p_tracked_m)
                                         ? orientation_->correct(p_tracked_m, tracker_from_sensor.orientation)
                                         : tracker_from_sensor.orientation;
@@ -133,7 +138,12 @@ void Corrector::correct(std::span<const Pose> tracker_from_sensor, std::span<Pos
     covered.push_back(i);
     p_m.push_back(tracker_from_sensor[i].position_m);
   }
-  position_->correct(p_m, p_m);
+  if (position_->takesOrientation()) {
+    for (std::size_t i = 0; i < covered.size(); ++i)
+      p_m[i] += position_->displacementAt_m(tracker_from_sensor[covered[i]]);
+  } else {
+    position_->correct(p_m, p_m);
+  }
   std::size_t next = 0;
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
     const Pose& tracked = tracker_from_sensor[i];
@@ -156,6 +166,18 @@ Eigen::Vector3d Corrector::correctPosition_m(const Eigen::Vector3d& p_tracked_m)
 
 std::optional<double> Corrector::uncertainty_m(const Eigen::Vector3d& p_tracked_m) const {
   return position_->covers(p_tracked_m) ? position_->uncertainty_m(p_tracked_m) : std::nullopt;
+}
+
+std::vector<Eigen::Quaterniond> Corrector::orientationsSeen() const {
+  std::vector<Eigen::Quaterniond> orientations;
+  for (const Node& node : table_.nodes)
+    if (node.has_orientation) orientations.push_back(node.tracker_from_sensor.orientation);
+  return distinctRotations(orientations, correctors::kSameOrientation_rad);
+}
+
+std::optional<double> Corrector::uncertaintyAt_m(const Pose& tracker_from_sensor) const {
+  return position_->covers(tracker_from_sensor.position_m) ? position_->uncertaintyAt_m(tracker_from_sensor)
+                                                           : std::nullopt;
 }
 
 bool Corrector::covers(const Eigen::Vector3d& p_tracked_m) const {

@@ -53,8 +53,15 @@ class Corrector {
   /// reference_from_sensor of a tracked pose. Where a part does not cover the position, only the alignment is applied.
   Pose correct(const Pose& tracker_from_sensor) const;
   void correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor) const;
+  /// Where the position part takes orientation: the mean over the orientations that were fitted.
   Eigen::Vector3d correctPosition_m(const Eigen::Vector3d& p_tracked_m) const;
+  /// Whether the position part is a function of the tracked pose, not of position alone.
+  bool takesOrientation() const { return position_->takesOrientation(); }
+  /// The distinct orientations it was fitted on, tracker_from_sensor: none within 5 degrees of another.
+  std::vector<Eigen::Quaterniond> orientationsSeen() const;
 
+  /// SD of the corrected position [m]; at a pose, or for any of the orientations that were fitted.
+  std::optional<double> uncertaintyAt_m(const Pose& tracker_from_sensor) const;
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const;
   /// Inside the calibrated region, and covered by the method; otherwise the result is an extrapolation.
   bool covers(const Eigen::Vector3d& p_tracked_m) const;

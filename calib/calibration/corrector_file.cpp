@@ -18,7 +18,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view kSchemaName = "fieldtrue.ftcal/";
-/// Version 2 has `baked` in place of the position part's `parameters`. What is not baked is still written as version 1.
+/// Version 2 has `baked` in place of the position part's `parameters`, or a position part that takes the whole pose.
+/// What version 1 could hold is still written as version 1.
 constexpr int kSchemaVersion = 2;
 constexpr std::string_view kChecksumKind = "fnv1a64:";
 
@@ -93,8 +94,10 @@ void checkEnvelope(const JsonReader& content) {
 }  // namespace
 
 std::string Corrector::toText() const {
+  json orientations = json::array();
+  for (const Eigen::Quaterniond& q : orientationsSeen()) orientations.push_back(jsonOf(q));
   json content = {
-      {"schema", std::string(kSchemaName) + std::to_string(is_baked_ ? kSchemaVersion : 1)},
+      {"schema", std::string(kSchemaName) + std::to_string(is_baked_ || takesOrientation() ? kSchemaVersion : 1)},
       {"software", "Fieldtrue " FIELDTRUE_VERSION},
       {"direction", "tracker_from_sensor as tracked -> reference_from_sensor as corrected"},
       {"units", "m, rad; quaternions w x y z"},
@@ -110,6 +113,8 @@ std::string Corrector::toText() const {
        {{"method", choice_.orientation_id},
         {"settings", toJson(choice_.orientation_settings)},
         {"parameters", orientation_->parameters()}}},
+      {"inputs", takesOrientation() ? "pose" : "position"},
+      {"orientations_seen", std::move(orientations)},
       {"region", region_.toJson()},
       {"report", reportToJson(report_)},
       {"table", fieldtrue::toJson(table_)},

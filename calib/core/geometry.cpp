@@ -132,6 +132,17 @@ PointSpread pointSpread(std::span<const Eigen::Vector3d> points_m, double flat_r
   return spread;
 }
 
+std::vector<Eigen::Quaterniond> distinctRotations(std::span<const Eigen::Quaterniond> rotations, double within_rad) {
+  std::vector<Eigen::Quaterniond> distinct;
+  for (const Eigen::Quaterniond& q : rotations) {
+    const bool is_new = std::none_of(distinct.begin(), distinct.end(), [&](const Eigen::Quaterniond& other) {
+      return angleBetween_rad(q, other) < within_rad;
+    });
+    if (is_new) distinct.push_back(q);
+  }
+  return distinct;
+}
+
 Region Region::around(std::span<const Eigen::Vector3d> points_m, int dimension, double margin_m) {
   FT_CHECK(margin_m >= 0.0 && allFinite(points_m));
   Region region;

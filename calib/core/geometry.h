@@ -26,6 +26,9 @@ struct PointSpread {
 };
 PointSpread pointSpread(std::span<const Eigen::Vector3d> points_m, double flat_ratio = 0.01);
 
+/// Of rotations, those that no earlier one is so near to. @return in the order of their first appearance
+std::vector<Eigen::Quaterniond> distinctRotations(std::span<const Eigen::Quaterniond> rotations, double within_rad);
+
 /// The region that measured points span: their convex hull (in a volume), or the hull in their plane with a slab of
 /// stated half-thickness around it. Nothing is claimed outside.
 class Region {

@@ -27,6 +27,9 @@ class AutomaticModel : public PositionModel {
   void correct(std::span<const Eigen::Vector3d> p_tracked_m, std::span<Eigen::Vector3d> p_corrected_m) const override {
     model_->correct(p_tracked_m, p_corrected_m);
   }
+  bool takesOrientation() const override { return model_->takesOrientation(); }
+  Eigen::Vector3d displacementAt_m(const Pose& tracked) const override { return model_->displacementAt_m(tracked); }
+  std::optional<double> uncertaintyAt_m(const Pose& tracked) const override { return model_->uncertaintyAt_m(tracked); }
   Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const override { return model_->jacobian(p_tracked_m); }
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
     return model_->uncertainty_m(p_tracked_m);

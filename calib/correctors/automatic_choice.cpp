@@ -49,8 +49,10 @@ std::vector<std::size_t> slotsOf(const FitData& data) {
 
 double squaredError_m2(const PositionModel& model, const FitData& data, std::size_t row) {
   const Eigen::Vector3d& p_m = data.p_tracked_m[row];
-  const Eigen::Vector3d corrected_m = model.covers(p_m) ? Eigen::Vector3d(p_m + model.displacement_m(p_m)) : p_m;
-  return (corrected_m - data.p_true_m[row]).squaredNorm();
+  if (!model.covers(p_m)) return (p_m - data.p_true_m[row]).squaredNorm();
+  const Eigen::Vector3d move_m =
+      data.hasOrientation() ? model.displacementAt_m({p_m, data.q_tracked[row]}) : model.displacement_m(p_m);
+  return (p_m + move_m - data.p_true_m[row]).squaredNorm();
 }
 
 using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const std::vector<std::size_t>& held_out)>;

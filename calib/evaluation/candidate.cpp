@@ -29,7 +29,10 @@ RowScore orientationScore(const Eigen::Quaterniond& q_corrected, const Node& nod
 RowScore scoreOf(const correctors::PositionModel& model, const Node& node, const calibration::Alignment& alignment) {
   const Eigen::Vector3d& p_tracked_m = node.tracker_from_sensor.position_m;
   const bool covered = model.covers(p_tracked_m);
-  const Eigen::Vector3d p_true_m = covered ? p_tracked_m + model.displacement_m(p_tracked_m) : p_tracked_m;
+  Eigen::Vector3d p_true_m = p_tracked_m;
+  if (covered)
+    p_true_m +=
+        node.has_orientation ? model.displacementAt_m(node.tracker_from_sensor) : model.displacement_m(p_tracked_m);
   RowScore score = positionScore(p_true_m, node, alignment);
   score.covered = covered;
   return score;
@@ -46,7 +49,7 @@ RowScore scoreOf(const correctors::OrientationModel& model, const Node& node, co
 }
 
 double evaluateOnce(const correctors::PositionModel& model, const Pose& tracked) {
-  return model.displacement_m(tracked.position_m).x();
+  return model.displacementAt_m(tracked).x();
 }
 
 double evaluateOnce(const correctors::OrientationModel& model, const Pose& tracked) {

@@ -52,7 +52,8 @@ std::string addedFields(const calibration::Corrector& corrector, const Node& nod
   text += node.has_orientation ? field(angleBetween_rad(q_before, truth.orientation)) +
                                      field(angleBetween_rad(corrected.orientation, truth.orientation))
                                : ",,";
-  const std::optional<double> uncertainty_m = corrector.uncertainty_m(tracked.position_m);
+  const std::optional<double> uncertainty_m =
+      node.has_orientation ? corrector.uncertaintyAt_m(tracked) : corrector.uncertainty_m(tracked.position_m);
   text += uncertainty_m ? field(*uncertainty_m) : ",";
   return text + (corrector.covers(tracked.position_m) ? ",1" : ",0");
 }

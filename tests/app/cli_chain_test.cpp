@@ -319,14 +319,21 @@ class CliChainTest : public QObject {
     const QList<QByteArray> lines = readWhole(at("out.csv")).split('\n');
     QCOMPARE(lines.size(), qsizetype(6));
     QCOMPARE(lines[0], QByteArray("# frame: jig"));
-    QCOMPARE(lines[1], QByteArray("note,z_m,y_m,x_m,qw,qx,qy,qz,x_corrected_m,y_corrected_m,z_corrected_m,qw_corrected,"
-                                  "qx_corrected,qy_corrected,qz_corrected,uncertainty_m,covered"));
+    QCOMPARE(lines[1],
+             QByteArray("note,z_m,y_m,x_m,qw,qx,qy,qz,x_corrected_m,y_corrected_m,z_corrected_m,qw_corrected,"
+                        "qx_corrected,qy_corrected,qz_corrected,uncertainty_m,covered,nearest_orientation_deg"));
     QVERIFY(lines[2].startsWith("\"a, b\",0.1,0.2,0.5,1,0,0,0,"));
     QCOMPARE(lines[3], QByteArray("# between the rows"));
     const Eigen::Matrix4d fit = rigidFit(table_.nodes, -1);
     verifyCorrected(lines[2].mid(7), fit * Eigen::Vector4d(0.5, 0.2, 0.1, 1.0));
     verifyCorrected(lines[4], fit * Eigen::Vector4d(30, 2, 1, 1.0));
-    QCOMPARE(lines[4].split(',').last(), QByteArray("0"));
+    const QList<QByteArray> far = lines[4].split(',');
+    QCOMPARE(far[far.size() - 2], QByteArray("0"));
+    // Fitted in one orientation only, and this row is turned by 120 degrees.
+    const double turned_deg =
+        180.0 / M_PI *
+        angleBetween_rad(table_.nodes.front().tracker_from_sensor.orientation, Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5));
+    FT_VERIFY_MATCH(near(far.last().trimmed().toDouble(), turned_deg, 5.0));
   }
 
   void applyKeepsReadingsTheTrackerMarked() {
@@ -337,7 +344,7 @@ class CliChainTest : public QObject {
     FT_VERIFY_STATUS(
         runCli({"apply", "--calibration", at("rigid.ftcal.json"), "--in", at("in.csv"), "--out", at("out.csv")}), 0);
     const auto rows = csvRows(readWhole(at("out.csv")));
-    QCOMPARE(rows.at(1), (QByteArrayList{"nan", "nan", "nan", "k", "", "", "", "", "", "", "", "", "0"}));
+    QCOMPARE(rows.at(1), (QByteArrayList{"nan", "nan", "nan", "k", "", "", "", "", "", "", "", "", "0", ""}));
     QVERIFY(!rows.at(2).at(4).isEmpty());
     QCOMPARE(rows.at(2).at(7), QByteArray());  // no orientation in, none out
   }

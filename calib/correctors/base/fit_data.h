@@ -5,8 +5,12 @@
 
 #include "calib/core/calibration_table.h"
 #include "calib/core/geometry.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::correctors {
+
+/// Rows turned less far apart than this are in the same orientation: a jig is not set down straighter.
+inline constexpr double kSameOrientation_rad = 5.0 * kRadPerDeg;
 
 /// What a correction method is fitted to: matching true and tracked poses, all in the tracker frame [m].
 /// The truth has already been brought there by the alignment (or is there by declaration).

@@ -17,6 +17,15 @@ class PositionModel {
   /// d at a tracked position [m].
   virtual Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const = 0;
 
+  /// Whether the displacement depends on how the sensor is turned; `displacement_m`, and with it a batch and the
+  /// derivative, is then the mean over the orientations that were fitted.
+  virtual bool takesOrientation() const { return false; }
+
+  /// d at a tracked pose [m].
+  virtual Eigen::Vector3d displacementAt_m(const Pose& tracker_from_sensor) const {
+    return displacement_m(tracker_from_sensor.position_m);
+  }
+
   /// Corrected positions of a batch; the default loops, fast methods override.
   /// @param p_corrected_m same length as p_tracked_m; may be the same memory
   virtual void correct(std::span<const Eigen::Vector3d> p_tracked_m, std::span<Eigen::Vector3d> p_corrected_m) const;
@@ -26,6 +35,9 @@ class PositionModel {
 
   /// SD of the corrected position [m], when the method knows it.
   virtual std::optional<double> uncertainty_m(const Eigen::Vector3d&) const { return std::nullopt; }
+  virtual std::optional<double> uncertaintyAt_m(const Pose& tracker_from_sensor) const {
+    return uncertainty_m(tracker_from_sensor.position_m);
+  }
 
   /// Whether the method can be evaluated there at all. Local methods cannot outside their cells; global ones always
   /// can.

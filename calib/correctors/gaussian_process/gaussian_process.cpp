@@ -11,6 +11,7 @@
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
 #include "calib/correctors/gaussian_process/gaussian_process_tuning.h"
+#include "calib/correctors/gaussian_process/pose_process.h"
 #include "calib/correctors/radial/rbf_system.h"
 
 namespace fieldtrue::correctors {
@@ -20,8 +21,6 @@ constexpr std::size_t kMaxPlaces = 10000;  // 800 MB for the matrix.
 const std::string kName = "Gaussian process";
 /// Displacements that a linear trend explains this well [m] leave nothing to find scales from.
 constexpr double kNoResidual_m = 1e-9;
-/// Alive at once: the covariance, its projection and what is factorised; later the inverse.
-constexpr double kMatrices = 3.0;
 
 /// The posterior, factorised when it is first asked for: views ask, evaluation does not, and at 5,000 places it takes
 /// seconds and 200 MB.
@@ -46,11 +45,16 @@ class GaussianProcessPosition : public PositionModel {
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
     std::call_once(lazy_->once, [this] {
       const auto n = static_cast<double>(field_.centers_m().size());
-      if (checkMemory("The uncertainty of a Gaussian process", kMatrices * 8.0 * n * n))
-        lazy_->posterior = GaussianProcessPosterior::of(field_, scales_, noise_m2_);
+      if (checkMemory("The uncertainty of a Gaussian process", kGaussianProcessMatrices * 8.0 * n * n))
+        lazy_->posterior = GaussianProcessPosterior::of(
+            field_.frame().tail(field_.centers_m()),
+            covarianceMatrix(field_.kernel(), field_.frame(), scales_, field_.centers_m(), noise_m2_));
     });
     if (!lazy_->posterior) return std::nullopt;
-    const double field_m2 = lazy_->posterior->variance_m2(field_, p_tracked_m);
+    const double signal_m2 = scales_.signal_sd_m * scales_.signal_sd_m;
+    const double field_m2 =
+        lazy_->posterior->variance_m2(signal_m2, signal_m2 * field_.kernelValues(p_tracked_m),
+                                      field_.frame().tail(std::span(&p_tracked_m, 1)).row(0).transpose());
     return std::sqrt(3.0 * (field_m2 + scales_.nugget_sd_m * scales_.nugget_sd_m));
   }
   std::string note() const override { return note_; }
@@ -81,6 +85,7 @@ struct GaussianProcessSystem {
   std::vector<double> noise_m2;
   std::string note;
   MemoryBooking memory;
+  std::optional<PoseSystem> poses;  ///< Where orientation is an input; it stands instead of all else.
 
   Eigen::VectorXd noise() const {
     return Eigen::Map<const Eigen::VectorXd>(noise_m2.data(), static_cast<Eigen::Index>(noise_m2.size()));
@@ -148,7 +153,7 @@ Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& s
                                              "; use a polynomial or B-splines");
   GaussianProcessSystem system;
   system.places = *std::move(places);
-  auto memory = bookSquareMatrices(kName, kMatrices, system.places.size(), control);
+  auto memory = bookSquareMatrices(kName, kGaussianProcessMatrices, system.places.size(), control);
   if (!memory) return tl::unexpected(memory.error());
   system.memory = *std::move(memory);
   system.kernel = choiceSetting(settings, "nu") == "1.5" ? RadialKernel::kMatern32 : RadialKernel::kMatern52;
@@ -160,8 +165,20 @@ Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& s
   const auto scales = chooseScales(system, used, static_cast<int>(integerSetting(settings, "restarts")), control);
   if (!scales) return tl::unexpected(scales.error());
   system.scales = *scales;
+  const std::string& inputs = choiceSetting(settings, "inputs");
+  PoseChoice poses;
+  if (inputs != "position") {
+    const auto tuning_places = static_cast<std::size_t>(integerSetting(settings, "tuning_places"));
+    FT_TRY(poses, choosePoses(data, system.places, system.kernel, system.frame, system.scales, tuning_places,
+                              inputs == "pose", control));
+  }
   system.frame = scaledFrame(system.frame, system.scales);
-  system.note = noteOf(data, system, used.size());
+  system.note = noteOf(data, system, used.size()) + (poses.note.empty() ? "" : " ") + poses.note;
+  system.poses = std::move(poses.system);
+  if (system.poses) {
+    const std::string plane = planeNote(data, "fitted in the plane, and nothing is claimed off it");
+    system.poses->note = plane + (plane.empty() ? "" : " ") + system.poses->note;
+  }
   return system;
 }
 
@@ -192,6 +209,7 @@ std::unique_ptr<PositionModel> modelOf(const GaussianProcessSystem& system, std:
 Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, const Settings& settings,
                                                           const RunControl& control) {
   FT_TRY(const auto system, buildSystem(data, settings, control));
+  if (system.poses) return fitPoses(*system.poses);
   const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
   if (!projection) return notSolvable(system);
   const auto solution = solveRadial(*projection, matrixOf(system), displacementMatrix(system.places));
@@ -221,6 +239,7 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const
                                                                            const Settings& settings,
                                                                            const RunControl& control) {
   FT_TRY(auto system, buildSystem(data, settings, control));
+  if (system.poses) return holdOutPoses(*std::move(system.poses));
   const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
   if (!projection) return notSolvable(system);
   auto solutions = RadialHoldOut::of(*projection, matrixOf(system), displacementMatrix(system.places),
@@ -230,6 +249,7 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const
 }
 
 std::unique_ptr<PositionModel> loadGaussianProcess(const JsonReader& parameters) {
+  if (parameters.has("pose")) return readPoses(parameters);
   RadialField field = RadialField::fromJson(parameters);
   const GaussianProcessScales scales{parameters["length_m"].vector3(), parameters["signal_sd_m"].number(),
                                      parameters["nugget_sd_m"].number()};
@@ -241,13 +261,18 @@ std::unique_ptr<PositionModel> loadGaussianProcess(const JsonReader& parameters)
 }
 
 std::vector<Setting> gaussianProcessSettings() {
-  return {declare::choice("nu", "Smoothness", {"1.5", "2.5"}, "2.5",
-                          "Of the Matern kernel: fields with nu = 2.5 have two derivatives, with 1.5 one."),
-          declare::integer("restarts", "Starts", {1, 20}, 3,
-                           "Starting points from which the scales are sought; the most likely end is kept."),
-          declare::integer(
-              "tuning_places", "Places for the scales", {50, 3000}, 700,
-              "With more places than these, the scales are found on a well-spread part of them; the fit takes all.")};
+  return {
+      declare::choice("inputs", "Inputs", {"auto", "position", "pose"}, "auto",
+                      "What the error is a function of: the tracked position, or the whole tracked pose. auto takes "
+                      "the pose where rows are turned differently, the evidence gains 3 nats for each further "
+                      "parameter and the error at places left out is less."),
+      declare::choice("nu", "Smoothness", {"1.5", "2.5"}, "2.5",
+                      "Of the Matern kernel: fields with nu = 2.5 have two derivatives, with 1.5 one."),
+      declare::integer("restarts", "Starts", {1, 20}, 3,
+                       "Starting points from which the scales are sought; the most likely end is kept."),
+      declare::integer(
+          "tuning_places", "Places for the scales", {50, 3000}, 700,
+          "With more places than these, the scales are found on a well-spread part of them; the fit takes all.")};
 }
 
 }  // namespace

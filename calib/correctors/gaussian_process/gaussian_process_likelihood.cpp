@@ -6,13 +6,7 @@
 #include "calib/correctors/numerics/dense_solver.h"
 
 namespace fieldtrue::correctors {
-namespace {
-
-constexpr double kOutputs = 3.0;
-
-}  // namespace
-
-GaussianProcessScales scalesOf(const RestrictedLikelihood::Parameters& parameters) {
+GaussianProcessScales scalesOf(std::span<const double> parameters) {
   return {{std::exp(parameters[0]), std::exp(parameters[1]), std::exp(parameters[2])},
           std::exp(parameters[3]),
           std::exp(parameters[4])};
@@ -35,6 +29,17 @@ Eigen::MatrixXd covarianceMatrix(RadialKernel kernel, const FieldFrame& frame, c
   return covariance;
 }
 
+std::optional<RestrictedFit> restrictedFit(const TailProjection& projection, const Eigen::MatrixXd& covariance,
+                                           const Eigen::MatrixXd& projected_y) {
+  RestrictedFit fit{0.0, projection.projected(covariance), projected_y};
+  if (!choleskyInPlace(fit.factor)) return std::nullopt;
+  choleskySolve(fit.factor, fit.solved);
+  // log |Q2^T K Q2| is log |K| + log |H^T K^-1 H| - log |H^T H|.
+  const auto n_outputs = static_cast<double>(projected_y.cols());
+  fit.value = n_outputs * choleskyLogDeterminant(fit.factor) + projected_y.cwiseProduct(fit.solved).sum();
+  return std::isfinite(fit.value) ? std::optional(std::move(fit)) : std::nullopt;
+}
+
 std::optional<RestrictedLikelihood> RestrictedLikelihood::of(RadialKernel kernel, const FieldFrame& frame,
                                                              std::vector<Eigen::Vector3d> p_m, Eigen::MatrixXd y,
                                                              Eigen::VectorXd noise_m2) {
@@ -55,18 +60,13 @@ std::optional<RestrictedLikelihood> RestrictedLikelihood::of(RadialKernel kernel
 
 std::optional<double> RestrictedLikelihood::evaluate(const Parameters& parameters, double* gradient) const {
   const GaussianProcessScales scales = scalesOf(parameters);
-  Eigen::MatrixXd factor = projection_->projected(covarianceMatrix(kernel_, frame_, scales, p_m_, noise_m2_));
-  if (!choleskyInPlace(factor)) return std::nullopt;
-  Eigen::MatrixXd solved = projected_y_;
-  choleskySolve(factor, solved);
-  // log |Q2^T K Q2| is log |K| + log |H^T K^-1 H| - log |H^T H|.
-  const double value = kOutputs * choleskyLogDeterminant(factor) + projected_y_.cwiseProduct(solved).sum();
-  if (!std::isfinite(value)) return std::nullopt;
+  auto fit = restrictedFit(*projection_, covarianceMatrix(kernel_, frame_, scales, p_m_, noise_m2_), projected_y_);
+  if (!fit) return std::nullopt;
   if (gradient != nullptr) {
-    choleskyInverseInPlace(factor);
-    addGradient(projection_->lifted(factor), projection_->fromComplement(solved), scales, gradient);
+    choleskyInverseInPlace(fit->factor);
+    addGradient(projection_->lifted(fit->factor), projection_->fromComplement(fit->solved), scales, gradient);
   }
-  return value;
+  return fit->value;
 }
 
 // d(-2 log L)/d theta = sum_ij D_ij dK_ij / d theta with D = 3 P - (P Y)(P Y)^T.

@@ -22,12 +22,31 @@ struct GaussianProcessScales {
 /// A share of the signal's variance that keeps the matrix positive definite where places repeat.
 inline constexpr double kGaussianProcessJitter = 1e-10;
 
+/// Matrices alive at once: the covariance, its projection and what is factorised; later the inverse.
+inline constexpr double kGaussianProcessMatrices = 3.0;
+
+/// Outputs, which share one covariance.
+inline constexpr double kOutputs = 3.0;
+
 /// The frame with lengths as units.
 FieldFrame scaledFrame(const FieldFrame& frame, const GaussianProcessScales& scales);
 
 /// The covariance matrix of the places, lower triangle. @param noise_m2 stated, one number a place
 Eigen::MatrixXd covarianceMatrix(RadialKernel kernel, const FieldFrame& frame, const GaussianProcessScales& scales,
                                  std::span<const Eigen::Vector3d> p_m, const Eigen::VectorXd& noise_m2);
+
+/// Minus twice the restricted log-likelihood of values about a trend, up to a constant, for one covariance of all
+/// outputs; and what its slope asks for.
+struct RestrictedFit {
+  double value = 0.0;
+  Eigen::MatrixXd factor;  ///< Cholesky factor of Q2^T K Q2.
+  Eigen::MatrixXd solved;  ///< (Q2^T K Q2)^-1 Q2^T Y
+};
+
+/// @param covariance lower triangle; @param projected_y Q2^T Y
+/// @return none when the covariance is not positive definite to rounding
+std::optional<RestrictedFit> restrictedFit(const TailProjection& projection, const Eigen::MatrixXd& covariance,
+                                           const Eigen::MatrixXd& projected_y);
 
 /// Minus twice the restricted log-likelihood of displacements about a linear trend, up to a constant, and its slope.
 /// The three outputs share one covariance.
@@ -67,6 +86,6 @@ class RestrictedLikelihood {
   double residual_variance_m2_ = 0.0;
 };
 
-GaussianProcessScales scalesOf(const RestrictedLikelihood::Parameters& parameters);
+GaussianProcessScales scalesOf(std::span<const double> parameters);
 
 }  // namespace fieldtrue::correctors

@@ -11,17 +11,16 @@ namespace fieldtrue::correctors {
 /// @source Matheron 1969; Rasmussen, Williams 2006, eq. 2.42
 class GaussianProcessPosterior {
  public:
-  /// Factorises the covariance of the places. @param field holds kernel, frame and places
-  static std::optional<GaussianProcessPosterior> of(const RadialField& field, const GaussianProcessScales& scales,
-                                                    const Eigen::VectorXd& noise_m2);
+  /// Factorises. @param tail FieldFrame::tail of what was measured; @param covariance of it, lower triangle [m2]
+  static std::optional<GaussianProcessPosterior> of(const Eigen::MatrixXd& tail, const Eigen::MatrixXd& covariance);
 
-  /// Variance of the smooth field per output at a position [m2]; the nugget is not in it.
-  double variance_m2(const RadialField& field, const Eigen::Vector3d& p_m) const;
+  /// Variance of the field per output at one input [m2]; the nugget is not in it.
+  /// @param prior_m2 before anything was measured; @param k covariance with each measurement [m2]; @param h its tail
+  double variance_m2(double prior_m2, const Eigen::VectorXd& k, const Eigen::VectorXd& h) const;
 
  private:
   explicit GaussianProcessPosterior(TailProjection projection) : projection_(std::move(projection)) {}
 
-  double signal_m2_ = 0.0;
   TailProjection projection_;
   Eigen::MatrixXd factor_;              ///< Cholesky factor of Q2^T K Q2.
   Eigen::MatrixXd k_of_weights_;        ///< K Q1

@@ -36,9 +36,18 @@ class PhysicsResidual : public PositionModel {
     const Eigen::Vector3d p_m = physics_->truePosition_m(p_tracked_m).value_or(p_tracked_m);
     return p_m + remainder_->displacement_m(p_m) - p_tracked_m;
   }
+  bool takesOrientation() const override { return remainder_->takesOrientation(); }
+  Eigen::Vector3d displacementAt_m(const Pose& tracked) const override {
+    const Eigen::Vector3d p_m = undistorted_m(tracked.position_m).value_or(tracked.position_m);
+    return p_m + remainder_->displacementAt_m({p_m, tracked.orientation}) - tracked.position_m;
+  }
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
     const auto p_m = undistorted_m(p_tracked_m);
     return p_m ? remainder_->uncertainty_m(*p_m) : std::nullopt;
+  }
+  std::optional<double> uncertaintyAt_m(const Pose& tracked) const override {
+    const auto p_m = undistorted_m(tracked.position_m);
+    return p_m ? remainder_->uncertaintyAt_m({*p_m, tracked.orientation}) : std::nullopt;
   }
   /// Not where the scene has no place for the reading.
   bool covers(const Eigen::Vector3d& p_tracked_m) const override {
@@ -171,6 +180,7 @@ bool helpsHeldOut(const FitData& data, std::vector<identify::ScenePositions>& wi
   constexpr double kLeastGain = 0.95;  // RMS.
   Settings quick = settings;
   quick["restarts"] = std::int64_t{1};
+  quick["inputs"] = std::string("position");
   double with_m2 = 0.0;
   double alone_m2 = 0.0;
   for (std::size_t fold = 0; fold < without_fold.size(); ++fold) {

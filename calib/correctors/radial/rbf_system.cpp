@@ -154,12 +154,29 @@ std::optional<RadialSolution> RadialHoldOut::without(std::span<const std::size_t
   solution.tail = of_y_.tail * rotation.transpose() + of_x_.tail * turn.transpose();
   solution.tail.row(0) += fold_from_data.position_m.transpose();
   if (out.empty()) return solution;
+  const auto errors = leftOutErrors(out, solution.coefficients);
+  if (!errors) return std::nullopt;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(out[i]);
+    solution.coefficients -= inverse_.col(column) * errors->row(static_cast<Eigen::Index>(i));
+    solution.tail -= tail_inverse_.row(column).transpose() * errors->row(static_cast<Eigen::Index>(i));
+  }
+  solution.coefficients = withoutRows(solution.coefficients, out);
+  return solution;
+}
+
+std::optional<Eigen::MatrixXd> RadialHoldOut::leftOutErrors(std::span<const std::size_t> out) const {
+  return leftOutErrors(out, of_y_.coefficients);
+}
+
+std::optional<Eigen::MatrixXd> RadialHoldOut::leftOutErrors(std::span<const std::size_t> out,
+                                                            const Eigen::MatrixXd& coefficients) const {
   const auto n_out = static_cast<Eigen::Index>(out.size());
   if (n_out + tail_inverse_.cols() > inverse_.rows()) return std::nullopt;
   Eigen::MatrixXd block(n_out, n_out), errors(n_out, 3);
   for (Eigen::Index i = 0; i < n_out; ++i) {
     const auto row = static_cast<Eigen::Index>(out[static_cast<std::size_t>(i)]);
-    errors.row(i) = solution.coefficients.row(row);
+    errors.row(i) = coefficients.row(row);
     for (Eigen::Index j = 0; j < n_out; ++j)
       block(i, j) = inverse_(row, static_cast<Eigen::Index>(out[static_cast<std::size_t>(j)]));
   }
@@ -168,14 +185,7 @@ std::optional<RadialSolution> RadialHoldOut::without(std::span<const std::size_t
   // A pivot that all but vanishes: the places left out were the only ones to hold up a direction of the tail.
   if (llt.info() != Eigen::Success || (llt.matrixLLT().diagonal().array().square() <= 1e-10 * diagonal.array()).any())
     return std::nullopt;
-  errors = llt.solve(errors).eval();
-  for (Eigen::Index i = 0; i < n_out; ++i) {
-    const auto column = static_cast<Eigen::Index>(out[static_cast<std::size_t>(i)]);
-    solution.coefficients -= inverse_.col(column) * errors.row(i);
-    solution.tail -= tail_inverse_.row(column).transpose() * errors.row(i);
-  }
-  solution.coefficients = withoutRows(solution.coefficients, out);
-  return solution;
+  return llt.solve(errors).eval();
 }
 
 Result<std::vector<std::size_t>> placesOfRows(const Places& places, std::span<const std::size_t> rows) {

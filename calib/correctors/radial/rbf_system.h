@@ -68,7 +68,14 @@ class RadialHoldOut {
   ///         interpolation, eq. 17; here with the tail and smoothing inside A
   Eigen::MatrixXd leaveOneOutErrors() const;
 
+  /// Error at some places of the fit without any of them, one row a place. @param out ascending
+  /// @return none when the rest does not determine it
+  std::optional<Eigen::MatrixXd> leftOutErrors(std::span<const std::size_t> out) const;
+
  private:
+  std::optional<Eigen::MatrixXd> leftOutErrors(std::span<const std::size_t> out,
+                                               const Eigen::MatrixXd& coefficients) const;
+
   Eigen::MatrixXd inverse_;       ///< P: c = P Y.
   Eigen::MatrixXd tail_inverse_;  ///< B: t = B^T Y.
   RadialSolution of_y_, of_x_;

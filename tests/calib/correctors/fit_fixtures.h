@@ -35,6 +35,12 @@ inline Eigen::Quaterniond smoothError(const Eigen::Vector3d& p) {
   return rotationFromVector(0.15 * Eigen::Vector3d(std::sin(p.x()), p.y() * p.z(), std::cos(p.y())));
 }
 
+/// Matern's correlation with nu = 5/2 at a distance in units of the length.
+inline double matern52(double r) {
+  const double t = std::sqrt(5.0) * r;
+  return (1.0 + t + t * t / 3.0) * std::exp(-t);
+}
+
 /// Tracked positions on a grid that is shaken a little, so that no two coordinates repeat [m].
 inline std::vector<Eigen::Vector3d> shakenGrid(const std::array<int, 3>& counts, double pitch_m, double shake_m,
                                                std::uint64_t seed = 5) {

@@ -1,0 +1,260 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "calib/core/spacing.h"
+#include "calib/core/units.h"
+#include "calib/correctors/base/fit_memory.h"
+#include "calib/correctors/gaussian_process/pose_process.h"
+
+namespace fieldtrue::correctors {
+namespace {
+
+constexpr std::size_t kMostPoses = 10000;  // 800 MB for the matrix.
+constexpr double kNatsAParameter = 3.0;
+constexpr std::size_t kTurnParameters = PoseLikelihood::kParameters - kFieldParameters;
+constexpr std::size_t kRowsOfPoseStarts = 200;
+constexpr int kPoseStartIterations = 25;
+constexpr int kPoseIterations = 40;
+
+/// The weak prior of the part that turns: logarithms of its SD beside the signal's, of its stretch and of its length.
+struct TurnPrior {
+  std::array<double, kTurnParameters> middle{};
+  static constexpr std::array<double, kTurnParameters> kSd = {2.0, 0.5, 0.7};
+
+  explicit TurnPrior(const WeakPrior& field) : middle{field.signal + std::log(0.5), 0.0, std::log(1.2)} {}
+
+  /// Minus twice its logarithm. @param gradient added to, unless null
+  double add(const double* point, double* gradient) const {
+    double value = 0.0;
+    for (std::size_t i = 0; i < kTurnParameters; ++i) {
+      const double off = (point[i] - middle[i]) / kSd[i];
+      value += off * off;
+      if (gradient != nullptr) gradient[i] += 2.0 * off / kSd[i];
+    }
+    return value;
+  }
+};
+
+/// What both kinds are fitted to while scales are sought.
+struct Search {
+  const PoseLikelihood& likelihood;
+  const WeakPrior& field_prior;
+  const TurnPrior& turn_prior;
+  const RunControl& control;
+
+  std::optional<Optimum> from(const std::vector<double>& start, int iterations) const {
+    const auto n_rows = static_cast<double>(likelihood.size());
+    const std::size_t n_parameters = start.size();
+    const LogLikelihood cost = [&](const double* point, double* gradient) -> std::optional<double> {
+      const auto value = likelihood.evaluate({point, n_parameters}, gradient);
+      if (!value) return std::nullopt;
+      double sum = *value + field_prior.add(point, n_rows, gradient);
+      if (n_parameters > kFieldParameters)
+        sum += turn_prior.add(point + kFieldParameters, gradient ? gradient + kFieldParameters : nullptr);
+      for (std::size_t k = 0; gradient != nullptr && k < n_parameters; ++k) gradient[k] /= n_rows;
+      return sum / n_rows;
+    };
+    return minimise(cost, start, iterations, control);
+  }
+};
+
+std::vector<double> logarithmsOf(const GaussianProcessScales& scales) {
+  return {std::log(scales.length_m.x()), std::log(scales.length_m.y()), std::log(scales.length_m.z()),
+          std::log(scales.signal_sd_m), std::log(scales.nugget_sd_m)};
+}
+
+/// Starts of poses from the best of position alone: what turns as large as half the residual, and smoother in space; as
+/// large as what position left unexplained.
+std::vector<std::vector<double>> startsOf(const std::vector<double>& position, const WeakPrior& prior) {
+  std::vector<std::vector<double>> starts;
+  const double unexplained = position[kFieldParameters - 1];
+  const std::array<std::array<double, kTurnParameters>, 3> turns = {
+      {{prior.signal + std::log(0.5), 0.0, std::log(1.5)},
+       {prior.signal + std::log(0.5), std::log(2.0), std::log(0.8)},
+       {std::max(unexplained, prior.signal + std::log(0.05)), 0.0, std::log(1.0)}}};
+  for (const auto& turn : turns) {
+    starts.push_back(position);
+    starts.back()[kFieldParameters - 1] = unexplained - std::log(3.0);
+    starts.back().insert(starts.back().end(), turn.begin(), turn.end());
+  }
+  return starts;
+}
+
+PoseRows rowsOf(const FitData& data, const Places& places) {
+  PoseRows rows;
+  rows.p_m = data.p_tracked_m;
+  for (const Eigen::Quaterniond& q : data.q_tracked) rows.q.push_back(q.normalized());
+  rows.place.resize(data.size());
+  Places each;
+  for (std::size_t place = 0; place < places.size(); ++place)
+    for (const std::size_t row : places.rows[place]) rows.place[row] = place;
+  for (std::size_t row = 0; row < data.size(); ++row) {
+    each.node.push_back(data.node[row]);
+    each.rows.push_back({row});
+  }
+  FitData reading = data;
+  reading.jig_sd_m = 0.0;
+  const Eigen::VectorXd noise_m2 = placeNoise_m2(reading, each);
+  rows.noise_m2.assign(noise_m2.begin(), noise_m2.end());
+  rows.placing_m2 = data.jig_sd_m * data.jig_sd_m;
+  return rows;
+}
+
+/// All rows of so many well-spread places that they are no more than `most`, ascending.
+std::vector<std::size_t> spreadRows(const Places& places, std::size_t n_rows, std::size_t most) {
+  const double share = std::min(1.0, static_cast<double>(most) / static_cast<double>(n_rows));
+  const auto n_places = static_cast<std::size_t>(share * static_cast<double>(places.size()));
+  std::vector<std::size_t> rows;
+  for (const std::size_t place : spreadPlaces(places.p_tracked_m, std::max<std::size_t>(n_places, 5)))
+    rows.insert(rows.end(), places.rows[place].begin(), places.rows[place].end());
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+
+Eigen::MatrixXd rowsOfMatrix(const Eigen::MatrixXd& all, std::span<const std::size_t> rows) {
+  Eigen::MatrixXd some(static_cast<Eigen::Index>(rows.size()), all.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    some.row(static_cast<Eigen::Index>(i)) = all.row(static_cast<Eigen::Index>(rows[i]));
+  return some;
+}
+
+/// RMS over rows whose places are left out, with these scales kept; infinite where they cannot be told.
+double heldOutRms_m(const PoseSystem& system, const PoseScales& scales, const PoseRows& rows,
+                    const Eigen::MatrixXd& displacement_m, const Eigen::MatrixXd& tracked_m) {
+  const auto projection = TailProjection::of(system.frame.tail(rows.p_m));
+  if (!projection) return HUGE_VAL;
+  const auto solutions = RadialHoldOut::of(*projection, poseCovariance(system.kernel, system.frame, scales, rows),
+                                           displacement_m, tracked_m);
+  if (!solutions) return HUGE_VAL;
+  std::vector<std::vector<std::size_t>> of_place(*std::max_element(rows.place.begin(), rows.place.end()) + 1);
+  for (std::size_t row = 0; row < rows.size(); ++row) of_place[rows.place[row]].push_back(row);
+  double squares_m2 = 0.0;
+  for (const std::vector<std::size_t>& out : of_place) {
+    if (out.empty()) continue;
+    const auto errors_m = solutions->leftOutErrors(out);
+    if (!errors_m) return HUGE_VAL;
+    squares_m2 += errors_m->squaredNorm();
+  }
+  return std::sqrt(squares_m2 / static_cast<double>(rows.size()));
+}
+
+/// How poses compare with position alone on the same rows.
+struct PoseGain {
+  PoseScales scales;
+  double nats = 0.0;
+  double position_m = 0.0;  ///< Held out.
+  double pose_m = 0.0;      ///< Held out.
+
+  bool isGain() const { return nats >= kNatsAParameter * static_cast<double>(kTurnParameters) && pose_m < position_m; }
+};
+
+std::string describedGain(const PoseGain& gain) {
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "%.0f nats over position alone (%.0f asked), held-out RMS %.3g mm against %.3g mm",
+                std::round(gain.nats) + 0.0, kNatsAParameter * static_cast<double>(kTurnParameters),
+                1000.0 * gain.pose_m, 1000.0 * gain.position_m);
+  return text.data();
+}
+
+std::string describedScales(const PoseScales& scales) {
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "SD %.3g mm of what changes as the sensor turns, correlated over %.0f degrees",
+                1000.0 * scales.turn_sd_m, kDegPerRad * scales.turn_length_rad);
+  return text.data();
+}
+
+/// @return none when no start leads anywhere, or on a request to stop
+std::optional<PoseGain> gainOfPoses(const PoseSystem& system, const GaussianProcessScales& start,
+                                    std::span<const std::size_t> used, std::span<const std::size_t> few,
+                                    double spacing_m, const RunControl& control) {
+  const PoseRows rows = system.rows.only(used);
+  const Eigen::MatrixXd displacement_m = rowsOfMatrix(system.displacement_m, used);
+  const auto full = PoseLikelihood::of(system.kernel, system.frame, rows, displacement_m);
+  const auto small =
+      PoseLikelihood::of(system.kernel, system.frame, system.rows.only(few), rowsOfMatrix(system.displacement_m, few));
+  if (!full || !small) return std::nullopt;
+  const WeakPrior field_prior(full->residualVariance_m2(), rmsSpread_m(rows.p_m), std::max(spacing_m, 1e-6));
+  const TurnPrior turn_prior(field_prior);
+  const Search of_all{*full, field_prior, turn_prior, control};
+  const Search of_few{*small, field_prior, turn_prior, control};
+
+  const auto position = of_all.from(logarithmsOf(start), kPoseIterations);
+  if (!position) return std::nullopt;
+  Optimum best{{}, HUGE_VAL};
+  for (const std::vector<double>& one : startsOf(position->parameters, field_prior)) {
+    const auto optimum = of_few.from(one, kPoseStartIterations);
+    if (optimum && optimum->cost < best.cost) best = *optimum;
+  }
+  if (!std::isfinite(best.cost)) return std::nullopt;
+  if (const auto optimum = of_all.from(best.parameters, kPoseIterations)) best = *optimum;
+  const auto of_position = full->evaluate(position->parameters, nullptr);
+  const auto of_pose = full->evaluate(best.parameters, nullptr);
+  if (control.stop.stop_requested() || !of_position || !of_pose) return std::nullopt;
+  const Eigen::MatrixXd tracked_m = rowsOfMatrix(system.tracked_m, used);
+  const auto held_out_m = [&](const std::vector<double>& parameters) {
+    return heldOutRms_m(system, poseScalesOf(parameters), rows, displacement_m, tracked_m);
+  };
+  return PoseGain{poseScalesOf(best.parameters), 0.5 * (*of_position - *of_pose), held_out_m(position->parameters),
+                  held_out_m(best.parameters)};
+}
+
+}  // namespace
+
+bool hasSeveralOrientations(const FitData& data) {
+  return std::any_of(data.q_tracked.begin(), data.q_tracked.end(), [&](const Eigen::Quaterniond& q) {
+    return angleBetween_rad(q, data.q_tracked.front()) > kSameOrientation_rad;
+  });
+}
+
+Result<PoseChoice> choosePoses(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
+                               const GaussianProcessScales& start, std::size_t tuning_places, bool must,
+                               const RunControl& control) {
+  if (!hasSeveralOrientations(data)) {
+    if (must)
+      return fail(ErrorCode::kUnsupported, "inputs=pose needs rows in several orientations, and all " +
+                                               std::to_string(data.size()) + " rows are " +
+                                               (data.hasOrientation() ? "within 5 degrees of one" : "without one"));
+    return PoseChoice{};
+  }
+  if (data.size() > kMostPoses) {
+    const std::string most = "a Gaussian process over poses takes at most " + std::to_string(kMostPoses) +
+                             " rows, and there are " + std::to_string(data.size());
+    if (must) return fail(ErrorCode::kUnsupported, "inputs=pose: " + most);
+    return PoseChoice{std::nullopt, "Position alone: " + most + "."};
+  }
+  PoseSystem system;
+  system.kernel = kernel;
+  system.frame = frame;
+  FT_TRY(auto memory,
+         bookSquareMatrices("A Gaussian process over poses", kGaussianProcessMatrices, data.size(), control));
+  system.memory = std::move(memory);
+  system.rows = rowsOf(data, places);
+  const auto n = static_cast<Eigen::Index>(data.size());
+  system.displacement_m.resize(n, 3);
+  system.tracked_m.resize(n, 3);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto row = static_cast<std::size_t>(i);
+    system.tracked_m.row(i) = data.p_tracked_m[row].transpose();
+    system.displacement_m.row(i) = (data.p_true_m[row] - data.p_tracked_m[row]).transpose();
+  }
+  const std::vector<std::size_t> used = spreadRows(places, data.size(), tuning_places);
+  const std::vector<std::size_t> few = spreadRows(places, data.size(), kRowsOfPoseStarts);
+  const auto gain = gainOfPoses(system, start, used, few, medianSpacing_m(places.p_tracked_m), control);
+  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
+  if (!gain) {
+    if (must)
+      return fail(ErrorCode::kDegenerate, "inputs=pose: no scales fit these " + std::to_string(data.size()) + " rows");
+    return PoseChoice{std::nullopt, "Position alone: no scales fit poses."};
+  }
+  if (!must && !gain->isGain())
+    return PoseChoice{std::nullopt, "Position alone: orientation brings " + describedGain(*gain) + "."};
+  system.scales = gain->scales;
+  system.note = "Takes orientation: " + describedScales(gain->scales) + "; " + describedGain(*gain) + ".";
+  return PoseChoice{std::move(system), {}};
+}
+
+}  // namespace fieldtrue::correctors

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "calib/core/memory_limit.h"
+#include "calib/core/run_control.h"
+#include "calib/correctors/base/method.h"
+#include "calib/correctors/gaussian_process/pose_covariance.h"
+
+namespace fieldtrue::correctors {
+
+/// Everything a Gaussian process over poses and its hold-outs share.
+struct PoseSystem {
+  RadialKernel kernel = RadialKernel::kMatern52;
+  FieldFrame frame;  ///< Not in units of the lengths.
+  PoseScales scales;
+  PoseRows rows;  ///< All rows of the fit data, in their order.
+  Eigen::MatrixXd displacement_m;
+  Eigen::MatrixXd tracked_m;
+  std::string note;
+  MemoryBooking memory;
+};
+
+/// Why position alone was kept, or the system over poses where that is better.
+struct PoseChoice {
+  std::optional<PoseSystem> system;
+  std::string note;  ///< Empty where there is nothing to choose.
+};
+
+/// Whether rows are turned so differently that orientation can be asked about.
+bool hasSeveralOrientations(const FitData& data);
+
+/// Chooses between position alone and poses, and finds the scales. Poses need 3 nats of restricted likelihood a further
+/// parameter, and less error at rows whose places are left out.
+/// @param places merged rows of the data; @param frame around them; @param start scales of the process over positions
+/// @param must take poses whatever the comparison says
+/// @error kUnsupported with `must` where all rows are turned alike; as MemoryBooking::book; kCancelled
+Result<PoseChoice> choosePoses(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
+                               const GaussianProcessScales& start, std::size_t tuning_places, bool must,
+                               const RunControl& control);
+
+Result<std::unique_ptr<PositionModel>> fitPoses(const PoseSystem& system);
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPoses(PoseSystem system);
+
+/// @param parameters as PositionModel::parameters stores them
+std::unique_ptr<PositionModel> readPoses(const JsonReader& parameters);
+
+}  // namespace fieldtrue::correctors
