@@ -265,7 +265,7 @@ std::vector<Setting> gaussianProcessSettings() {
       declare::choice("inputs", "Inputs", {"auto", "position", "pose"}, "auto",
                       "What the error is a function of: the tracked position, or the whole tracked pose. auto takes "
                       "the pose where rows are turned differently, the evidence gains 3 nats for each further "
-                      "parameter and the error at places left out is less."),
+                      "parameter and the error at places left out is 3 % less."),
       declare::choice("nu", "Smoothness", {"1.5", "2.5"}, "2.5",
                       "Of the Matern kernel: fields with nu = 2.5 have two derivatives, with 1.5 one."),
       declare::integer("restarts", "Starts", {1, 20}, 3,

@@ -33,7 +33,7 @@ struct PoseChoice {
 bool hasSeveralOrientations(const FitData& data);
 
 /// Chooses between position alone and poses, and finds the scales. Poses need 3 nats of restricted likelihood a further
-/// parameter, and less error at rows whose places are left out.
+/// parameter, and 3 % less error at rows whose places are left out.
 /// @param places merged rows of the data; @param frame around them; @param start scales of the process over positions
 /// @param must take poses whatever the comparison says
 /// @error kUnsupported with `must` where all rows are turned alike; as MemoryBooking::book; kCancelled

@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""What orientation as an input of the position error is worth, on places that no fit saw.
+
+orientation_gain.py FIELDTRUE-CLI [TABLE.nodes.csv ...]
+
+Makes tables of simulated rooms, permutes the orientations of some, and takes the tables given besides. Of each the places
+are dealt to ten folds; every fold's table is fitted with the others alone (alignment, scales, choice of inputs and all)
+and its own rows are corrected by `apply`. Folds, errors and intervals are this script's own: it asks the program for no
+judgement. Printed are the RMS over places with position alone, with `inputs=auto` and with `inputs=pose`, and the change of
+the RMS from position alone to `auto` with its paired 90 % interval (bootstrap over places).
+"""
+import csv
+import itertools
+import json
+import math
+import os
+import random
+import subprocess
+import sys
+import tempfile
+
+FOLDS = 10
+INPUTS = ("position", "auto", "pose")
+POSITION = ("x_m", "y_m", "z_m")
+TURN = ("qw", "qx", "qy", "qz")
+
+
+def scene(name, effects):
+    return {"schema": "fieldtrue.scene/1", "name": name, "rig": {"tolerance_m": 0.0005, "tolerance_rad": 0.002},
+            "effects": [{"id": kind, "parameters": parameters} for kind, parameters in effects]}
+
+
+METAL = ("compact_metal", {"center_m": [0.7, 0.4, -0.5], "radius_m": 0.12, "material": "conductive"})
+COILS = [("coil_gain", {"receiver_gain": [0.01, -0.01, 0.005]}),
+         ("coil_nonorthogonality", {"receiver_rad": [0.005, -0.01, 0.005]}),
+         ("finite_coil", {"coil": "receiver", "radius_m": [0.02, 0.015, 0.01]})]
+SCENES = {"unequal coils": scene("unequal coils", COILS), "metal": scene("metal", [METAL]),
+          "metal and unequal coils": scene("metal and unequal coils", [METAL] + COILS)}
+
+
+def random_turn(draw):
+    q = [draw.gauss(0, 1) for _ in range(4)]
+    norm = math.sqrt(sum(part * part for part in q))
+    return [part / norm for part in q]
+
+
+def scattered_plan(draw):
+    """Every place in an orientation of its own."""
+    nodes = []
+    for number, (i, j, k) in enumerate(itertools.product(range(6), range(6), range(4))):
+        nodes.append(dict(zip(("node", "x_m", "y_m", "z_m") + TURN,
+                              [number, 0.3 + 0.14 * i, -0.35 + 0.14 * j, -0.3 + 0.14 * k] + random_turn(draw))))
+    return {"schema": "fieldtrue.plan/1", "nodes": nodes}
+
+
+class Program:
+    def __init__(self, path, folder):
+        self.path, self.folder = path, folder
+
+    def run(self, *arguments):
+        ended = subprocess.run([self.path, *arguments], text=True, capture_output=True, check=False)
+        if ended.returncode != 0:
+            sys.exit(f"{' '.join(arguments)}: {ended.stderr.strip()}")
+        return ended.stdout
+
+    def file(self, name):
+        return os.path.join(self.folder, name)
+
+    def simulated(self, room, plan):
+        with open(self.file("room.scene.json"), "w", encoding="utf-8") as out:
+            json.dump(room, out)
+        if isinstance(plan, dict):
+            with open(self.file("some.plan.json"), "w", encoding="utf-8") as out:
+                json.dump(plan, out)
+            plan = self.file("some.plan.json")
+        self.run("simulate", "--scene", self.file("room.scene.json"), "--plan", plan, "--seed", "7", "--nodes",
+                 self.file("all.nodes.csv"))
+        return Table(self.file("all.nodes.csv"))
+
+
+class Table:
+    def __init__(self, path):
+        with open(path, encoding="utf-8") as text:
+            lines = text.read().splitlines()
+        self.head = [line for line in lines if line.startswith("#")]
+        self.rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+    def write(self, path, rows):
+        with open(path, "w", encoding="utf-8", newline="") as out:
+            out.write("".join(line + "\n" for line in self.head))
+            writer = csv.DictWriter(out, self.rows[0].keys(), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+
+    def permuted(self, draw):
+        """Turns of other rows, tracked and true alike."""
+        names = [name for name in self.rows[0] if name in TURN or name in [turn[:2] + "_true" for turn in TURN]]
+        turns = [[row[name] for name in names] for row in self.rows]
+        draw.shuffle(turns)
+        for row, turn in zip(self.rows, turns):
+            row.update(zip(names, turn))
+        return self
+
+
+def squares_by_place(program, table, inputs):
+    """{place: mean squared error of its rows [mm2]}, each by a fit that saw none of them."""
+    places = sorted({row["node"] for row in table.rows}, key=int)
+    random.Random(5).shuffle(places)
+    fold_of = {place: number % min(FOLDS, len(places)) for number, place in enumerate(places)}
+    squares = {place: [] for place in places}
+    for fold in sorted(set(fold_of.values())):
+        table.write(program.file("seen.nodes.csv"), [row for row in table.rows if fold_of[row["node"]] != fold])
+        table.write(program.file("unseen.csv"), [row for row in table.rows if fold_of[row["node"]] == fold])
+        program.run("fit", "--nodes", program.file("seen.nodes.csv"), "--position", f"gaussian_process:inputs={inputs}",
+                    "--out", program.file("fold.ftcal.json"))
+        program.run("apply", "--calibration", program.file("fold.ftcal.json"), "--in", program.file("unseen.csv"), "--out",
+                    program.file("corrected.csv"), "--force")
+        for row in Table(program.file("corrected.csv")).rows:
+            squares[row["node"]].append(sum((1e3 * (float(row[f"{axis}_corrected_m"]) - float(row[f"{axis}_true_m"]))) ** 2
+                                            for axis in "xyz"))
+    return {place: sum(rows) / len(rows) for place, rows in squares.items()}
+
+
+def rms(squares, places):
+    return math.sqrt(sum(squares[place] for place in places) / len(places))
+
+
+def paired_interval(a, b):
+    """90 % of the relative change of the RMS from a to b."""
+    draw, places = random.Random(11), list(a)
+    changes = []
+    for _ in range(2000):
+        some = draw.choices(places, k=len(places))
+        changes.append(rms(b, some) / rms(a, some) - 1)
+    changes.sort()
+    return changes[100], changes[1899]
+
+
+def main():
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    print("| table | rows | position alone | auto | pose | change by auto, 90 % |\n|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        program = Program(sys.argv[1], folder)
+
+        def line(name, table):
+            squares = {inputs: squares_by_place(program, table, inputs) for inputs in INPUTS}
+            low, high = paired_interval(squares["position"], squares["auto"])
+            figures = [rms(squares[inputs], list(squares[inputs])) for inputs in INPUTS]
+            change = figures[1] / figures[0] - 1
+            print(f"| {name} | {len(table.rows)} | " + " | ".join(f"{figure:.3g}" for figure in figures) +
+                  f" | {100 * change:+.0f} % ({100 * low:+.0f} to {100 * high:+.0f}) |", flush=True)
+
+        for name, room in SCENES.items():
+            for turns in (3, 6):
+                line(f"{name}, {turns} orientations", program.simulated(room, f"grid:4x4x3@0.2:orientations={turns}"))
+            line(f"{name}, each place turned at random", program.simulated(room, scattered_plan(random.Random(2))))
+        for name in ("unequal coils", "metal"):
+            permuted = program.simulated(SCENES[name], "grid:4x4x3@0.2:orientations=6").permuted(random.Random(3))
+            line(f"{name}, 6 orientations permuted", permuted)
+        for path in sys.argv[2:]:
+            line(os.path.basename(path).removesuffix(".nodes.csv"), Table(path))
+
+
+if __name__ == "__main__":
+    main()
