@@ -58,6 +58,10 @@ class CliBarrierTest : public QObject {
     options.smooth_distortion_m = 0.02;
     options.counts = {8, 8, 7};
     FT_VERIFY_OK(writeNodeTable(std::filesystem::path(at("some.csv").toStdString()), syntheticTable(options)));
+    options.counts = {4, 4, 3};
+    options.orientations = 6;
+    FT_VERIFY_OK(writeNodeTable(std::filesystem::path(at("turned.csv").toStdString()), syntheticTable(options)));
+    options.orientations = 1;
     options.counts = {20, 20, 15};
     FT_VERIFY_OK(writeNodeTable(std::filesystem::path(at("many.csv").toStdString()), syntheticTable(options)));
   }
@@ -71,6 +75,16 @@ class CliBarrierTest : public QObject {
     FT_VERIFY_MATCH(holdsAll(run.err.toStdString(),
                              {"Hardy's multiquadric on 448 places needs about 14 MiB", "80 % of the 1 MiB"}));
     QVERIFY(!QFileInfo::exists(at("no.ftcal.json")));
+  }
+
+  void posesBeyondMemoryLeavePositionAlone() {
+    const CliRun run = runWith(
+        "FIELDTRUE_MEMORY_MIB", "1",
+        {"fit", "--nodes", at("turned.csv"), "--position", "gaussian_process", "--out", at("position.ftcal.json")});
+    FT_VERIFY_STATUS(run, 0);
+    FT_VERIFY_MATCH(
+        holdsAll(run.out.toStdString(),
+                 {"Position alone: A Gaussian process over poses on 288 places needs about", "80 % of the 1 MiB"}));
   }
 
   void theComparisonSkipsIt() {

@@ -248,9 +248,12 @@ Result<PoseChoice> choosePoses(const FitData& data, const Places& places, Radial
   PoseSystem system;
   system.kernel = kernel;
   system.frame = frame;
-  FT_TRY(auto memory,
-         bookSquareMatrices("A Gaussian process over poses", kGaussianProcessMatrices, data.size(), control));
-  system.memory = std::move(memory);
+  auto memory = bookSquareMatrices("A Gaussian process over poses", kGaussianProcessMatrices, data.size(), control);
+  if (!memory) {
+    if (must || memory.error().code == ErrorCode::kCancelled) return tl::unexpected(memory.error());
+    return PoseChoice{std::nullopt, "Position alone: " + memory.error().message + "."};
+  }
+  system.memory = *std::move(memory);
   system.rows = rowsOf(data, places);
   const auto n = static_cast<Eigen::Index>(data.size());
   system.displacement_m.resize(n, 3);
