@@ -11,6 +11,10 @@
 namespace fieldtrue::correctors {
 namespace {
 
+/// A metal body turns the readings of a sensor that is set down in one orientation, some of them by several degrees;
+/// such turns foretell its other errors there, and mislead in every other orientation.
+constexpr double kTurnedAlike_rad = 15.0 * kRadPerDeg;
+constexpr double kShareTurnedAlike = 0.9;
 constexpr std::size_t kMostPoses = 10000;  // 800 MB for the matrix.
 constexpr double kNatsAParameter = 3.0;
 /// By one per cent the error left out falls where orientation says nothing, too: three parameters more follow the
@@ -28,11 +32,14 @@ constexpr int kPoseIterations = 40;
 /// nothing in common.
 struct TurnPrior {
   static constexpr double kLeastLength = -0.7;  ///< log 0.5 [log rad]
+  static constexpr double kMostSd = 0.4;        ///< log 1.5, beside what the trend leaves.
   static constexpr double kWallSd = 0.05;       ///< Of all places together.
   static constexpr std::array<double, kTurnParameters> kSd = {2.0, 1.0, 0.7};
   std::array<double, kTurnParameters> middle{};
+  double most = 0.0;
 
-  explicit TurnPrior(const WeakPrior& field) : middle{field.signal + std::log(0.5), 0.0, std::log(1.5)} {}
+  explicit TurnPrior(const WeakPrior& field)
+      : middle{field.signal + std::log(0.5), 0.0, std::log(1.5)}, most(field.signal + kMostSd) {}
 
   /// Minus twice its logarithm. @param gradient added to, unless null
   double add(const double* point, double n_rows, double* gradient) const {
@@ -42,12 +49,14 @@ struct TurnPrior {
       value += off * off;
       if (gradient != nullptr) gradient[i] += 2.0 * off / kSd[i];
     }
-    const double below = (point[kTurnParameters - 1] - kLeastLength) * std::sqrt(n_rows) / kWallSd;
-    if (below < 0.0) {
-      value += below * below;
-      if (gradient != nullptr) gradient[kTurnParameters - 1] += 2.0 * below * std::sqrt(n_rows) / kWallSd;
+    const double wall = std::sqrt(n_rows) / kWallSd;
+    const double below = wall * std::min(0.0, point[kTurnParameters - 1] - kLeastLength);
+    const double above = wall * std::max(0.0, point[0] - most);
+    if (gradient != nullptr) {
+      gradient[kTurnParameters - 1] += 2.0 * wall * below;
+      gradient[0] += 2.0 * wall * above;
     }
-    return value;
+    return value + below * below + above * above;
   }
 };
 
@@ -224,9 +233,16 @@ std::optional<PoseGain> gainOfPoses(const PoseSystem& system, const GaussianProc
 }  // namespace
 
 bool hasSeveralOrientations(const FitData& data) {
-  return std::any_of(data.q_tracked.begin(), data.q_tracked.end(), [&](const Eigen::Quaterniond& q) {
-    return angleBetween_rad(q, data.q_tracked.front()) > kSameOrientation_rad;
-  });
+  const auto n_alike = [&data](const Eigen::Quaterniond& q) {
+    return std::count_if(data.q_tracked.begin(), data.q_tracked.end(), [&q](const Eigen::Quaterniond& other) {
+      return angleBetween_rad(q, other) < kTurnedAlike_rad;
+    });
+  };
+  const auto most_alike = kShareTurnedAlike * static_cast<double>(data.q_tracked.size());
+  const std::vector<Eigen::Quaterniond> distinct = distinctRotations(data.q_tracked, kSameOrientation_rad);
+  return data.hasOrientation() && std::none_of(distinct.begin(), distinct.end(), [&](const Eigen::Quaterniond& q) {
+           return static_cast<double>(n_alike(q)) > most_alike;
+         });
 }
 
 Result<PoseChoice> choosePoses(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
@@ -234,9 +250,11 @@ Result<PoseChoice> choosePoses(const FitData& data, const Places& places, Radial
                                const RunControl& control) {
   if (!hasSeveralOrientations(data)) {
     if (must)
-      return fail(ErrorCode::kUnsupported, "inputs=pose needs rows in several orientations, and all " +
-                                               std::to_string(data.size()) + " rows are " +
-                                               (data.hasOrientation() ? "within 5 degrees of one" : "without one"));
+      return fail(ErrorCode::kUnsupported,
+                  "inputs=pose needs rows in several orientations, and " +
+                      (data.hasOrientation() ? "nine of ten of these " + std::to_string(data.size()) +
+                                                   " rows are turned within 15 degrees of one"
+                                             : std::string("these have none")));
     return PoseChoice{};
   }
   if (data.size() > kMostPoses) {

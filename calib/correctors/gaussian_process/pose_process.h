@@ -36,7 +36,7 @@ bool hasSeveralOrientations(const FitData& data);
 /// parameter, and 3 % less error at rows whose places are left out.
 /// @param places merged rows of the data; @param frame around them; @param start scales of the process over positions
 /// @param must take poses whatever the comparison says
-/// @error kUnsupported with `must` where all rows are turned alike; as MemoryBooking::book; kCancelled
+/// @error kUnsupported with `must` where rows are turned alike; as MemoryBooking::book; kCancelled
 Result<PoseChoice> choosePoses(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
                                const GaussianProcessScales& start, std::size_t tuning_places, bool must,
                                const RunControl& control);
