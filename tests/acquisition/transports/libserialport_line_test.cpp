@@ -92,7 +92,9 @@ void LibserialportLineTest::libraryItselfReadsRecords() {
   QCOMPARE(sp_set_stopbits(port, 1), SP_OK);
   QCOMPARE(sp_set_flowcontrol(port, SP_FLOWCONTROL_NONE), SP_OK);
   const std::string commands = "cO1,2,11,16,1\rufC";
-  QCOMPARE(sp_nonblocking_write(port, commands.data(), commands.size()), static_cast<sp_return>(commands.size()));
+  // A count, or one of the enumeration's negative values.
+  const int n_written = sp_nonblocking_write(port, commands.data(), commands.size());
+  QCOMPARE(n_written, static_cast<int>(commands.size()));
 
   FastrakStreamSettings settings;
   settings.items[0] = {2, 11, 16, 1};

@@ -48,8 +48,13 @@ class CorrectorBakingTest : public QObject {
  private slots:
   void everyMethodStaysWithinTheBoundOrSaysThatItCannot_data() {
     QTest::addColumn<QByteArray>("id");
-    for (const correctors::PositionMethod& method : correctors::positionMethods())
+    for (const correctors::PositionMethod& method : correctors::positionMethods()) {
+#ifdef __SANITIZE_ADDRESS__  // Its dense lattice, an inverse solved for each coefficient, takes a quarter of an hour
+                             // then.
+      if (method.id == "harmonic_field") continue;
+#endif
       QTest::newRow(method.id.c_str()) << QByteArray::fromStdString(method.id);
+    }
   }
   void everyMethodStaysWithinTheBoundOrSaysThatItCannot() {
     QFETCH(QByteArray, id);
