@@ -49,8 +49,7 @@ class CorrectorBakingTest : public QObject {
   void everyMethodStaysWithinTheBoundOrSaysThatItCannot_data() {
     QTest::addColumn<QByteArray>("id");
     for (const correctors::PositionMethod& method : correctors::positionMethods()) {
-#ifdef __SANITIZE_ADDRESS__  // Its dense lattice, an inverse solved for each coefficient, takes a quarter of an hour
-                             // then.
+#ifdef __SANITIZE_ADDRESS__  // Its dense lattice then takes a quarter of an hour: an inverse for each coefficient.
       if (method.id == "harmonic_field") continue;
 #endif
       QTest::newRow(method.id.c_str()) << QByteArray::fromStdString(method.id);
