@@ -438,7 +438,7 @@ class CliChainTest : public QObject {
   static void verifyCorrected(const QByteArray& line, const Eigen::Vector4d& expected_m) {
     const QByteArrayList cells = line.split(',');
     for (int axis = 0; axis < 3; ++axis) {
-      FT_VERIFY_MATCH(near(cells.at(cells.size() - 9 + axis).toDouble(), expected_m[axis], 1e-9));
+      FT_VERIFY_MATCH(near(cells.at(cells.size() - 10 + axis).toDouble(), expected_m[axis], 1e-9));
     }
   }
 

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "calib/core/spacing.h"
 #include "calib/core/units.h"
@@ -20,10 +21,14 @@ constexpr double kNatsAParameter = 3.0;
 /// By one per cent the error left out falls where orientation says nothing, too: three parameters more follow the
 /// noise.
 constexpr double kClearlyLess = 0.97;
-constexpr std::size_t kTurnParameters = PoseLikelihood::kParameters - kFieldParameters;
+constexpr std::size_t kPositionParameters = PoseLikelihood::kPositionParameters;
+constexpr std::size_t kTurnParameters = PoseLikelihood::kParameters - kPositionParameters;
 constexpr std::size_t kRowsOfPoseStarts = 200;
 constexpr int kPoseStartIterations = 25;
 constexpr int kPoseIterations = 40;
+constexpr std::size_t kSearchesOfAll = 2;
+constexpr double kLeastScatter = -9.0;  // log 1e-4, beside what the trend leaves.
+constexpr double kRowSd = 3.0;          // Of the logarithm of the rows' own SD about a tenth of what the trend leaves.
 
 /// The weak prior of the part that turns: logarithms of its SD beside the signal's, of its stretch and of its length.
 /// And a wall: what coils do is of low degree in the rotation (gains and skew of the second), so that no length is far
@@ -67,39 +72,52 @@ struct Search {
   const TurnPrior& turn_prior;
   const RunControl& control;
 
-  std::optional<Optimum> from(std::span<const double> start, int iterations) const {
+  /// Minus twice the logarithm, prior included, per row. @param gradient out, unless null
+  std::optional<double> cost(const double* point, std::size_t n_parameters, double* gradient) const {
     const auto n_rows = static_cast<double>(likelihood.size());
-    const std::size_t n_parameters = start.size();
-    const LogLikelihood cost = [&](const double* point, double* gradient) -> std::optional<double> {
-      const auto value = likelihood.evaluate({point, n_parameters}, gradient);
-      if (!value) return std::nullopt;
-      double sum = *value + field_prior.add(point, n_rows, gradient);
-      if (n_parameters > kFieldParameters)
-        sum += turn_prior.add(point + kFieldParameters, n_rows, gradient ? gradient + kFieldParameters : nullptr);
-      for (std::size_t k = 0; gradient != nullptr && k < n_parameters; ++k) gradient[k] /= n_rows;
-      return sum / n_rows;
-    };
-    return minimise(cost, start, iterations, control);
+    const auto value = likelihood.evaluate({point, n_parameters}, gradient);
+    if (!value) return std::nullopt;
+    double sum = *value + field_prior.add(point, n_rows, gradient);
+    const double off = (point[kFieldParameters] - field_prior.nugget) / kRowSd;
+    sum += off * off;
+    if (gradient != nullptr) gradient[kFieldParameters] += 2.0 * off / kRowSd;
+    // Neither scatter is larger than the errors, nor so small that rounding decides.
+    const double wall = std::sqrt(n_rows) / TurnPrior::kWallSd;
+    for (const std::size_t scatter : {kFieldParameters - 1, kFieldParameters}) {
+      const double inside = std::clamp(point[scatter], field_prior.signal + kLeastScatter, field_prior.signal);
+      const double beyond = wall * (point[scatter] - inside);
+      sum += beyond * beyond;
+      if (gradient != nullptr) gradient[scatter] += 2.0 * wall * beyond;
+    }
+    if (n_parameters > kPositionParameters)
+      sum += turn_prior.add(point + kPositionParameters, n_rows, gradient ? gradient + kPositionParameters : nullptr);
+    for (std::size_t k = 0; gradient != nullptr && k < n_parameters; ++k) gradient[k] /= n_rows;
+    return sum / n_rows;
+  }
+
+  std::optional<Optimum> from(std::span<const double> start, int iterations) const {
+    return minimise([&](const double* point, double* gradient) { return cost(point, start.size(), gradient); }, start,
+                    iterations, control);
   }
 };
 
 std::vector<double> logarithmsOf(const GaussianProcessScales& scales) {
   return {std::log(scales.length_m.x()), std::log(scales.length_m.y()), std::log(scales.length_m.z()),
-          std::log(scales.signal_sd_m), std::log(scales.nugget_sd_m)};
+          std::log(scales.signal_sd_m),  std::log(scales.nugget_sd_m),  std::log(scales.nugget_sd_m)};
 }
 
 /// Starts of poses from the best of position alone: what turns as large as half the residual, and smoother in space; as
 /// large as what position left unexplained.
 std::vector<std::vector<double>> startsOf(const std::vector<double>& position, const WeakPrior& prior) {
   std::vector<std::vector<double>> starts;
-  const double unexplained = position[kFieldParameters - 1];
+  const double unexplained = position[kFieldParameters];
   const std::array<std::array<double, kTurnParameters>, 3> turns = {
       {{prior.signal + std::log(0.5), 0.0, std::log(1.2)},
        {prior.signal, std::log(3.0), std::log(3.0)},
        {std::max(unexplained, prior.signal + std::log(0.05)), 0.0, std::log(1.0)}}};
   for (const auto& turn : turns) {
     starts.push_back(position);
-    starts.back()[kFieldParameters - 1] = unexplained - std::log(3.0);
+    starts.back()[kFieldParameters] = unexplained - std::log(3.0);
     starts.back().insert(starts.back().end(), turn.begin(), turn.end());
   }
   return starts;
@@ -125,13 +143,17 @@ PoseRows rowsOf(const FitData& data, const Places& places) {
   return rows;
 }
 
-/// All rows of so many well-spread places that they are no more than `most`, ascending.
-std::vector<std::size_t> spreadRows(const Places& places, std::size_t n_rows, std::size_t most) {
+/// So many well-spread places that their rows are no more than about `most`.
+std::vector<std::size_t> placesOfAbout(const Places& places, std::size_t n_rows, std::size_t most) {
   const double share = std::min(1.0, static_cast<double>(most) / static_cast<double>(n_rows));
   const auto n_places = static_cast<std::size_t>(share * static_cast<double>(places.size()));
+  return spreadPlaces(places.p_tracked_m, std::max<std::size_t>(n_places, 5));
+}
+
+/// Ascending.
+std::vector<std::size_t> rowsOfPlaces(const Places& places, std::span<const std::size_t> some) {
   std::vector<std::size_t> rows;
-  for (const std::size_t place : spreadPlaces(places.p_tracked_m, std::max<std::size_t>(n_places, 5)))
-    rows.insert(rows.end(), places.rows[place].begin(), places.rows[place].end());
+  for (const std::size_t place : some) rows.insert(rows.end(), places.rows[place].begin(), places.rows[place].end());
   std::sort(rows.begin(), rows.end());
   return rows;
 }
@@ -143,24 +165,52 @@ Eigen::MatrixXd rowsOfMatrix(const Eigen::MatrixXd& all, std::span<const std::si
   return some;
 }
 
-/// RMS over rows whose places are left out, with these scales kept; infinite where they cannot be told.
-double heldOutRms_m(const PoseSystem& system, const PoseScales& scales, const PoseRows& rows,
-                    const Eigen::MatrixXd& displacement_m, const Eigen::MatrixXd& tracked_m) {
+/// RMS over places, each left out with all its rows, with these scales kept; infinite where it cannot be told.
+double heldOutRms_m(const PoseSystem& system, const PoseScales& scales, std::span<const std::size_t> used) {
+  const PoseRows rows = system.rows.only(used);
   const auto projection = TailProjection::of(system.frame.tail(rows.p_m));
   if (!projection) return HUGE_VAL;
-  const auto solutions = RadialHoldOut::of(*projection, poseCovariance(system.kernel, system.frame, scales, rows),
-                                           displacement_m, tracked_m);
+  const auto solutions =
+      RadialHoldOut::of(*projection, poseCovariance(system.kernel, system.frame, scales, rows),
+                        rowsOfMatrix(system.displacement_m, used), rowsOfMatrix(system.tracked_m, used));
   if (!solutions) return HUGE_VAL;
-  std::vector<std::vector<std::size_t>> of_place(*std::max_element(rows.place.begin(), rows.place.end()) + 1);
+  std::map<std::size_t, std::vector<std::size_t>> of_place;
   for (std::size_t row = 0; row < rows.size(); ++row) of_place[rows.place[row]].push_back(row);
   double squares_m2 = 0.0;
-  for (const std::vector<std::size_t>& out : of_place) {
-    if (out.empty()) continue;
+  for (const auto& [place, out] : of_place) {
     const auto errors_m = solutions->leftOutErrors(out);
     if (!errors_m) return HUGE_VAL;
-    squares_m2 += errors_m->squaredNorm();
+    squares_m2 += errors_m->squaredNorm() / static_cast<double>(out.size());
   }
-  return std::sqrt(squares_m2 / static_cast<double>(rows.size()));
+  return std::sqrt(squares_m2 / static_cast<double>(of_place.size()));
+}
+
+/// The same of the process over positions as it would be fitted instead: to the means of the places.
+double heldOutRmsOfPosition_m(const FitData& data, const Places& places, const PoseSystem& system,
+                              const GaussianProcessScales& scales, std::span<const std::size_t> used) {
+  const Eigen::VectorXd all_noise_m2 = placeNoise_m2(data, places);
+  const Eigen::MatrixXd displacement_m = rowsOfMatrix(displacementMatrix(places), used);
+  const Eigen::VectorXd noise_m2 = rowsOfMatrix(all_noise_m2, used);
+  std::vector<Eigen::Vector3d> p_m;
+  for (const std::size_t place : used) p_m.push_back(places.p_tracked_m[place]);
+  const auto projection = TailProjection::of(system.frame.tail(p_m));
+  if (!projection) return HUGE_VAL;
+  const auto solutions =
+      RadialHoldOut::of(*projection, covarianceMatrix(system.kernel, system.frame, scales, p_m, noise_m2),
+                        displacement_m, rowsOfMatrix(positionMatrix(places), used));
+  if (!solutions) return HUGE_VAL;
+  const Eigen::MatrixXd of_means_m = solutions->leaveOneOutErrors();
+  double squares_m2 = 0.0;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const std::vector<std::size_t>& rows = places.rows[used[i]];
+    const auto place = static_cast<Eigen::Index>(i);
+    for (const std::size_t row : rows)
+      squares_m2 += (of_means_m.row(place) + system.displacement_m.row(static_cast<Eigen::Index>(row)) -
+                     displacement_m.row(place))
+                        .squaredNorm() /
+                    static_cast<double>(rows.size());
+  }
+  return std::sqrt(squares_m2 / static_cast<double>(used.size()));
 }
 
 /// How poses compare with position alone on the same rows.
@@ -184,50 +234,60 @@ std::string describedGain(const PoseGain& gain) {
   return text.data();
 }
 
-std::string describedScales(const PoseScales& scales) {
+/// How much changes from one of the orientations to another, and over which angle.
+std::string describedTurn(const PoseSystem& system, const PoseScales& scales) {
+  const std::vector<Eigen::Quaterniond> seen = distinctRotations(system.rows.q, kSameOrientation_rad);
+  double among = 0.0;
+  for (const Eigen::Quaterniond& q : seen)
+    among += turnCorrelation(system.kernel, scales.turn_length_rad, q, seen).mean() / static_cast<double>(seen.size());
+  const double angle_deg = kDegPerRad * scales.turn_length_rad;
   std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(),
-                "SD %.3g mm of what changes as the sensor turns, correlated over %.0f degrees",
-                1000.0 * scales.turn_sd_m, kDegPerRad * scales.turn_length_rad);
-  return text.data();
+  std::snprintf(text.data(), text.size(), "%.3g mm SD over %zu orientations, correlated over ",
+                1000.0 * scales.turn_sd_m * std::sqrt(1.0 - among), seen.size());
+  return text.data() + (angle_deg > 180.0 ? "all angles" : std::to_string(std::lround(angle_deg)) + " degrees");
 }
 
+/// The likeliest of both kinds for the same rows. The errors left out are for the caller to add.
 /// @return none when no start leads anywhere, or on a request to stop
 std::optional<PoseGain> gainOfPoses(const PoseSystem& system, const GaussianProcessScales& start,
                                     std::span<const std::size_t> used, std::span<const std::size_t> few,
                                     double spacing_m, const RunControl& control) {
-  const PoseRows rows = system.rows.only(used);
-  const Eigen::MatrixXd displacement_m = rowsOfMatrix(system.displacement_m, used);
-  const auto full = PoseLikelihood::of(system.kernel, system.frame, rows, displacement_m);
+  const auto full = PoseLikelihood::of(system.kernel, system.frame, system.rows.only(used),
+                                       rowsOfMatrix(system.displacement_m, used));
   const auto small =
       PoseLikelihood::of(system.kernel, system.frame, system.rows.only(few), rowsOfMatrix(system.displacement_m, few));
   if (!full || !small) return std::nullopt;
-  const WeakPrior field_prior(full->residualVariance_m2(), rmsSpread_m(rows.p_m), std::max(spacing_m, 1e-6));
+  const WeakPrior field_prior(full->residualVariance_m2(), rmsSpread_m(system.rows.p_m), std::max(spacing_m, 1e-6));
   const TurnPrior turn_prior(field_prior);
   const Search of_all{*full, field_prior, turn_prior, control};
   const Search of_few{*small, field_prior, turn_prior, control};
 
   auto position = of_all.from(logarithmsOf(start), kPoseIterations);
   if (!position) return std::nullopt;
-  Optimum best{{}, HUGE_VAL};
+  // What is likely for a few rows may be far from it for all, and a search that begins there never comes back.
+  std::vector<Optimum> begins;
+  const auto begin = [&](const std::vector<double>& point) {
+    if (const auto cost = of_all.cost(point.data(), point.size(), nullptr)) begins.push_back({point, *cost});
+  };
   for (const std::vector<double>& one : startsOf(position->parameters, field_prior)) {
-    const auto optimum = of_few.from(one, kPoseStartIterations);
-    if (optimum && optimum->cost < best.cost) best = *optimum;
+    begin(one);
+    if (const auto optimum = of_few.from(one, kPoseStartIterations)) begin(optimum->parameters);
+  }
+  const auto less = [](const Optimum& a, const Optimum& b) { return a.cost < b.cost; };
+  std::sort(begins.begin(), begins.end(), less);
+  Optimum best{{}, HUGE_VAL};
+  for (std::size_t i = 0; i < std::min(begins.size(), kSearchesOfAll); ++i) {
+    const auto optimum = of_all.from(begins[i].parameters, kPoseIterations);
+    best = std::min({best, begins[i], optimum.value_or(begins[i])}, less);
   }
   if (!std::isfinite(best.cost)) return std::nullopt;
-  if (const auto optimum = of_all.from(best.parameters, kPoseIterations)) best = *optimum;
   // What the search over poses found of the field alone is not orientation's merit.
-  const auto again = of_all.from(std::span(best.parameters).first(kFieldParameters), kPoseIterations);
+  const auto again = of_all.from(std::span(best.parameters).first(kPositionParameters), kPoseIterations);
   if (again && again->cost < position->cost) position = again;
   const auto of_position = full->evaluate(position->parameters, nullptr);
   const auto of_pose = full->evaluate(best.parameters, nullptr);
   if (control.stop.stop_requested() || !of_position || !of_pose) return std::nullopt;
-  const Eigen::MatrixXd tracked_m = rowsOfMatrix(system.tracked_m, used);
-  const auto held_out_m = [&](const std::vector<double>& parameters) {
-    return heldOutRms_m(system, poseScalesOf(parameters), rows, displacement_m, tracked_m);
-  };
-  return PoseGain{poseScalesOf(best.parameters), 0.5 * (*of_position - *of_pose), held_out_m(position->parameters),
-                  held_out_m(best.parameters)};
+  return PoseGain{poseScalesOf(best.parameters), 0.5 * (*of_position - *of_pose)};
 }
 
 }  // namespace
@@ -281,19 +341,23 @@ Result<PoseChoice> choosePoses(const FitData& data, const Places& places, Radial
     system.tracked_m.row(i) = data.p_tracked_m[row].transpose();
     system.displacement_m.row(i) = (data.p_true_m[row] - data.p_tracked_m[row]).transpose();
   }
-  const std::vector<std::size_t> used = spreadRows(places, data.size(), tuning_places);
-  const std::vector<std::size_t> few = spreadRows(places, data.size(), kRowsOfPoseStarts);
-  const auto gain = gainOfPoses(system, start, used, few, medianSpacing_m(places.p_tracked_m), control);
+  const std::vector<std::size_t> used_places = placesOfAbout(places, data.size(), tuning_places);
+  const std::vector<std::size_t> used = rowsOfPlaces(places, used_places);
+  const std::vector<std::size_t> few = rowsOfPlaces(places, placesOfAbout(places, data.size(), kRowsOfPoseStarts));
+  auto gain = gainOfPoses(system, start, used, few, medianSpacing_m(places.p_tracked_m), control);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
   if (!gain) {
     if (must)
       return fail(ErrorCode::kDegenerate, "inputs=pose: no scales fit these " + std::to_string(data.size()) + " rows");
     return PoseChoice{std::nullopt, "Position alone: no scales fit poses."};
   }
+  gain->pose_m = heldOutRms_m(system, gain->scales, used);
+  gain->position_m = heldOutRmsOfPosition_m(data, places, system, start, used_places);
   if (!must && !gain->isGain())
     return PoseChoice{std::nullopt, "Position alone: orientation brings " + describedGain(*gain) + "."};
   system.scales = gain->scales;
-  system.note = "Takes orientation: " + describedScales(gain->scales) + "; " + describedGain(*gain) + ".";
+  system.note = "Takes orientation: what changes as the sensor turns has " + describedTurn(system, gain->scales) +
+                "; " + describedGain(*gain) + ".";
   return PoseChoice{std::move(system), {}};
 }
 

@@ -76,6 +76,7 @@ Eigen::MatrixXd poseCovariance(RadialKernel kernel, const FieldFrame& frame, con
                                const PoseRows& rows) {
   const double signal_m2 = squared(scales.field.signal_sd_m);
   const double turn_m2 = squared(scales.turn_sd_m);
+  const double of_place_m2 = rows.placing_m2 + squared(scales.field.nugget_sd_m);
   const LocalRows local(scaledFrame(frame, scales.field), rows.p_m);
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd covariance(n, n);
@@ -95,19 +96,20 @@ Eigen::MatrixXd poseCovariance(RadialKernel kernel, const FieldFrame& frame, con
       below.array() += turn_m2 * q.head(n - j - 1).array() * turned.head(n - j - 1).array();
     }
     for (std::size_t i = 0; i < count; ++i)
-      if (rows.place[row + 1 + i] == rows.place[row]) below[static_cast<Eigen::Index>(i)] += rows.placing_m2;
-    covariance(j, j) = (1.0 + kGaussianProcessJitter) * (signal_m2 + turn_m2) + rows.noise_m2[row] + rows.placing_m2 +
-                       squared(scales.field.nugget_sd_m);
+      if (rows.place[row + 1 + i] == rows.place[row]) below[static_cast<Eigen::Index>(i)] += of_place_m2;
+    covariance(j, j) = (1.0 + kGaussianProcessJitter) * (signal_m2 + turn_m2 + of_place_m2) + rows.noise_m2[row] +
+                       squared(scales.row_sd_m);
   }
   return covariance;
 }
 
 PoseScales poseScalesOf(std::span<const double> parameters) {
-  PoseScales scales{scalesOf(parameters)};
-  if (parameters.size() == kFieldParameters) return scales;
-  scales.turn_sd_m = std::exp(parameters[kFieldParameters]);
-  scales.turn_stretch = std::exp(parameters[kFieldParameters + 1]);
-  scales.turn_length_rad = std::exp(parameters[kFieldParameters + 2]);
+  PoseScales scales{scalesOf(parameters), std::exp(parameters[kFieldParameters])};
+  if (parameters.size() == PoseLikelihood::kPositionParameters) return scales;
+  const auto turn = parameters.subspan(PoseLikelihood::kPositionParameters);
+  scales.turn_sd_m = std::exp(turn[0]);
+  scales.turn_stretch = std::exp(turn[1]);
+  scales.turn_length_rad = std::exp(turn[2]);
   return scales;
 }
 
@@ -127,7 +129,7 @@ std::optional<PoseLikelihood> PoseLikelihood::of(RadialKernel kernel, const Fiel
 }
 
 std::optional<double> PoseLikelihood::evaluate(std::span<const double> parameters, double* gradient) const {
-  FT_CHECK(parameters.size() == kParameters || parameters.size() == kFieldParameters);
+  FT_CHECK(parameters.size() == kParameters || parameters.size() == kPositionParameters);
   const PoseScales scales = poseScalesOf(parameters);
   auto fit = restrictedFit(*projection_, poseCovariance(kernel_, frame_, scales, rows_), projected_y_);
   if (!fit) return std::nullopt;
@@ -156,10 +158,14 @@ void PoseLikelihood::addGradient(const Eigen::MatrixXd& inverse, const Eigen::Ma
     const auto below = static_cast<Eigen::Index>(count);
     const double diagonal = kOutputs * inverse(column, column) - weighted_y.row(column).squaredNorm();
     gradient[3] += 2.0 * signal_m2 * (1.0 + kGaussianProcessJitter) * diagonal;
-    gradient[4] += 2.0 * squared(scales.field.nugget_sd_m) * diagonal;
-    gradient[5] += 2.0 * turn_m2 * (1.0 + kGaussianProcessJitter) * diagonal;
+    gradient[4] += 2.0 * squared(scales.field.nugget_sd_m) * (1.0 + kGaussianProcessJitter) * diagonal;
+    gradient[5] += 2.0 * squared(scales.row_sd_m) * diagonal;
+    gradient[6] += 2.0 * turn_m2 * (1.0 + kGaussianProcessJitter) * diagonal;
     const Eigen::ArrayXd d = 2.0 * (kOutputs * inverse.col(column).tail(below) -
                                     weighted_y.bottomRows(below) * weighted_y.row(column).transpose());
+    for (std::size_t i = 0; i < count; ++i)
+      if (rows_.place[j + 1 + i] == rows_.place[j])
+        gradient[4] += 2.0 * squared(scales.field.nugget_sd_m) * d[static_cast<Eigen::Index>(i)];
     local.squaredDistancesBelow(j, q.data());
     radialValues(kernel_, 0.0, q.data(), count, value.data());
     radialSlopes(kernel_, 0.0, q.data(), count, slope.data());
@@ -173,9 +179,9 @@ void PoseLikelihood::addGradient(const Eigen::MatrixXd& inverse, const Eigen::Ma
       radialValues(kernel_, 0.0, chord2.data(), count, turn.data());
       radialSlopes(kernel_, 0.0, chord2.data(), count, turn_slope.data());
       const Eigen::ArrayXd weighted = turn_m2 * d * turn.head(below);
-      gradient[5] += 2.0 * (weighted * turned.head(below)).sum();
-      gradient[6] -= (weighted * turned_slope.head(below) * turned_q.head(below)).sum();
-      gradient[7] -= (turn_m2 * d * turned.head(below) * turn_slope.head(below) * chord2.head(below)).sum();
+      gradient[6] += 2.0 * (weighted * turned.head(below)).sum();
+      gradient[7] -= (weighted * turned_slope.head(below) * turned_q.head(below)).sum();
+      gradient[8] -= (turn_m2 * d * turned.head(below) * turn_slope.head(below) * chord2.head(below)).sum();
       of_square += per_stretch2 * weighted * turned_slope.head(below);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {

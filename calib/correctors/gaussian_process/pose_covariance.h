@@ -18,8 +18,9 @@ namespace fieldtrue::correctors {
 /// c = 2 sin(angle/2) the chord of the rotation between the two, near the angle for small ones. The chord is a distance
 /// between rotation matrices as points of R^9, so that the kernel is positive definite on rotations, and q = -q.
 struct PoseScales {
-  GaussianProcessScales field;
-  double turn_sd_m = 0.0;  ///< Per output: of the part that changes as the sensor turns.
+  GaussianProcessScales field;  ///< Its nugget is shared by the rows of a place: of placing, where that is not stated.
+  double row_sd_m = 0.0;        ///< Per output: what is unexplained of each row for itself.
+  double turn_sd_m = 0.0;       ///< Per output: of the part that changes as the sensor turns.
   double turn_stretch = 1.0;
   double turn_length_rad = 1.0;
 };
@@ -51,14 +52,16 @@ Eigen::MatrixXd poseCovariance(RadialKernel kernel, const FieldFrame& frame, con
 /// RestrictedLikelihood over poses; without the part that turns it is that of position alone, for the same rows.
 class PoseLikelihood {
  public:
-  /// Logarithms: three lengths, signal, nugget; and with the part that turns its SD, its stretch and its length [rad].
-  static constexpr std::size_t kParameters = kFieldParameters + 3;
+  /// Logarithms: three lengths, signal, nugget, the rows' own SD.
+  static constexpr std::size_t kPositionParameters = kFieldParameters + 1;
+  /// And with the part that turns its SD, its stretch and its length [rad].
+  static constexpr std::size_t kParameters = kPositionParameters + 3;
 
   /// @param y displacements of the rows [m] @return none when the rows do not determine the trend
   static std::optional<PoseLikelihood> of(RadialKernel kernel, const FieldFrame& frame, PoseRows rows,
                                           const Eigen::MatrixXd& y);
 
-  /// @param parameters kParameters of them, or the first five for position alone; @param gradient as many, or null
+  /// @param parameters kParameters of them, or kPositionParameters for position alone; @param gradient as many, or null
   /// @return none when the covariance is not positive definite to rounding
   std::optional<double> evaluate(std::span<const double> parameters, double* gradient) const;
 

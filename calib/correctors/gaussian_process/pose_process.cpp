@@ -74,6 +74,7 @@ class PosePosition : public PositionModel {
               {"length_m", jsonOf(scales_.field.length_m)},
               {"signal_sd_m", scales_.field.signal_sd_m},
               {"nugget_sd_m", scales_.field.nugget_sd_m},
+              {"row_sd_m", scales_.row_sd_m},
               {"turn_sd_m", scales_.turn_sd_m},
               {"turn_stretch", scales_.turn_stretch},
               {"turn_length_rad", scales_.turn_length_rad},
@@ -130,7 +131,7 @@ class PosePosition : public PositionModel {
         signal_m2 * field_.kernelValues(p_m) + turn_m2 * turned_.kernelValues(p_m).cwiseProduct(turn);
     const Eigen::VectorXd h = frame_.tail(std::span(&p_m, 1)).row(0).transpose();
     const double field_m2 = lazy_->posterior->variance_m2(signal_m2 + turn_m2 * among, k, h) + turn_m2 * (1.0 - among);
-    return std::sqrt(3.0 * (field_m2 + squareOf(scales_.field.nugget_sd_m)));
+    return std::sqrt(3.0 * (field_m2 + squareOf(scales_.field.nugget_sd_m) + squareOf(scales_.row_sd_m)));
   }
 
   FieldFrame frame_;
@@ -204,9 +205,15 @@ std::unique_ptr<PositionModel> readPoses(const JsonReader& parameters) {
   const FieldFrame frame = FieldFrame::fromJson(pose["frame"]);
   PoseScales scales;
   scales.field = {pose["length_m"].vector3(), pose["signal_sd_m"].number(), pose["nugget_sd_m"].number()};
-  scales.turn_sd_m = pose["turn_sd_m"].number();
-  scales.turn_stretch = pose["turn_stretch"].number();
-  scales.turn_length_rad = pose["turn_length_rad"].number();
+  constexpr Bounds kSd_m{0.0, 10.0}, kPositive{1e-6, 1e6};
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(scales.field.length_m[axis] > 0.0)) pose["length_m"].refuse("three lengths above 0");
+  scales.field.signal_sd_m = pose["signal_sd_m"].number(kSd_m, "m");
+  scales.field.nugget_sd_m = pose["nugget_sd_m"].number(kSd_m, "m");
+  scales.row_sd_m = pose["row_sd_m"].number(kSd_m, "m");
+  scales.turn_sd_m = pose["turn_sd_m"].number(kSd_m, "m");
+  scales.turn_stretch = pose["turn_stretch"].number(kPositive, "");
+  scales.turn_length_rad = pose["turn_length_rad"].number(kPositive, "rad");
   PoseRows rows;
   const Eigen::MatrixXd positions_m = pose["positions_m"].matrix(3);
   for (Eigen::Index i = 0; i < positions_m.rows(); ++i) rows.p_m.emplace_back(positions_m.row(i).transpose());

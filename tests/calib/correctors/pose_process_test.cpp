@@ -83,10 +83,11 @@ struct WrittenOut {
       trend.row(row) << 1.0, p_m[i].transpose();
       for (std::size_t j = 0; j < p_m.size(); ++j) {
         double k = signalAndTurn_m2(p_m[i], turn[i], j);
-        if (pose.at("place").at(i) == pose.at("place").at(j)) k += number("placing_m2");
+        if (pose.at("place").at(i) == pose.at("place").at(j))
+          k += number("placing_m2") + std::pow(number("nugget_sd_m"), 2);
         if (i == j)
-          k += pose.at("noise_m2").at(i).get<double>() + std::pow(number("nugget_sd_m"), 2) +
-               1e-10 * (signal_m2 + turn_m2);
+          k += pose.at("noise_m2").at(i).get<double>() + std::pow(number("row_sd_m"), 2) +
+               1e-10 * (signal_m2 + turn_m2 + number("placing_m2") + std::pow(number("nugget_sd_m"), 2));
         covariance(row, static_cast<Eigen::Index>(j)) = k;
       }
     }
@@ -193,8 +194,9 @@ class PoseProcessTest : public QObject {
   void theSlopeOfTheLikelihood() {
     QFETCH(const RadialKernel, kernel);
     const PoseLikelihood likelihood = someLikelihood(kernel);
-    std::vector<double> at = {std::log(0.3),   std::log(0.4), std::log(0.25), std::log(0.003), std::log(2e-4),
-                              std::log(0.002), 0.2,           std::log(1.1)};
+    const std::vector<double> at = {std::log(0.3),  std::log(0.4),  std::log(0.25),  std::log(0.003),
+                                    std::log(2e-4), std::log(3e-4), std::log(0.002), 0.2,
+                                    std::log(1.1)};
     std::vector<double> slope(at.size());
     QVERIFY(likelihood.evaluate(at, slope.data()).has_value());
     constexpr double kStep = 1e-5;
@@ -220,8 +222,9 @@ class PoseProcessTest : public QObject {
       const auto expected = written.at(pose, displacementsOf(data), allRowsBut(data.size(), {}));
       FT_VERIFY_MATCH(near(model->displacementAt_m(pose), expected.displacement_m.transpose(), 1e-9));
       const double nugget_m = model->parameters().at("pose").at("nugget_sd_m");
-      FT_VERIFY_MATCH(
-          near(*model->uncertaintyAt_m(pose), std::sqrt(3.0 * (expected.variance_m2 + nugget_m * nugget_m)), 1e-9));
+      const double row_m = model->parameters().at("pose").at("row_sd_m");
+      FT_VERIFY_MATCH(near(*model->uncertaintyAt_m(pose),
+                           std::sqrt(3.0 * (expected.variance_m2 + nugget_m * nugget_m + row_m * row_m)), 1e-9));
     }
   }
 
@@ -278,9 +281,9 @@ class PoseProcessTest : public QObject {
       last_m = now_m;
     }
     const nlohmann::json pose = model->parameters().at("pose");
-    const double prior_m2 = std::pow(pose.at("signal_sd_m").get<double>(), 2) +
-                            std::pow(pose.at("turn_sd_m").get<double>(), 2) +
-                            std::pow(pose.at("nugget_sd_m").get<double>(), 2);
+    const double prior_m2 =
+        std::pow(pose.at("signal_sd_m").get<double>(), 2) + std::pow(pose.at("turn_sd_m").get<double>(), 2) +
+        std::pow(pose.at("nugget_sd_m").get<double>(), 2) + std::pow(pose.at("row_sd_m").get<double>(), 2);
     QVERIFY(last_m < std::sqrt(3.0 * prior_m2) * 1.5);
   }
 
@@ -316,7 +319,8 @@ class PoseProcessTest : public QObject {
     const Settings settings = *resolveSettings(method->id, method->settings, {{"inputs", "pose"}});
     const auto refused = method->fit(turnedData(1, {}), settings, {});
     QVERIFY(!refused);
-    FT_VERIFY_MATCH(holdsAll(refused.error().message, {"inputs=pose needs rows in several orientations", "these 48 rows"}));
+    FT_VERIFY_MATCH(
+        holdsAll(refused.error().message, {"inputs=pose needs rows in several orientations", "these 48 rows"}));
   }
 
   void storesAndReadsTheSameBits() {
