@@ -54,6 +54,15 @@ FitReport reportOf(std::span<const Node> nodes, const Corrector& corrector) {
   return report;
 }
 
+/// That orientations are in vain where some rows have none; empty otherwise.
+std::string orientationNote(std::span<const Node> nodes) {
+  const auto n_without =
+      std::count_if(nodes.begin(), nodes.end(), [](const Node& node) { return !node.has_orientation; });
+  if (n_without == 0 || static_cast<std::size_t>(n_without) == nodes.size()) return {};
+  return std::to_string(n_without) + " of " + std::to_string(nodes.size()) +
+         " rows have no orientation, so that no orientation is used: complete these rows, or leave them out.";
+}
+
 }  // namespace
 
 Result<CorrectorChoice> parseCorrectorChoice(const std::string& position_text, const std::string& orientation_text) {
@@ -87,8 +96,8 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   corrector.region_ = Region::around(data.p_tracked_m, data.dimension,
                                      kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
   corrector.report_ = reportOf(nodes, corrector);
-  for (const std::string& note : {correctors::planeNote(data, "nothing is claimed off it"), corrector.position_->note(),
-                                  corrector.orientation_->note()}) {
+  for (const std::string& note : {orientationNote(nodes), correctors::planeNote(data, "nothing is claimed off it"),
+                                  corrector.position_->note(), corrector.orientation_->note()}) {
     std::vector<std::string>& notes = corrector.report_.notes;
     if (!note.empty() && std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
   }

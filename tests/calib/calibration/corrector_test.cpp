@@ -257,6 +257,24 @@ class CorrectorTest : public QObject {
     }
   }
 
+  void aRowWithoutOrientationIsTold() {
+    CalibrationTable table = alignedTable({});
+    const auto says = [&table] {
+      const Corrector corrector = fitted(table, "affine");
+      const std::vector<std::string>& notes = corrector.report().notes;
+      return std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
+        return note ==
+               "1 of 100 rows have no orientation, so that no orientation is used: complete these rows, or leave "
+               "them out.";
+      });
+    };
+    QVERIFY(!says());
+    table.nodes[7].has_orientation = false;
+    QVERIFY(says());
+    for (Node& node : table.nodes) node.has_orientation = false;
+    QVERIFY(!says());
+  }
+
   void badTablesGiveOneSentence_data() {
     QTest::addColumn<int>("places");
     QTest::addColumn<int>("bad_row");

@@ -26,6 +26,7 @@
 /// opened again.
 using namespace fieldtrue;
 using namespace fieldtrue::widgets;
+using namespace fieldtrue::testing;
 
 namespace {
 
