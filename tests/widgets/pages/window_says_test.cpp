@@ -32,6 +32,8 @@
 #include "widgets/style/theme.h"
 
 namespace fieldtrue::widgets {
+using testing::kWaitMs;
+
 namespace {
 
 constexpr double kPitch_m = 0.2;
