@@ -4,8 +4,8 @@
 tidy.py [--seconds N] [--done FOLDER] [--no-analyzer] [--together N] FILE... | --all
 
 A header stands for the .cpp beside it. Files are looked at several together, as one text, so that the headers they share are
-read once; files that cannot stand in one text (two meanings of a name) are looked at in halves. After --seconds nothing more
-is started, and what was left out is told. With --done, a file that was clean leaves a mark in FOLDER and is not looked at
+read once; files that cannot stand in one text (two meanings of a name), or of which anything is found, are looked at in halves
+down to one. After --seconds nothing more is started, and what was left out is told. With --done, a file that was clean leaves a mark in FOLDER and is not looked at
 again.
 """
 import argparse
@@ -111,7 +111,9 @@ def complaints(files, compiled, checks):
         if len(files) == 1 or unit.run("clang++-14", "-fsyntax-only", "-w", *unit.flags, unit.path)[0] == 0:
             status, output = unit.run("clang-tidy-14", "--quiet", f"--config-file={ROOT}/.clang-tidy",
                                       f"--checks={checks}{together}", "--warnings-as-errors=*", unit.path, "--", *unit.flags)
-            return [(files, (output or f"clang-tidy ended with status {status}") if status else "")]
+            if status == 0 or len(files) == 1:
+                return [(files, (output or f"clang-tidy ended with status {status}") if status else "")]
+    # What is found may be of the joint alone: a name of one file that another has for something else.
     half = len(files) // 2
     return complaints(files[:half], compiled, checks) + complaints(files[half:], compiled, checks)
 
