@@ -5,8 +5,8 @@ tidy.py [--seconds N] [--done FOLDER] [--no-analyzer] [--together N] FILE... | -
 
 A header stands for the .cpp beside it. Files are looked at several together, as one text, so that the headers they share are
 read once; files that cannot stand in one text (two meanings of a name), or of which anything is found, are looked at in halves
-down to one. After --seconds nothing more is started, and what was left out is told. With --done, a file that was clean leaves a mark in FOLDER and is not looked at
-again.
+down to one. After --seconds nothing more is started, and what was left out is told. With --done, a file that was clean leaves
+a mark in FOLDER and is not looked at again.
 """
 import argparse
 import bisect
