@@ -204,7 +204,7 @@ std::unique_ptr<PositionModel> readPoses(const JsonReader& parameters) {
   if (!kernel) pose["kernel"].refuse("the name of a kernel");
   const FieldFrame frame = FieldFrame::fromJson(pose["frame"]);
   PoseScales scales;
-  scales.field = {pose["length_m"].vector3(), pose["signal_sd_m"].number(), pose["nugget_sd_m"].number()};
+  scales.field.length_m = pose["length_m"].vector3();
   constexpr Bounds kSd_m{0.0, 10.0}, kPositive{1e-6, 1e6};
   for (int axis = 0; axis < 3; ++axis)
     if (!(scales.field.length_m[axis] > 0.0)) pose["length_m"].refuse("three lengths above 0");

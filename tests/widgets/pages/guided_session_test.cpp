@@ -251,8 +251,11 @@ void GuidedSessionTest::cutsTheVolume() {
   auto* text = find<QLabel>("volumeText");
   const auto shot = [this] { return find<FieldView>("fieldLeft")->picture(); };
   const QImage places = shot();
-  quantity->setFocus();
-  QTest::keyClicks(quantity, QStringLiteral("Expected"));
+  // Not typed: on a busy machine the list forgets letters that are far apart.
+  const auto choose = [quantity](const QString& start) {
+    quantity->setCurrentIndex(quantity->findText(start, Qt::MatchStartsWith));
+  };
+  choose(QStringLiteral("Expected"));
   QTRY_VERIFY_WITH_TIMEOUT(text->text().contains(QStringLiteral("interpolated between the places")), kWaitMs);
   QTRY_VERIFY(shot() != places);
   const QImage middle = shot();
@@ -268,12 +271,12 @@ void GuidedSessionTest::cutsTheVolume() {
   QTest::keyClick(iso, Qt::Key_Up);
   QTRY_VERIFY(shot() != first);
   find<QCheckBox>("sliceShown")->click();
-  QTest::keyClicks(quantity, QStringLiteral("Size"));
+  choose(QStringLiteral("Size"));
   QTRY_VERIFY_WITH_TIMEOUT(text->text().contains(QStringLiteral("moves a reading")), kWaitMs);
   const int left = find<QComboBox>("leftMethod")->currentIndex();
   const int tetrahedral = find<QComboBox>("leftMethod")->findText(QStringLiteral("Tetrahedral"), Qt::MatchStartsWith);
   if (tetrahedral >= 0) find<QComboBox>("leftMethod")->setCurrentIndex(tetrahedral);
-  QTest::keyClicks(quantity, QStringLiteral("Expected"));
+  choose(QStringLiteral("Expected"));
   QTRY_VERIFY_WITH_TIMEOUT(!text->text().contains(QStringLiteral("Sampling")), kWaitMs);
   iso->setValue(20.0);
   slider->setValue(25);
@@ -283,7 +286,7 @@ void GuidedSessionTest::cutsTheVolume() {
   click("modeDifference");
   QTRY_VERIFY_WITH_TIMEOUT(text->text().contains(QStringLiteral("needs two methods")), kWaitMs);
   click("modeTwo");
-  QTest::keyClicks(quantity, QStringLiteral("Places"));
+  choose(QStringLiteral("Places"));
   QTRY_VERIFY(!text->isVisible());
 }
 
