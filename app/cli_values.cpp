@@ -122,7 +122,8 @@ void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
       ->type_name("LIST");
   command
       .add_option("--validate", arguments.validate,
-                  "role, loo, kfold:K or block:8; default role where validation rows exist, else loo")
+                  "role, loo, kfold:K or block:8; default role where validation rows exist, else kfold:10, or loo "
+                  "where no method is tuned or costly")
       ->type_name("SCHEME");
   command
       .add_option("--align", arguments.align,

@@ -151,7 +151,8 @@ PositionMethod automaticPosition() {
                                      "correction, a rigid motion and an affine map are always among them.")};
   method.fit = fitAutomatic;
   method.read = loadAutomatic;
-  method.most_folds = 5;
+  method.cost = FitCost::kVeryCostly;
+  method.tuning = Tuning::kAlways;
   method.origin = MethodOrigin::kLater;
   return method;
 }

@@ -79,8 +79,7 @@ bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
 }
 
 std::size_t foldsToScore(const AutomaticCandidate& candidate, std::size_t n_folds) {
-  return candidate.method->most_folds > 0 ? std::min(n_folds, std::max<std::size_t>(2, (2 * n_folds + 4) / 5))
-                                          : n_folds;
+  return candidate.method->isCostly() ? std::min(n_folds, std::max<std::size_t>(2, (2 * n_folds + 4) / 5)) : n_folds;
 }
 
 InnerScore skippedScore(std::string why) {
@@ -165,7 +164,7 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
       if (!std::isfinite(square_m2)) return skippedScore("its errors at held-out places are not finite");
       score.squares_m2[slots[row]] += square_m2 / n_rows[slots[row]];
     }
-    const bool may_drop = best != nullptr && candidate.method->most_folds > 0 && k + 1 < score.n_folds;
+    const bool may_drop = best != nullptr && candidate.method->isCostly() && k + 1 < score.n_folds;
     if (may_drop && isClearlyWorse(score, *best))
       return skippedScore("dropped after " + std::to_string(k + 1) + " of " + std::to_string(folds.size()) +
                           " folds, clearly worse than another candidate");
@@ -181,7 +180,7 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
   std::vector<std::size_t> order(candidates.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return (candidates[a].method->most_folds > 0) < (candidates[b].method->most_folds > 0);
+    return candidates[a].method->isCostly() < candidates[b].method->isCostly();
   });
   std::vector<InnerScore> scores(candidates.size());
   const InnerScore* best = nullptr;

@@ -41,7 +41,7 @@ struct InnerScore {
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data);
 
 /// Scores a candidate on places its fits did not see: in closed form where the method has one, by refits otherwise. A
-/// costly method (most_folds) is scored on two fifths of the folds.
+/// costly method (FitCost) is scored on two fifths of the folds.
 /// @param best so far, or null: a costly method that after any fold is worse by two standard errors is dropped
 /// @error kCancelled only; what a method cannot do is in the score
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,

@@ -1,7 +1,5 @@
 #include "calib/evaluation/candidate.h"
 
-#include <algorithm>
-
 #include "calib/calibration/alignment.h"
 #include "calib/core/units.h"
 #include "calib/correctors/base/method.h"
@@ -76,20 +74,14 @@ FitWithout fitWithout(std::unique_ptr<correctors::HoldOutFits<Model>> owned) {
   };
 }
 
-bool isAuto(const SettingValue& value) {
-  const auto* text = std::get_if<std::string>(&value);
-  return text != nullptr && *text == "auto";
-}
-
 template <class Model>
 Candidate makeCandidate(const correctors::CorrectionMethod<Model>& method, Settings settings) {
   Candidate candidate;
   candidate.id = method.id;
   candidate.settings = settings;
   candidate.is_position = std::is_same_v<Model, correctors::PositionModel>;
-  candidate.most_folds = method.most_folds;
-  candidate.chooses_settings =
-      std::any_of(settings.begin(), settings.end(), [](const auto& setting) { return isAuto(setting.second); });
+  candidate.is_costly = method.isCostly();
+  candidate.is_tuned = method.tunes(settings);
   if (method.hold_out)
     candidate.hold_out = [&method, settings](const correctors::FitData& data, const RunControl& control) {
       return method.hold_out(data, settings, control).map(fitWithout<Model>);

@@ -37,9 +37,9 @@ struct Candidate {
   bool is_position = true;
   std::function<Result<FittedCandidate>(const correctors::FitData&, const RunControl&)> fit;
   std::function<Result<FitWithout>(const correctors::FitData&, const RunControl&)>
-      hold_out;                   ///< Empty without a closed form.
-  int most_folds = 0;             ///< @see CorrectionMethod::most_folds
-  bool chooses_settings = false;  ///< One of its settings is found from the data it is fitted to.
+      hold_out;            ///< Empty without a closed form.
+  bool is_costly = false;  ///< Held out in ten folds at most.
+  bool is_tuned = false;   ///< @see CorrectionMethod::tunes
 };
 
 /// The candidates that texts name; all of the registry with default settings when there are none.

@@ -20,9 +20,19 @@
 namespace fieldtrue::evaluation {
 namespace {
 
+/// Statistics over the places at the edge, or over the others; none where there are none.
+std::optional<ErrorStats> statsWhere(const std::vector<double>& errors, const std::vector<bool>& is_edge, bool wanted,
+                                     std::uint64_t seed) {
+  std::vector<double> some;
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    if (is_edge[i] == wanted) some.push_back(errors[i]);
+  return some.empty() ? std::nullopt : std::optional(errorStats(some, seed));
+}
+
 /// The places' errors of one candidate, with what its fits told.
 MethodScore methodScore(const HeldOutJob& job, const Candidate& candidate, CandidateScores scores,
-                        const std::vector<Node>& scored, const std::vector<int>& places) {
+                        const std::vector<Node>& scored, const std::vector<int>& places,
+                        const std::vector<bool>& is_edge) {
   MethodScore score;
   score.method = candidate.id;
   score.settings = candidate.settings;
@@ -30,10 +40,14 @@ MethodScore methodScore(const HeldOutJob& job, const Candidate& candidate, Candi
   if (score.skipped) return score;
   PlaceScores held_out = gatherByPlace(places, scored, scores.held_out);
   score.stats = errorStats(held_out.errors, job.seed);
+  score.inside = statsWhere(held_out.errors, is_edge, false, job.seed);
+  score.edge = statsWhere(held_out.errors, is_edge, true, job.seed);
   score.n_uncovered = static_cast<int>(std::count(held_out.covered.begin(), held_out.covered.end(), false));
   score.place_errors = std::move(held_out.errors);
   score.place_covered = std::move(held_out.covered);
   if (candidate.is_position) score.residual_m = std::move(held_out.residual_m);
+  score.validated = scores.validated;
+  score.tuned_inside = scores.tuned_inside;
   score.n_folds = scores.n_folds;
   score.closed_form = scores.closed_form;
   score.in_sample_rms = scores.in_sample_rms;
@@ -62,7 +76,8 @@ void scoreMethods(const HeldOutJob& job, HeldOutScores& held_out, const std::vec
   std::vector<MethodScore> scores(job.candidates.size());
   control.parallel_for(scores.size(), [&](std::size_t i) {
     if (control.stop.stop_requested()) return;
-    scores[i] = methodScore(job, job.candidates[i], std::move(held_out.candidates[i]), scored, comparison.places);
+    scores[i] = methodScore(job, job.candidates[i], std::move(held_out.candidates[i]), scored, comparison.places,
+                            comparison.is_edge);
   });
   for (std::size_t i = 0; i < scores.size(); ++i)
     (job.candidates[i].is_position ? comparison.position : comparison.orientation).push_back(std::move(scores[i]));
@@ -96,6 +111,7 @@ Comparison begin(const HeldOutJob& job, const std::vector<Node>& scored) {
   comparison.validation = job.validation;
   comparison.align = job.align;
   comparison.places = placesOf(scored);
+  comparison.is_edge = outermostPlaces(rowsOf(job, job.fitted), job.nodes, comparison.places);
   comparison.names = PlaceNames(job.nodes);
   comparison.n_places = static_cast<int>(placesOf(job.nodes).size());
   comparison.validation_places = static_cast<int>(comparison.places.size());
@@ -119,10 +135,26 @@ void noteClosedForm(Comparison& comparison) {
   std::set<std::string> named;
   for (const std::string& label : labels)
     if (named.insert(label).second) names += (names.empty() ? "" : ", ") + label;
+  if (!names.empty()) comparison.notes.push_back("Held out in closed form, from one fit to all places: " + names + ".");
+}
+
+/// Methods whose figures are not those of the others: told, and never called best.
+void noteUnranked(Comparison& comparison) {
+  std::string names;
+  const auto add = [&](const std::vector<MethodScore>& scores, auto label) {
+    for (const MethodScore& score : scores)
+      if (!score.skipped && !isRanked(score, comparison))
+        names += (names.empty() ? "" : ", ") + label(score.method, score.settings);
+  };
+  add(comparison.position,
+      [](const std::string& id, const Settings& settings) { return correctors::positionLabel(id, settings); });
+  add(comparison.orientation,
+      [](const std::string& id, const Settings& settings) { return correctors::orientationLabel(id, settings); });
   if (!names.empty())
-    comparison.notes.push_back("Held out in closed form, from one fit to all places: " + names +
-                               ". What such a fit chooses from the data (automatic settings, scales, knots) was "
-                               "chosen on all places.");
+    comparison.notes.push_back(
+        "Not ranked, because what they choose saw the places held out, or because they were "
+        "held out otherwise than the others: " +
+        names + ". Compared with kfold:10, all are.");
 }
 
 /// The same control, telling its progress as a part of the whole.
@@ -149,8 +181,9 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
   if (control.stop.stop_requested()) return comparisonStopped();
   scoreCommonPlaces(comparison.position, comparison.places.size());
   noteClosedForm(comparison);
+  noteUnranked(comparison);
   pickBest(comparison, options.seed, control);
-  judgePlaces(comparison, job);
+  judgePlaces(comparison);
   if (control.stop.stop_requested()) return comparisonStopped();
   if (options.with_surroundings) FT_TRY_VOID(addSurroundings(comparison, table, job, partOf(control, scores_end, 1.0)));
   writeVerdictText(comparison);

@@ -23,12 +23,14 @@ enum class ValidationKind { kRole, kLeaveOneOut, kFolds, kBlocks };
 struct Validation {
   ValidationKind kind = ValidationKind::kLeaveOneOut;
   int count = 0;  ///< Folds or blocks.
+  bool operator==(const Validation&) const = default;
 };
 
 /// Reads `role`, `loo`, `kfold:10`, `block:8`. @error kBadInput
 Result<Validation> parseValidation(const std::string& text);
-/// `role` where the table has validation rows, else `loo`.
-Validation defaultValidation(const CalibrationTable& table);
+/// `role` where the table has validation rows; else `loo`, or `kfold:10` where a method takes part that must be fitted
+/// anew without the places it is judged at, because its fits are tuned by them or costly.
+Validation defaultValidation(const CalibrationTable& table, bool needs_refits);
 std::string toText(const Validation& validation);
 
 struct ComparisonOptions {
@@ -48,6 +50,8 @@ struct MethodScore {
   std::string method;
   Settings settings;
   ErrorStats stats;                  ///< mm or deg, over all scored places.
+  std::optional<ErrorStats> inside;  ///< Over the places that have others on all sides; none where there are none.
+  std::optional<ErrorStats> edge;    ///< Over the outermost places.
   std::vector<double> place_errors;  ///< Same order as Comparison::places.
   std::vector<Eigen::Vector3d>
       residual_m;  ///< Position only: corrected minus true at each place, reference frame (mean over its rows).
@@ -57,6 +61,8 @@ struct MethodScore {
   double rms_to_best = 0;    ///< RMS minus the best method's, mm or deg, with its paired 90 % bootstrap interval.
   double rms_to_best_low90 = 0;
   double rms_to_best_high90 = 0;
+  Validation validated;                ///< What it was scored with; not the comparison's for a costly method under loo.
+  bool tuned_inside = true;            ///< Its fits chose nothing from the places they were scored on.
   int n_folds = 0;                     ///< Fits that were scored; fewer than asked for a costly method.
   bool closed_form = false;            ///< Held out by downdating one fit rather than by fitting anew.
   double in_sample_rms = 0;            ///< On the rows it was fitted to, all at once. Not a verdict.
@@ -126,6 +132,7 @@ struct Comparison {
   Validation validation;
   calibration::AlignMode align = calibration::AlignMode::kNone;
   std::vector<int> places;       ///< Node numbers scored.
+  std::vector<bool> is_edge;     ///< Of each: whether it is an outermost place.
   PlaceNames names;              ///< What the places of the table are called.
   double validated_share = 1.0;  ///< Volume of the box around the scored places, of that around all places.
   int n_places = 0;              ///< In the table, skipped ones left out.

@@ -29,6 +29,7 @@ json scoreToJson(const MethodScore& score, const char* stats_key, bool is_positi
   json to = {{"method", score.method},
              {"settings", fieldtrue::toJson(score.settings)},
              {stats_key, nullUnless(used, statsToJson(score.stats))},
+             {is_position ? "place_mm" : "place_deg", nullUnless(used, score.place_errors)},
              {"n_uncovered", nullUnless(used, score.n_uncovered)},
              {"fit_s", nullUnless(used, score.fit_s)},
              {"eval_ns", nullUnless(used, score.eval_ns)},
@@ -36,11 +37,16 @@ json scoreToJson(const MethodScore& score, const char* stats_key, bool is_positi
              {"rms_to_best", nullUnless(used, score.rms_to_best)},
              {"rms_to_best_low90", nullUnless(used, score.rms_to_best_low90)},
              {"rms_to_best_high90", nullUnless(used, score.rms_to_best_high90)},
+             {"validated", nullUnless(used, toText(score.validated))},
+             {"tuned_inside", nullUnless(used, score.tuned_inside)},
              {"n_folds", nullUnless(used, score.n_folds)},
              {"closed_form", nullUnless(used, score.closed_form)},
              {"notes", score.notes},
              {"skipped", nullUnless(!used, score.skipped.value_or(""))}};
   if (is_position) to["rms_common_mm"] = nullUnless(used, score.rms_common_mm);
+  const std::string key = stats_key;
+  to[key + "_inside"] = score.inside ? statsToJson(*score.inside) : json(nullptr);
+  to[key + "_edge"] = score.edge ? statsToJson(*score.edge) : json(nullptr);
   return to;
 }
 
@@ -115,13 +121,18 @@ json toJson(const Comparison& comparison) {
           {"align", comparison.align == calibration::AlignMode::kRigid ? "rigid" : "none"},
           {"places", comparison.n_places},
           {"validation_places", comparison.validation_places},
+          {"scored_places", comparison.places},
+          {"scored_at_edge", comparison.is_edge},
           {"validated_share", comparison.validated_share},
           {"floor",
            {{"position_mm", nullUnless(comparison.floor_position_mm > 0.0, comparison.floor_position_mm)},
             {"orientation_deg", nullUnless(comparison.floor_orientation_deg > 0.0, comparison.floor_orientation_deg)},
             {"from", comparison.floor_from}}},
           {"before",
-           {{"position_mm", statsToJson(comparison.before_position_mm)}, {"orientation_deg", before_orientation}}},
+           {{"position_mm", statsToJson(comparison.before_position_mm)},
+            {"orientation_deg", before_orientation},
+            {"place_mm", comparison.before_place_mm},
+            {"place_deg", comparison.before_place_deg}}},
           {"position", std::move(position)},
           {"orientation", std::move(orientation)},
           {"best", {{"position", comparison.best_position}, {"orientation", comparison.best_orientation}}},

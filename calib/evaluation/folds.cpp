@@ -93,10 +93,11 @@ Result<Validation> parseValidation(const std::string& text) {
   return fail(ErrorCode::kBadInput, "Validation '" + text + "' is not known; there are: role, loo, kfold:10, block:8");
 }
 
-Validation defaultValidation(const CalibrationTable& table) {
+Validation defaultValidation(const CalibrationTable& table, bool needs_refits) {
   const bool has_validation = std::any_of(table.nodes.begin(), table.nodes.end(),
                                           [](const Node& node) { return node.role == NodeRole::kValidation; });
-  return {has_validation ? ValidationKind::kRole : ValidationKind::kLeaveOneOut, 0};
+  if (has_validation) return {ValidationKind::kRole, 0};
+  return needs_refits ? Validation{ValidationKind::kFolds, 10} : Validation{ValidationKind::kLeaveOneOut, 0};
 }
 
 std::string toText(const Validation& validation) {

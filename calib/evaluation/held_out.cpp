@@ -17,6 +17,9 @@ namespace {
 constexpr double kFitted = 0.15;
 constexpr double kAligned = 0.2;
 
+/// Folds of a method whose fit is costly, at most.
+constexpr int kCostlyFolds = 10;
+
 /// Where the scores of a row of HeldOutJob::nodes go: its place in HeldOutJob::scored.
 std::vector<std::size_t> slotsOf(const HeldOutJob& job) {
   std::vector<std::size_t> slots(job.nodes.size(), 0);
@@ -97,16 +100,18 @@ void runClosedForm(Run& run, std::size_t i, ProgressMeter& meter, double share) 
   }
 }
 
-/// Whether the closed form can follow the alignment of each fold: it moves the true positions, while an orientation's
-/// truth is turned by the mounting too.
+/// Whether the folds are taken off one fit. The closed form must be able to follow the alignment of each fold: it moves
+/// the true positions, while an orientation's truth is turned by the mounting too. What a fit is tuned to stays as all
+/// rows chose it, so only where refits would be as many as places is that accepted, and told.
 bool hasClosedForm(const HeldOutJob& job, const Candidate& candidate) {
+  if (candidate.is_tuned && job.validation.kind != ValidationKind::kLeaveOneOut) return false;
   return candidate.hold_out && (candidate.is_position || job.align == calibration::AlignMode::kNone);
 }
 
 bool isTooCostly(const HeldOutJob& job, const Candidate& candidate) {
   const bool may_regroup =
       job.validation.kind == ValidationKind::kLeaveOneOut || job.validation.kind == ValidationKind::kFolds;
-  return may_regroup && candidate.most_folds >= 2 && job.folds.size() > static_cast<std::size_t>(candidate.most_folds);
+  return may_regroup && candidate.is_costly && job.folds.size() > static_cast<std::size_t>(kCostlyFolds);
 }
 
 /// A part of the work that any thread may take.
@@ -116,12 +121,13 @@ struct Task {
 
 /// A costly candidate's own, larger folds, each a task.
 Result<void> addCostly(Run& run, std::size_t i, ProgressMeter& meter, std::vector<Task>& tasks) {
-  const int n_folds = run.job.candidates[i].most_folds;
-  auto folds = makeFolds(run.job.nodes, {ValidationKind::kFolds, n_folds}, run.job.seed);
+  const Validation validation{ValidationKind::kFolds, kCostlyFolds};
+  auto folds = makeFolds(run.job.nodes, validation, run.job.seed);
   if (!folds) return tl::unexpected(folds.error());
   CandidateScores& scores = run.scores.candidates[i];
   scores.n_folds = static_cast<int>(folds->size());
-  scores.notes.push_back("Scored with kfold:" + std::to_string(n_folds) + " instead of " + toText(run.job.validation) +
+  scores.validated = validation;
+  scores.notes.push_back("Scored with " + toText(validation) + " instead of " + toText(run.job.validation) +
                          ", because one fit is costly; its fits see fewer places than those of other methods.");
   for (std::size_t k = 0; k < folds->size(); ++k)
     tasks.push_back({[&run, i, k, &meter, fold = std::move((*folds)[k])] {
@@ -175,7 +181,7 @@ double totalCost_s(const Run& run) {
     if (scores.skipped) continue;
     const Candidate& candidate = run.job.candidates[i];
     const double n_fits = hasClosedForm(run.job, candidate) ? 3.0
-                          : isTooCostly(run.job, candidate) ? candidate.most_folds
+                          : isTooCostly(run.job, candidate) ? kCostlyFolds
                                                             : static_cast<double>(run.job.folds.size());
     total_s += n_fits * scores.fit_s;
   }
@@ -231,9 +237,10 @@ Result<void> runFolds(Run& run) {
   keepReasons(run);
   for (std::size_t i = 0; i < run.job.candidates.size(); ++i) {
     CandidateScores& scores = run.scores.candidates[i];
-    if (!scores.skipped && scores.closed_form && run.job.candidates[i].chooses_settings)
-      scores.notes.push_back(
-          "Its automatic settings were chosen on all places, and kept while each place was held out.");
+    if (scores.skipped || !scores.closed_form || !run.job.candidates[i].is_tuned) continue;
+    scores.tuned_inside = false;
+    scores.notes.push_back(
+        "What it chooses from the data was chosen on all places, and kept while each place was held out.");
   }
   return {};
 }
@@ -255,6 +262,7 @@ Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& cont
   control.parallel_for(job.candidates.size(), [&](std::size_t i) {
     if (run.stopped()) return;
     scores.candidates[i] = fitInSample(job, job.candidates[i], run.all_data, alignment, run.inner());
+    scores.candidates[i].validated = job.validation;
     run.why_not[i].resize(job.folds.size());
     if (!is_role) scores.candidates[i].held_out.resize(job.scored.size());
     meter.add(1.0);

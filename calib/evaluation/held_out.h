@@ -17,6 +17,8 @@ namespace fieldtrue::evaluation {
 struct CandidateScores {
   std::optional<std::string> skipped;  ///< Why it cannot be used; then nothing else is set.
   std::vector<RowScore> held_out;      ///< One per row of HeldOutJob::scored.
+  Validation validated;                ///< What it was scored with: not the job's where a fit is costly.
+  bool tuned_inside = true;            ///< Nothing that its fits chose from the data came from the rows scored.
   int n_folds = 0;
   bool closed_form = false;
   double fit_s = 0.0;
@@ -33,7 +35,8 @@ struct HeldOutScores {
 };
 
 /// Fits and scores every candidate. Where a method can leave rows out in closed form the folds are taken off one fit
-/// to all rows; a costly method is refitted over fewer, larger folds.
+/// to all rows; a tuned method only where places are left out one by one, and it then keeps what all rows chose. A
+/// costly method is refitted over ten folds at most.
 /// @error kTooFewNodes, kDegenerate, kBadInput of the alignment; kCancelled
 Result<HeldOutScores> scoreHeldOut(const HeldOutJob& job, const RunControl& control);
 

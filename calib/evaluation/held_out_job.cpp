@@ -36,7 +36,10 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
   job.candidates = *std::move(candidates);
   for (Candidate& candidate : job.candidates)
     if (!options.closed_form) candidate.hold_out = nullptr;
-  job.validation = options.validation.value_or(defaultValidation(table));
+  const bool needs_refits = std::any_of(job.candidates.begin(), job.candidates.end(), [](const Candidate& candidate) {
+    return candidate.is_tuned || candidate.is_costly;
+  });
+  job.validation = options.validation.value_or(defaultValidation(table, needs_refits));
   job.align = options.align.value_or(calibration::defaultAlignMode(table.metadata));
   job.has_orientation =
       std::all_of(job.nodes.begin(), job.nodes.end(), [](const Node& node) { return node.has_orientation; });

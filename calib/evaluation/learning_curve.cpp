@@ -91,7 +91,7 @@ LearningCurve curveOf(const Candidate& candidate, std::vector<LearningPoint> poi
     bool is_enough = true;
     for (std::size_t d = 0; d < draws.size(); ++d) {
       if (draws[d].point != p) continue;
-      const std::size_t n_wanted = candidate.most_folds > 0 ? kCostlyDraws : kDraws;
+      const std::size_t n_wanted = candidate.is_costly ? kCostlyDraws : kDraws;
       if (values.size() >= n_wanted) continue;
       is_enough = is_enough && rms[d].has_value();
       if (rms[d]) values.push_back(*rms[d]);
@@ -134,8 +134,7 @@ Result<std::vector<LearningCurve>> learningCurves(const CalibrationTable& table,
     const std::size_t d = draws.size() - 1 - task / n_candidates;
     const std::size_t i = task % n_candidates;
     const Candidate& candidate = job.candidates[i];
-    const bool is_wanted =
-        candidate.most_folds == 0 || draws[d].point + 1 == points.size() || d % kDraws < kCostlyDraws;
+    const bool is_wanted = !candidate.is_costly || draws[d].point + 1 == points.size() || d % kDraws < kCostlyDraws;
     if (is_wanted && !control.stop.stop_requested())
       rms[i][d] = heldOutRms(job, candidate, draws[d], scored, split.scored, dimension, inner);
     meter.add(1.0);

@@ -148,11 +148,11 @@ std::vector<bool> outermostPlaces(std::span<const Node> fitted, std::span<const 
   return is_outermost;
 }
 
-void judgePlaces(Comparison& comparison, const HeldOutJob& job) {
+void judgePlaces(Comparison& comparison) {
   const std::vector<double>& errors = recommendedErrors(comparison);
   if (errors.empty()) return;
   Verdict& verdict = comparison.verdict;
-  const Split split = splitRms(errors, outermostPlaces(rowsOf(job, job.fitted), job.nodes, comparison.places));
+  const Split split = splitRms(errors, comparison.is_edge);
   verdict.edge_mm = split.picked;
   verdict.inside_mm = split.others;
   const auto worst = std::max_element(errors.begin(), errors.end());
@@ -165,7 +165,7 @@ Result<std::optional<double>> rmsWithHalf_mm(const Comparison& comparison, const
   if (!comparison.best_position_row) return std::optional<double>();
   HeldOutJob half = job;
   half.candidates = {job.candidates[*comparison.best_position_row]};
-  if (half.candidates.front().most_folds > 0) return std::optional<double>();
+  if (half.candidates.front().is_costly) return std::optional<double>();
   half.candidates.front().hold_out = nullptr;
   half.validation = {ValidationKind::kFolds, 2};
   auto folds = makeFolds(rowsOf(job, job.fitted), half.validation, job.seed);

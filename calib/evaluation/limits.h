@@ -17,7 +17,7 @@ std::vector<bool> outermostPlaces(std::span<const Node> fitted, std::span<const 
                                   const std::vector<int>& places);
 
 /// Fills in where the recommended correction errs: inside, near the edge, worst. The verdict must have been made.
-void judgePlaces(Comparison& comparison, const HeldOutJob& job);
+void judgePlaces(Comparison& comparison);
 
 /// Held-out RMS [mm] of the best position method fitted to half of the places; none without one or where a fit is
 /// costly.

@@ -71,7 +71,7 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   if (!fold_back) return tl::unexpected(fold_back.error());
   comparison.fold_back = *std::move(fold_back);
   refuseInsideOut(comparison);
-  judgePlaces(comparison, job);
+  judgePlaces(comparison);
   if (auto going = unlessStopped(control, 0.4); !going) return going;
   if (job.has_orientation) {
     auto dependence = orientationDependence({job.metadata, job.nodes}, job.seed, quiet);

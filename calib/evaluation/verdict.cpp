@@ -18,11 +18,12 @@ constexpr double kWholeRegion = 0.5;
 /// Differences of the last bits are not a win: a millionth of a millimetre or of a degree.
 constexpr double kTie = 1e-6;
 
-std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, double before_rms) {
+std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, double before_rms,
+                                   const Comparison& comparison) {
   std::optional<std::size_t> best;
   double lowest = before_rms;
   for (std::size_t row = 0; row < scores.size(); ++row) {
-    if (scores[row].skipped || !(scores[row].stats.rms < lowest - kTie)) continue;
+    if (scores[row].skipped || !isRanked(scores[row], comparison) || !(scores[row].stats.rms < lowest - kTie)) continue;
     lowest = scores[row].stats.rms;
     best = row;
   }
@@ -31,9 +32,9 @@ std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, doubl
 
 /// Fills in each method's RMS minus that of the best, or of the least wrong where none beats the error before, with
 /// the interval over the same resampled places.
-void tellDistanceToBest(std::vector<MethodScore>& scores, std::optional<std::size_t> best_row, std::uint64_t seed,
-                        const RunControl& control) {
-  const auto best = best_row ? best_row : bestRow(scores, HUGE_VAL);
+void tellDistanceToBest(std::vector<MethodScore>& scores, std::optional<std::size_t> best_row,
+                        const Comparison& comparison, std::uint64_t seed, const RunControl& control) {
+  const auto best = best_row ? best_row : bestRow(scores, HUGE_VAL, comparison);
   if (!best) return;
   const std::vector<double> of_best = scores[*best].place_errors;
   control.parallel_for(scores.size(), [&](std::size_t row) {
@@ -98,12 +99,21 @@ std::string insideOutText(const FoldBack& fold_back) {
          "transmitter was moved on the way";
 }
 
+/// Where a method that is not ranked has the smaller figure, that it was not judged.
+std::string unrankedText(const Comparison& comparison) {
+  const bool hides_better =
+      std::any_of(comparison.position.begin(), comparison.position.end(), [&](const MethodScore& score) {
+        return !score.skipped && !isRanked(score, comparison) && score.stats.rms < comparison.before_position_mm.rms;
+      });
+  return hides_better ? " that " + toText(comparison.validation) + " can judge (kfold:10 judges more)" : std::string();
+}
+
 std::string positionText(const Comparison& comparison, const std::string& do_not_apply) {
   const GainTest& test = comparison.verdict.position;
   const std::string before = errorText(comparison.before_position_mm.rms) + " mm";
   if (!comparison.best_position_row)
     return do_not_apply + (comparison.verdict.is_inside_out ? insideOutText(*comparison.fold_back) + "; " : "") +
-           "no method does better than " +
+           "no method" + unrankedText(comparison) + " does better than " +
            (comparison.align == calibration::AlignMode::kRigid ? "the rigid alignment alone" : "the tracker as it is") +
            " (" + before + ") " + placesText(comparison);
   const MethodScore& best = comparison.position[*comparison.best_position_row];
@@ -169,12 +179,16 @@ GainTest testGain(const std::vector<int>& places, const std::vector<double>& bef
   return test;
 }
 
+bool isRanked(const MethodScore& score, const Comparison& comparison) {
+  return score.tuned_inside && score.validated == comparison.validation;
+}
+
 double excessError(double rms, double floor) { return std::sqrt(std::max(0.0, rms * rms - floor * floor)); }
 
 void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& control) {
   Verdict& verdict = comparison.verdict;
   Trueness& trueness = comparison.trueness;
-  comparison.best_position_row = bestRow(comparison.position, comparison.before_position_mm.rms);
+  comparison.best_position_row = bestRow(comparison.position, comparison.before_position_mm.rms, comparison);
   trueness.before_position_mm = excessError(comparison.before_position_mm.rms, comparison.floor_position_mm);
   trueness.after_position_mm = trueness.before_position_mm;
   if (const auto row = comparison.best_position_row) {
@@ -184,7 +198,8 @@ void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& cont
     trueness.after_position_mm = excessError(best.stats.rms, comparison.floor_position_mm);
   }
   if (comparison.before_orientation_deg) {
-    comparison.best_orientation_row = bestRow(comparison.orientation, comparison.before_orientation_deg->rms);
+    comparison.best_orientation_row =
+        bestRow(comparison.orientation, comparison.before_orientation_deg->rms, comparison);
     trueness.before_orientation_deg =
         excessError(comparison.before_orientation_deg->rms, comparison.floor_orientation_deg);
     trueness.after_orientation_deg = trueness.before_orientation_deg;
@@ -195,8 +210,8 @@ void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& cont
     verdict.orientation = testGain(comparison.places, comparison.before_place_deg, best.place_errors, seed);
     trueness.after_orientation_deg = excessError(best.stats.rms, comparison.floor_orientation_deg);
   }
-  tellDistanceToBest(comparison.position, comparison.best_position_row, seed, control);
-  tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, seed, control);
+  tellDistanceToBest(comparison.position, comparison.best_position_row, comparison, seed, control);
+  tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, comparison, seed, control);
   verdict.apply_position = verdict.position.apply;
   verdict.apply_orientation = verdict.orientation.apply;
   verdict.gain_low90 = verdict.position.low90;

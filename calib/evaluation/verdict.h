@@ -10,8 +10,11 @@ namespace fieldtrue::evaluation {
 /// larger floor is overstated.
 constexpr double kOverstatedFloor = 3.0;
 
-/// Picks the best methods by held-out RMS (nothing wins unless it beats the error before), tests their gain, and tells
-/// how far the others are from the best.
+/// Whether a method may be called best: scored as the comparison says, and not tuned by the places it is judged at.
+bool isRanked(const MethodScore& score, const Comparison& comparison);
+
+/// Picks the best of the ranked methods by held-out RMS (nothing wins unless it beats the error before), tests their
+/// gain, and tells how far the others are from the best.
 void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& control = {});
 
 /// Nothing is applied where more than a quarter of the grid's cells fold back, or the correction does at more than a

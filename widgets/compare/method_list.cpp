@@ -7,21 +7,13 @@
 namespace fieldtrue::widgets {
 namespace {
 
-/// Methods that a comparison refits less often than this take so long that a person asks for them.
-constexpr int kFewFolds = 10;
-
-template <class Method>
-bool isSlow(const Method& method) {
-  return method.most_folds > 0;
-}
-
 template <class Method>
 std::vector<MethodEntry> entriesOf(std::span<const Method> methods) {
   std::vector<MethodEntry> entries;
   for (const Method& method : methods)
     if (method.id != "none")
       entries.push_back(
-          {method.id, defaultSettings(method.settings), !isSlow(method) || method.most_folds >= kFewFolds, false});
+          {method.id, defaultSettings(method.settings), method.cost != correctors::FitCost::kVeryCostly, false});
   return entries;
 }
 
@@ -29,7 +21,7 @@ template <class Method>
 MethodInfo infoOf(const Result<const Method*>& method, const std::string& id) {
   if (!method) return {QString::fromStdString(id), {}, {}, false};
   return {QString::fromStdString((*method)->label), (*method)->settings, QString::fromStdString((*method)->source),
-          isSlow(**method)};
+          (*method)->isCostly()};
 }
 
 }  // namespace

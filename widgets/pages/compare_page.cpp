@@ -120,8 +120,9 @@ QWidget* ComparePage::makeControls(QWidget* header) {
   layout->setContentsMargins(0, 4, 0, 0);
   validation_ = new QComboBox(controls);
   validation_->setObjectName(QStringLiteral("validation"));
-  validation_->addItem(tr("Leave one place out"), QStringLiteral("loo"));
+  validation_->addItem(tr("As suits the table"), QString());
   validation_->addItem(tr("10 folds"), QStringLiteral("kfold:10"));
+  validation_->addItem(tr("Leave one place out"), QStringLiteral("loo"));
   validation_->addItem(tr("8 blocks of space"), QStringLiteral("block:8"));
   validation_->addItem(tr("Validation places"), QStringLiteral("role"));
   validation_->setAccessibleName(tr("How methods are judged"));

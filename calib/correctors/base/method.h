@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string>
@@ -41,6 +42,20 @@ inline constexpr int kSmoothing = 10;      ///< Smoothing fits that follow any f
 inline constexpr int kInterpolating = 20;  ///< What passes through every place.
 }  // namespace simplicity
 
+/// What one fit takes beside those of other methods.
+enum class FitCost {
+  kLight,
+  kCostly,     ///< Places are held out in ten folds at most, never one by one.
+  kVeryCostly  ///< The same, and the window compares it only when asked.
+};
+
+/// Whether a fit chooses from the true positions what is not determined by them alone: settings, scales, members.
+enum class Tuning {
+  kBySettings,  ///< Where one of its auto-numbers is left to it.
+  kNever,
+  kAlways
+};
+
 /// Settings with which the automatic choice tries a method.
 struct AutomaticTry {
   std::string settings;  ///< As after the colon of a method's text; empty = the defaults.
@@ -60,13 +75,25 @@ struct CorrectionMethod {
   std::unique_ptr<Model> (*read)(const JsonReader& parameters) = nullptr;
   /// Fits with rows left out, without fitting anew; null where the method has no closed form.
   Result<std::unique_ptr<HoldOutFits<Model>>> (*hold_out)(const FitData&, const Settings&, const RunControl&) = nullptr;
-  /// A comparison refits a costly method at most so often, over larger folds; 0 = as often as asked.
-  int most_folds = 0;
+  FitCost cost = FitCost::kLight;
+  Tuning tuning = Tuning::kBySettings;
   MethodOrigin origin = MethodOrigin::kSurvey;
   /// What the automatic choice tries of it; empty = nothing.
   std::vector<AutomaticTry> tries = {};
   /// How the source is read where a sentence of it leaves more than one way; empty where none does.
   std::string reading = {};
+
+  bool isCostly() const { return cost != FitCost::kLight; }
+
+  /// Whether a fit with these settings is tuned by its data, so that only a fit without a place can be judged at it.
+  bool tunes(const Settings& given) const {
+    if (tuning != Tuning::kBySettings) return tuning == Tuning::kAlways;
+    return std::any_of(settings.begin(), settings.end(), [&](const Setting& setting) {
+      const auto value = given.find(setting.key);
+      return setting.type == SettingType::kAutoNumber && value != given.end() &&
+             std::holds_alternative<std::string>(value->second);
+    });
+  }
 
   /// @error kBadInput when the JSON is not what the method stores
   Result<std::unique_ptr<Model>> load(const nlohmann::json& parameters) const {

@@ -19,6 +19,7 @@ PositionMethod localBumpPosition() {
           .settings = {lengthUnitSetting(), bumpEndSetting()},
           .fit = fitLocalBump,
           .read = loadLocalPosition,
+          .tuning = Tuning::kNever,  // The end of the bump is the cell's own length.
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}},
           .reading = trackedGridReading()};

@@ -83,7 +83,8 @@ OrientationMethod localQuaternionOrientation() {
           .source = "Kindratenko, Bennett 2000; survey by Kindratenko, section 4.1, weights of eq. 9-11 and 13",
           .settings = {rotationWeightSetting(), lengthUnitSetting(), bumpEndSetting(), errorFrameSetting()},
           .fit = fitLocalQuaternion,
-          .read = loadLocalQuaternion};
+          .read = loadLocalQuaternion,
+          .tuning = Tuning::kNever};  // The end of the bump is the cell's own length.
 }
 
 }  // namespace fieldtrue::correctors

@@ -290,6 +290,7 @@ PositionMethod gaussianProcessPosition() {
       .fit = fitGaussianProcess,
       .read = loadGaussianProcess,
       .hold_out = holdOutGaussianProcess,
+      .tuning = Tuning::kAlways,
       .origin = MethodOrigin::kLater,
       .tries = {{"", simplicity::kSmoothing}}};
 }

@@ -198,7 +198,8 @@ PositionMethod harmonicFieldPosition() {
   method.settings = {least_gain, most_sources};
   method.fit = fitHarmonic;
   method.read = loadHarmonic;
-  method.most_folds = 10;
+  method.cost = FitCost::kCostly;
+  method.tuning = Tuning::kAlways;
   method.origin = MethodOrigin::kLater;
   method.tries = {{"", simplicity::kPhysical}};
   return method;

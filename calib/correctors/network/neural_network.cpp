@@ -190,7 +190,7 @@ PositionMethod neuralNetworkPosition() {
       .settings = neuralNetworkSettings(),
       .fit = fitNeuralNetwork,
       .read = loadNeuralNetwork,
-      .most_folds = 10,
+      .cost = FitCost::kCostly,
       .origin = MethodOrigin::kSurvey};
 }
 

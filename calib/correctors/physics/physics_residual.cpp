@@ -291,7 +291,8 @@ PositionMethod physicsResidualPosition() {
                        "the Gaussian process takes all."));
   method.fit = fitPhysicsResidual;
   method.read = loadPhysicsResidual;
-  method.most_folds = 5;
+  method.cost = FitCost::kVeryCostly;
+  method.tuning = Tuning::kAlways;
   method.origin = MethodOrigin::kLater;
   return method;
 }

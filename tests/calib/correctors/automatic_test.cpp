@@ -184,7 +184,7 @@ class AutomaticTest : public QObject {
     const auto folds = innerFolds(data);
     PositionMethod costly = *findPositionMethod("none").value();
     costly.hold_out = nullptr;
-    costly.most_folds = 10;
+    costly.cost = FitCost::kCostly;
     const PositionMethod& good = *findPositionMethod("polynomial").value();
     const auto best = scoreCandidate({&good, settingsOf(good), "", 0}, data, folds, nullptr, {});
     FT_VERIFY_OK(best);

@@ -1,12 +1,16 @@
 #include <QTest>
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numeric>
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/corrector.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/method_text.h"
 #include "calib/correctors/registry.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/tables/true_box.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
 #include "tests/support/test_main.h"
@@ -63,10 +67,11 @@ class ClosedFormTest : public QObject {
     QTest::addColumn<bool>("rigid");
     for (const correctors::PositionMethod& method : correctors::positionMethods()) {
       if (!method.hold_out) continue;
-      for (const char* validate : {"loo", "kfold:7", "block:8"})
-        for (const bool rigid : {true, false})
-          QTest::addRow("%s, %s, align %s", method.id.c_str(), validate, rigid ? "rigid" : "none")
-              << QByteArray::fromStdString(method.id) << QByteArray(validate) << rigid;
+      for (const QByteArray validate : {"loo", "kfold:7", "block:8"})
+        if (validate == "loo" || method.tuning != correctors::Tuning::kAlways)
+          for (const bool rigid : {true, false})
+            QTest::addRow("%s, %s, align %s", method.id.c_str(), validate.constData(), rigid ? "rigid" : "none")
+                << QByteArray::fromStdString(method.id) << validate << rigid;
     }
   }
   void agreesWithFittingAnew() {
@@ -103,37 +108,95 @@ class ClosedFormTest : public QObject {
     QCOMPARE(seen.place_covered, expected.place_covered);
   }
 
-  void automaticSettingsAreSaidToComeFromAllPlaces() {
-    int n_scored = 0;
-    for (const correctors::PositionMethod& method : correctors::positionMethods()) {
-      const bool has_auto = std::any_of(method.settings.begin(), method.settings.end(), [](const Setting& setting) {
-        return setting.default_value == SettingValue(std::string("auto"));
-      });
-      if (!method.hold_out || !has_auto) continue;
-      ComparisonOptions options;
-      options.position_methods = {{method.id, {}}};
-      options.with_surroundings = false;
-      options.validation = Validation{ValidationKind::kFolds, 3};
-      const auto comparison = compareMethods(weightedTable(), options);
-      FT_VERIFY_OK(comparison);
-      const MethodScore& score = comparison->position.front();
-      if (score.skipped) continue;
-      ++n_scored;
-      QVERIFY2(std::any_of(score.notes.begin(), score.notes.end(),
-                           [](const std::string& note) { return note.find("chosen on all places") != note.npos; }),
-               method.id.c_str());
+  /// A tuned method is tuned again without the places it is judged at: its errors are those of calibrations that were
+  /// fitted, octant by octant, to the rows of the other octants alone.
+  void tunedMethodsAreTunedAnewInEveryFold_data() {
+    QTest::addColumn<QByteArray>("method");
+    for (const char* text : {"rbf", "hmq:r2_cm2=auto", "polynomial:degree=auto", "bspline", "gaussian_process"})
+      QTest::newRow(text) << QByteArray(text);
+  }
+  void tunedMethodsAreTunedAnewInEveryFold() {
+    QFETCH(QByteArray, method);
+    const CalibrationTable table = weightedTable();
+    const auto choice = calibration::parseCorrectorChoice(method.toStdString(), "none");
+    FT_VERIFY_OK(choice);
+    ComparisonOptions options;
+    options.position_methods = {parseMethodText(method.toStdString()).value()};
+    options.orientation_methods = {{"none", {}}};
+    options.validation = parseValidation("block:8").value();
+    options.align = calibration::AlignMode::kRigid;
+    options.with_surroundings = false;
+    const auto comparison = compareMethods(table, options);
+    FT_VERIFY_OK(comparison);
+    const MethodScore& score = comparison->position.front();
+    QVERIFY(score.tuned_inside && !score.closed_form && score.validated == comparison->validation);
+
+    const Eigen::Vector3d middle_m = trueBox_m(table.nodes).center();
+    const auto octant = [&](const Node& node) {
+      const Eigen::Vector3d p_m = node.reference_from_sensor.position_m - middle_m;
+      return (p_m.x() > 0.0 ? 1 : 0) + (p_m.y() > 0.0 ? 2 : 0) + (p_m.z() > 0.0 ? 4 : 0);
+    };
+    std::map<int, std::vector<double>> squares_mm2;
+    for (int held_out = 0; held_out < 8; ++held_out) {
+      std::vector<Node> others;
+      for (const Node& node : table.nodes)
+        if (octant(node) != held_out) others.push_back(node);
+      const auto corrector =
+          calibration::Corrector::fit(others, table.metadata, *choice, calibration::AlignMode::kRigid);
+      FT_VERIFY_OK(corrector);
+      for (const Node& node : table.nodes)
+        if (octant(node) == held_out)
+          squares_mm2[node.node].push_back(
+              1e6 * (corrector->correct(node.tracker_from_sensor).position_m - node.reference_from_sensor.position_m)
+                        .squaredNorm());
     }
-    QVERIFY(n_scored > 0);
+    for (std::size_t i = 0; i < comparison->places.size(); ++i) {
+      const std::vector<double>& rows = squares_mm2.at(comparison->places[i]);
+      const double mean_mm2 = std::accumulate(rows.begin(), rows.end(), 0.0) / static_cast<double>(rows.size());
+      FT_VERIFY_MATCH(near(score.place_errors[i], std::sqrt(mean_mm2), 1e-6));
+    }
   }
 
-  void aCostlyMethodIsScoredOverFewerFolds() {
+  /// Left out one by one a tuned method keeps what all places chose: told, and never called best.
+  void aMethodTunedByThePlacesItIsJudgedAtIsNeverBest() {
+    ComparisonOptions options;
+    options.position_methods = {{"affine", {}}, {"rbf", {}}};
+    options.orientation_methods = {{"none", {}}};
+    options.with_surroundings = false;
+    options.validation = parseValidation("loo").value();
+    const auto loo = compareMethods(weightedTable(), options);
+    FT_VERIFY_OK(loo);
+    QVERIFY(loo->position.front().tuned_inside);
+    const MethodScore& tuned = loo->position.back();
+    QVERIFY(!tuned.tuned_inside && tuned.closed_form && tuned.stats.rms < loo->position.front().stats.rms);
+    QCOMPARE(loo->best_position, std::string("affine"));
+    FT_VERIFY_MATCH(holdsAll(tuned.notes.back(), {"chosen on all places"}));
+    FT_VERIFY_MATCH(holdsAll(loo->notes.back(), {"Not ranked", "Radial basis functions", "kfold:10"}));
+    options.position_methods = {{"rbf", {}}};
+    const auto alone = compareMethods(weightedTable(), options);
+    FT_VERIFY_OK(alone);
+    QCOMPARE(alone->best_position, std::string("none"));
+    FT_VERIFY_MATCH(holdsAll(alone->verdict.text, {"Do not apply", "no method that loo can judge"}));
+
+    options.position_methods = {{"affine", {}}, {"rbf", {}}};
+    options.validation.reset();
+    const auto folds = compareMethods(weightedTable(), options);
+    FT_VERIFY_OK(folds);
+    QCOMPARE(toText(folds->validation), std::string("kfold:10"));
+    QCOMPARE(folds->best_position, std::string("rbf"));
+    for (const MethodScore& score : folds->position)
+      QVERIFY(score.tuned_inside && score.validated == folds->validation && score.n_folds == 10);
+  }
+
+  void aCostlyMethodIsHeldOutInTenFoldsAndThenNotBest() {
     int n_scored = 0;
     for (const correctors::PositionMethod& method : correctors::positionMethods()) {
-      if (method.most_folds == 0 || method.hold_out) continue;
+      if (!method.isCostly()) continue;
       ComparisonOptions options;
       options.position_methods = {{method.id, {}}, {"none", {}}};
       options.orientation_methods = {{"none", {}}};
       options.with_surroundings = false;
+      options.validation = parseValidation("loo").value();
       SyntheticOptions synthetic;
       synthetic.counts = {3, 3, 3};
       synthetic.smooth_distortion_m = 0.01;
@@ -142,11 +205,12 @@ class ClosedFormTest : public QObject {
       const MethodScore& score = comparison->position.front();
       if (score.skipped) continue;
       ++n_scored;
-      QCOMPARE(score.n_folds, method.most_folds);
+      QCOMPARE(score.n_folds, 10);
+      QCOMPARE(toText(score.validated), std::string("kfold:10"));
       QCOMPARE(comparison->position.back().n_folds, 27);
       QCOMPARE(score.place_errors.size(), std::size_t{27});
-      FT_VERIFY_MATCH(
-          holdsAll(score.notes.back(), {"kfold:" + QByteArray::number(method.most_folds), "instead of loo"}));
+      QCOMPARE(comparison->best_position, std::string("none"));
+      FT_VERIFY_MATCH(holdsAll(score.notes.back(), {"kfold:10", "instead of loo"}));
     }
     QVERIFY(n_scored > 0);
   }

@@ -358,6 +358,17 @@ class ComparisonTest : public QObject {
     QVERIFY(json.at("schema") == "fieldtrue.compare/1" && json.at("validate") == "loo" && json.at("align") == "rigid");
     QVERIFY(json.at("places") == 64 && json.at("validation_places") == 64);
     for (const char* key : {"position_mm", "orientation_deg", "from"}) QVERIFY(json.at("floor").contains(key));
+    QCOMPARE(json.at("scored_places").size(), std::size_t{64});
+    QCOMPARE(json.at("scored_at_edge").size(), std::size_t{64});
+    QCOMPARE(json.at("before").at("place_mm").size(), std::size_t{64});
+    const nlohmann::json& second = json.at("position").at(1);
+    QVERIFY(second.at("validated") == "loo" && second.at("tuned_inside") == true);
+    QCOMPARE(second.at("place_mm").size(), std::size_t{64});
+    // Of a grid of 4x4x4 places 56 are outermost; the whole is made of both parts.
+    const double inside_mm = second.at("position_mm_inside").at("rms").get<double>();
+    const double edge_mm = second.at("position_mm_edge").at("rms").get<double>();
+    const double whole_mm = second.at("position_mm").at("rms").get<double>();
+    FT_VERIFY_MATCH(near(std::sqrt((8 * inside_mm * inside_mm + 56 * edge_mm * edge_mm) / 64), whole_mm, 1e-9));
     for (const char* key : {"mean", "median", "rms", "p95", "max", "rms_low90", "rms_high90"}) {
       QVERIFY(json.at("before").at("position_mm").at(key).is_number());
       QVERIFY(json.at("before").at("orientation_deg").at(key).is_number());

@@ -51,11 +51,13 @@ class ValidationTest : public QObject {
 
   void roleIsTheDefaultWhereThereAreValidationRows() {
     CalibrationTable table = syntheticTable();
-    QCOMPARE(defaultValidation(table).kind, ValidationKind::kLeaveOneOut);
+    QCOMPARE(toText(defaultValidation(table, false)), std::string("loo"));
+    QCOMPARE(toText(defaultValidation(table, true)), std::string("kfold:10"));
     table.nodes[3].role = NodeRole::kSkipped;
-    QCOMPARE(defaultValidation(table).kind, ValidationKind::kLeaveOneOut);
+    QCOMPARE(toText(defaultValidation(table, false)), std::string("loo"));
     table.nodes[4].role = NodeRole::kValidation;
-    QCOMPARE(defaultValidation(table).kind, ValidationKind::kRole);
+    QCOMPARE(toText(defaultValidation(table, false)), std::string("role"));
+    QCOMPARE(toText(defaultValidation(table, true)), std::string("role"));
   }
 
   void everyPlaceIsHeldOutOnceAndWhole_data() {
