@@ -5,9 +5,9 @@
 #include <set>
 
 #include "calib/correctors/method_label.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/base/noise_floor.h"
 #include "calib/evaluation/base/progress_meter.h"
-#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/held_out.h"
 #include "calib/evaluation/held_out_job.h"
@@ -22,31 +22,31 @@ namespace {
 
 /// Statistics over the places at the edge, or over the others; none where there are none.
 std::optional<ErrorStats> statsWhere(const std::vector<double>& errors, const std::vector<bool>& is_edge, bool wanted,
-                                     std::uint64_t seed) {
+                                     bool is_tuned) {
   std::vector<double> some;
   for (std::size_t i = 0; i < errors.size(); ++i)
     if (is_edge[i] == wanted) some.push_back(errors[i]);
-  return some.empty() ? std::nullopt : std::optional(errorStats(some, seed));
+  return some.empty() ? std::nullopt : std::optional(errorStats(some, is_tuned));
 }
 
 /// The places' errors of one candidate, with what its fits told.
-MethodScore methodScore(const HeldOutJob& job, const Candidate& candidate, CandidateScores scores,
-                        const std::vector<Node>& scored, const std::vector<int>& places,
-                        const std::vector<bool>& is_edge) {
+MethodScore methodScore(const Candidate& candidate, CandidateScores scores, const std::vector<Node>& scored,
+                        const std::vector<int>& places, const std::vector<bool>& is_edge) {
   MethodScore score;
   score.method = candidate.id;
   score.settings = candidate.settings;
   score.skipped = std::move(scores.skipped);
   if (score.skipped) return score;
   PlaceScores held_out = gatherByPlace(places, scored, scores.held_out);
-  score.stats = errorStats(held_out.errors, job.seed);
-  score.inside = statsWhere(held_out.errors, is_edge, false, job.seed);
-  score.edge = statsWhere(held_out.errors, is_edge, true, job.seed);
+  score.stats = errorStats(held_out.errors, candidate.is_tuned);
+  score.inside = statsWhere(held_out.errors, is_edge, false, candidate.is_tuned);
+  score.edge = statsWhere(held_out.errors, is_edge, true, candidate.is_tuned);
   score.n_uncovered = static_cast<int>(std::count(held_out.covered.begin(), held_out.covered.end(), false));
   score.place_errors = std::move(held_out.errors);
   score.place_covered = std::move(held_out.covered);
   if (candidate.is_position) score.residual_m = std::move(held_out.residual_m);
   score.validated = scores.validated;
+  score.is_tuned = candidate.is_tuned;
   score.tuned_inside = scores.tuned_inside;
   score.n_folds = scores.n_folds;
   score.closed_form = scores.closed_form;
@@ -76,7 +76,7 @@ void scoreMethods(const HeldOutJob& job, HeldOutScores& held_out, const std::vec
   std::vector<MethodScore> scores(job.candidates.size());
   control.parallel_for(scores.size(), [&](std::size_t i) {
     if (control.stop.stop_requested()) return;
-    scores[i] = methodScore(job, job.candidates[i], std::move(held_out.candidates[i]), scored, comparison.places,
+    scores[i] = methodScore(job.candidates[i], std::move(held_out.candidates[i]), scored, comparison.places,
                             comparison.is_edge);
   });
   for (std::size_t i = 0; i < scores.size(); ++i)
@@ -86,12 +86,12 @@ void scoreMethods(const HeldOutJob& job, HeldOutScores& held_out, const std::vec
 void scoreBefore(const HeldOutJob& job, const HeldOutScores& held_out, const std::vector<Node>& scored,
                  Comparison& comparison) {
   PlaceScores position = gatherByPlace(comparison.places, scored, held_out.before_position);
-  comparison.before_position_mm = errorStats(position.errors, job.seed);
+  comparison.before_position_mm = errorStats(position.errors);
   comparison.before_place_mm = std::move(position.errors);
   comparison.before_residual_m = std::move(position.residual_m);
   if (!job.has_orientation) return;
   PlaceScores orientation = gatherByPlace(comparison.places, scored, held_out.before_orientation);
-  comparison.before_orientation_deg = errorStats(orientation.errors, job.seed);
+  comparison.before_orientation_deg = errorStats(orientation.errors);
   comparison.before_place_deg = std::move(orientation.errors);
 }
 
@@ -182,7 +182,7 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
   scoreCommonPlaces(comparison.position, comparison.places.size());
   noteClosedForm(comparison);
   noteUnranked(comparison);
-  pickBest(comparison, options.seed, control);
+  pickBest(comparison);
   judgePlaces(comparison);
   if (control.stop.stop_requested()) return comparisonStopped();
   if (options.with_surroundings) FT_TRY_VOID(addSurroundings(comparison, table, job, partOf(control, scores_end, 1.0)));

@@ -38,7 +38,7 @@ struct ComparisonOptions {
   std::vector<MethodText> orientation_methods;  ///< Empty = all.
   std::optional<Validation> validation;         ///< None = defaultValidation.
   std::optional<calibration::AlignMode> align;  ///< None = defaultAlignMode.
-  std::uint64_t seed = 1;                       ///< Of folds and bootstrap.
+  std::uint64_t seed = 1;                       ///< Of folds.
   /// Coverage, fold-back, dependence on orientation and what limits the best method, beside the scores. Without them
   /// only the scores and the rule of application are found.
   bool with_surroundings = true;
@@ -58,10 +58,11 @@ struct MethodScore {
   std::vector<bool> place_covered;  ///< Same order; where false the input stood unchanged.
   int n_uncovered = 0;
   double rms_common_mm = 0;  ///< Position only: over the places all methods cover.
-  double rms_to_best = 0;    ///< RMS minus the best method's, mm or deg, with its paired 90 % bootstrap interval.
+  double rms_to_best = 0;    ///< RMS minus the best method's, mm or deg, with its paired 90 % interval.
   double rms_to_best_low90 = 0;
   double rms_to_best_high90 = 0;
   Validation validated;                ///< What it was scored with; not the comparison's for a costly method under loo.
+  bool is_tuned = false;               ///< @see CorrectionMethod::tunes
   bool tuned_inside = true;            ///< Its fits chose nothing from the places they were scored on.
   int n_folds = 0;                     ///< Fits that were scored; fewer than asked for a costly method.
   bool closed_form = false;            ///< Held out by downdating one fit rather than by fitting anew.
@@ -86,13 +87,13 @@ struct GainTest {
 
 /// @param places node numbers, before and after in the same order; fewer than 3 never pass
 GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
-                  std::uint64_t seed = 1);
+                  bool is_tuned = false);
 
 struct Verdict {
   bool apply_position = false;
   bool apply_orientation = false;
   bool is_inside_out = false;  ///< Much of the volume is: axes or places of the readings are wrong. Nothing applies.
-  double gain_low90 = 0;  ///< Of the best position method: 1 - RMS after / RMS before, paired bootstrap over places.
+  double gain_low90 = 0;       ///< Of the best position method: 1 - RMS after / RMS before, over the same places.
   double gain_high90 = 0;
   double gain_without_worst_place = 0;
   GainTest position;     ///< Of the best position method.

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/base/index_source.h"
 #include "calib/tables/true_box.h"
 
 namespace fieldtrue::evaluation {

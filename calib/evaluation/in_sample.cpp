@@ -4,7 +4,7 @@
 #include <chrono>
 
 #include "calib/calibration/alignment.h"
-#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
 

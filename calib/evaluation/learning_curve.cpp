@@ -8,8 +8,9 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/core/statistics.h"
+#include "calib/evaluation/base/index_source.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/base/progress_meter.h"
-#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/held_out.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"

@@ -9,7 +9,7 @@
 #include "calib/core/convex_hull.h"
 #include "calib/core/spacing.h"
 #include "calib/evaluation/base/figures.h"
-#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/evaluation/region/region_lattice.h"

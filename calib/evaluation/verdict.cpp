@@ -6,7 +6,7 @@
 #include "calib/calibration/alignment.h"
 #include "calib/correctors/method_label.h"
 #include "calib/evaluation/base/figures.h"
-#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/base/intervals.h"
 
 namespace fieldtrue::evaluation {
 namespace {
@@ -31,24 +31,25 @@ std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, doubl
 }
 
 /// Fills in each method's RMS minus that of the best, or of the least wrong where none beats the error before, with
-/// the interval over the same resampled places.
+/// the interval over the same places.
 void tellDistanceToBest(std::vector<MethodScore>& scores, std::optional<std::size_t> best_row,
-                        const Comparison& comparison, std::uint64_t seed, const RunControl& control) {
+                        const Comparison& comparison) {
   const auto best = best_row ? best_row : bestRow(scores, HUGE_VAL, comparison);
   if (!best) return;
   const std::vector<double> of_best = scores[*best].place_errors;
-  control.parallel_for(scores.size(), [&](std::size_t row) {
-    MethodScore& score = scores[row];
-    if (score.skipped || control.stop.stop_requested()) return;
-    const PairedDifference difference = pairedDifference(score.place_errors, of_best, seed);
+  for (MethodScore& score : scores) {
+    if (score.skipped) continue;
+    const PairedDifference difference = pairedDifference(score.place_errors, of_best);
     score.rms_to_best = difference.difference;
     score.rms_to_best_low90 = difference.low90;
     score.rms_to_best_high90 = difference.high90;
-  });
+  }
 }
 
 std::string intervalText(const GainTest& test) {
-  return "90 % interval " + percentText(test.low90) + " to " + percentText(test.high90) + " %";
+  const std::string high = percentText(test.high90) + " %";
+  if (test.low90 < -1.0) return "90 % interval from an error more than doubled to " + high;
+  return "90 % interval " + percentText(test.low90) + " to " + high;
 }
 
 /// Why a best method fails the rule; the sentence's middle, without a full stop.
@@ -157,11 +158,11 @@ std::string orientationText(const Comparison& comparison) {
 }  // namespace
 
 GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
-                  std::uint64_t seed) {
+                  bool is_tuned) {
   FT_CHECK(places.size() == before.size() && before.size() == after.size());
   GainTest test;
   if (places.empty()) return test;
-  const PairedGain all = pairedGain(before, after, seed);
+  const PairedGain all = pairedGain(before, after, is_tuned);
   test.gain = all.gain;
   test.low90 = all.low90;
   test.high90 = all.high90;
@@ -172,7 +173,7 @@ GainTest testGain(const std::vector<int>& places, const std::vector<double>& bef
     errors.erase(errors.begin() + static_cast<std::ptrdiff_t>(worst));
     return errors;
   };
-  const PairedGain rest = pairedGain(without(before), without(after), seed);
+  const PairedGain rest = pairedGain(without(before), without(after), is_tuned);
   test.gain_without_worst_place = rest.gain;
   test.low90_without_worst_place = rest.low90;
   test.apply = all.low90 > 0.0 && all.gain >= kNeededGain && rest.low90 > 0.0 && rest.gain >= kNeededGain;
@@ -185,7 +186,7 @@ bool isRanked(const MethodScore& score, const Comparison& comparison) {
 
 double excessError(double rms, double floor) { return std::sqrt(std::max(0.0, rms * rms - floor * floor)); }
 
-void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& control) {
+void pickBest(Comparison& comparison) {
   Verdict& verdict = comparison.verdict;
   Trueness& trueness = comparison.trueness;
   comparison.best_position_row = bestRow(comparison.position, comparison.before_position_mm.rms, comparison);
@@ -194,7 +195,7 @@ void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& cont
   if (const auto row = comparison.best_position_row) {
     const MethodScore& best = comparison.position[*row];
     comparison.best_position = best.method;
-    verdict.position = testGain(comparison.places, comparison.before_place_mm, best.place_errors, seed);
+    verdict.position = testGain(comparison.places, comparison.before_place_mm, best.place_errors, best.is_tuned);
     trueness.after_position_mm = excessError(best.stats.rms, comparison.floor_position_mm);
   }
   if (comparison.before_orientation_deg) {
@@ -207,11 +208,11 @@ void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& cont
   if (const auto row = comparison.best_orientation_row) {
     const MethodScore& best = comparison.orientation[*row];
     comparison.best_orientation = best.method;
-    verdict.orientation = testGain(comparison.places, comparison.before_place_deg, best.place_errors, seed);
+    verdict.orientation = testGain(comparison.places, comparison.before_place_deg, best.place_errors, best.is_tuned);
     trueness.after_orientation_deg = excessError(best.stats.rms, comparison.floor_orientation_deg);
   }
-  tellDistanceToBest(comparison.position, comparison.best_position_row, comparison, seed, control);
-  tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, comparison, seed, control);
+  tellDistanceToBest(comparison.position, comparison.best_position_row, comparison);
+  tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, comparison);
   verdict.apply_position = verdict.position.apply;
   verdict.apply_orientation = verdict.orientation.apply;
   verdict.gain_low90 = verdict.position.low90;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "calib/evaluation/comparison.h"
 
 namespace fieldtrue::evaluation {
@@ -15,7 +13,7 @@ bool isRanked(const MethodScore& score, const Comparison& comparison);
 
 /// Picks the best of the ranked methods by held-out RMS (nothing wins unless it beats the error before), tests their
 /// gain, and tells how far the others are from the best.
-void pickBest(Comparison& comparison, std::uint64_t seed, const RunControl& control = {});
+void pickBest(Comparison& comparison);
 
 /// Nothing is applied where more than a quarter of the grid's cells fold back, or the correction does at more than a
 /// quarter of the points between the places: the axes or the places of the readings are wrong then, and a correction

@@ -9,7 +9,7 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
-#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/base/index_source.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"

@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/base/progress_meter.h"
-#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/orientation/orientation_models.h"
 #include "calib/evaluation/orientation/orientation_neighbours.h"
 #include "calib/evaluation/orientation/orientation_rows.h"
@@ -21,9 +21,9 @@ constexpr std::size_t kEnoughToHoldOut = 6;
 /// A dependence that takes less than this off the error does not matter.
 constexpr double kMatters = 0.10;
 
-void judge(const NestedErrors& errors, std::uint64_t seed, OrientationDependence& dependence) {
+void judge(const NestedErrors& errors, OrientationDependence& dependence) {
   if (errors.place_only_deg.size() < 3) return;
-  const PairedGain gain = pairedGain(errors.place_only_deg, errors.with_orientation_deg, seed);
+  const PairedGain gain = pairedGain(errors.place_only_deg, errors.with_orientation_deg);
   dependence.place_only_deg = rootMeanSquare(errors.place_only_deg);
   dependence.with_orientation_deg = rootMeanSquare(errors.with_orientation_deg);
   dependence.gain_low90 = gain.low90;
@@ -77,7 +77,7 @@ Result<OrientationDependence> orientationDependence(const CalibrationTable& tabl
   const NestedErrors errors =
       has_visits ? nestedModelErrors(rows, hold_out_orientations, seed, control) : neighbourErrors(rows, seed);
   if (control.stop.stop_requested()) return comparisonStopped();
-  judge(errors, seed, dependence);
+  judge(errors, dependence);
   dependence.text = answerText(dependence);
   if (dependence.by_neighbours)
     dependence.text += ", judged by neighbours in position and orientation, which is weaker than visits of one place";

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/base/index_source.h"
 #include "calib/evaluation/orientation/orientation_rows.h"
 
 namespace fieldtrue::evaluation {

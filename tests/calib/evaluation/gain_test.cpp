@@ -3,8 +3,9 @@
 #include <numeric>
 #include <random>
 
+#include "calib/evaluation/base/index_source.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/base/noise_floor.h"
-#include "calib/evaluation/base/resampling.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/error_stats.h"
 #include "tests/support/matchers.h"
@@ -52,15 +53,57 @@ class GainTestTest : public QObject {
     std::normal_distribution<double> normal;
     std::vector<double> errors(2000);
     for (double& error : errors) error = std::abs(normal(generator));
-    const ErrorStats stats = errorStats(errors, 3);
+    const ErrorStats stats = errorStats(errors);
     const double half_width = 1.645 / std::sqrt(2.0 * 2000.0);
     FT_VERIFY_MATCH(near(stats.rms - stats.rms_low90, half_width, 0.15 * half_width));
     FT_VERIFY_MATCH(near(stats.rms_high90 - stats.rms, half_width, 0.15 * half_width));
   }
 
-  void resamplesFollowTheSeed() {
-    const std::vector<double> errors = {1, 5, 2, 8, 3, 1, 4};
-    QCOMPARE(errorStats(errors, 7).rms_low90, errorStats(errors, 7).rms_low90);
+  /// Eight squares of mean 1 and variance 1 are carried by 8 / (1 + 1) = 4 places: two degrees of freedom, whose 95 %
+  /// point is 2.919986 by the tables.
+  void intervalByHand() {
+    std::vector<double> errors;
+    for (int i = 0; i < 8; ++i) errors.push_back(std::sqrt(1.0 + (i % 2 == 0 ? 1.0 : -1.0) * std::sqrt(7.0 / 8.0)));
+    const double t_sd = 2.919986 / std::sqrt(8.0);
+    const ErrorStats stats = errorStats(errors);
+    FT_VERIFY_MATCH(near(stats.rms, 1.0, 1e-12));
+    FT_VERIFY_MATCH(near(stats.rms_low90, std::exp(-0.5 * t_sd * (1.0 + 0.4 / 2.0)), 1e-6));
+    FT_VERIFY_MATCH(near(stats.rms_high90, std::exp(0.5 * t_sd * (1.0 + 1.4 / 2.0)), 1e-6));
+    const ErrorStats tuned = errorStats(errors, true);
+    FT_VERIFY_MATCH(near(tuned.rms_high90, std::exp(1.3 * 0.5 * t_sd * (1.0 + 1.4 / 2.0)), 1e-6));
+    // Beside an error of 4 at each place, the ratio of mean squares varies as these do, and is linear in them; 1.894579
+    // is the 95 % point of seven degrees of freedom.
+    const GainTest gain = testGain(numbered(8), std::vector<double>(8, 4.0), errors);
+    FT_VERIFY_MATCH(near(gain.gain, 0.75, 1e-12));
+    FT_VERIFY_MATCH(near(gain.low90, 1.0 - 0.25 * std::sqrt(1.0 + 1.3 * 1.894579 / std::sqrt(8.0)), 1e-6));
+    FT_VERIFY_MATCH(near(gain.high90, 1.0 - 0.25 * std::exp(-0.5 * t_sd * 1.7), 1e-6));
+    const PairedDifference difference = pairedDifference(errors, std::vector<double>(8, 4.0));
+    FT_VERIFY_MATCH(near(difference.difference, -3.0, 1e-12));
+    FT_VERIFY_MATCH(near(difference.high90, -3.0 + 0.5 * t_sd * 1.7, 1e-6));
+    FT_VERIFY_MATCH(near(difference.low90, -3.0 - 0.5 * t_sd * 1.7, 1e-6));
+  }
+
+  /// Where both vary: at its low end the gain is just within reach of the paired differences there.
+  void lowGainIsFiellers() {
+    const std::vector<double> before = {9, 7, 8, 11, 6, 10, 8, 9, 12, 7, 9, 8},
+                              after = {3, 2, 4, 3, 1, 5, 2, 3, 4, 2, 3, 2};
+    const GainTest test = testGain(numbered(12), before, after);
+    const double ratio = std::pow(1.0 - test.low90, 2);
+    double mean = 0.0, sum = 0.0;
+    for (std::size_t i = 0; i < 12; ++i) mean += (after[i] * after[i] - ratio * before[i] * before[i]) / 12.0;
+    for (std::size_t i = 0; i < 12; ++i)
+      sum += std::pow(after[i] * after[i] - ratio * before[i] * before[i] - mean, 2) / 11.0;
+    // 1.795885: Student's t, 95 %, eleven degrees of freedom, by the tables.
+    FT_VERIFY_MATCH(near(-mean / std::sqrt(sum / 12.0), 1.3 * 1.795885, 1e-5));
+  }
+
+  void oneErrorHasNoInterval() {
+    const Interval interval = rmsInterval90(std::vector<double>{2.0});
+    QCOMPARE(interval.low, 2.0);
+    QCOMPARE(interval.high, 2.0);
+  }
+
+  void indicesAreDrawnEvenly() {
     IndexSource source(1);
     std::vector<int> counts(7, 0);
     for (int i = 0; i < 70000; ++i) {
@@ -80,7 +123,7 @@ class GainTestTest : public QObject {
       after.push_back(0.5 * i);
     }
     const GainTest test = testGain(numbered(30), before, after);
-    // Every resample gains exactly one half, with and without any place.
+    // Every place gains exactly one half, so nothing varies.
     FT_VERIFY_MATCH(near(test.gain, 0.5, 1e-12));
     FT_VERIFY_MATCH(near(test.low90, 0.5, 1e-12));
     FT_VERIFY_MATCH(near(test.high90, 0.5, 1e-12));

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "calib/evaluation/base/resampling.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/limits.h"
@@ -70,10 +70,10 @@ class VerdictTest : public QObject {
       a.insert(a.end(), {x, y});
       b.insert(b.end(), {y, x});
     }
-    const PairedDifference ab = pairedDifference(a, b, 1);
+    const PairedDifference ab = pairedDifference(a, b);
     FT_VERIFY_MATCH(near(ab.difference, 0.0, 1e-12));
     QVERIFY(ab.low90 < 0.0 && ab.high90 > 0.0);
-    const PairedDifference ba = pairedDifference(b, a, 1);
+    const PairedDifference ba = pairedDifference(b, a);
     FT_VERIFY_MATCH(near(ba.low90, -ab.high90, 1e-12));
     FT_VERIFY_MATCH(near(ba.high90, -ab.low90, 1e-12));
   }
@@ -86,7 +86,7 @@ class VerdictTest : public QObject {
       a.push_back(1.0 + 0.1 * i);
       b.push_back(1.1 + 0.1 * i);
     }
-    const PairedDifference difference = pairedDifference(b, a, 1);
+    const PairedDifference difference = pairedDifference(b, a);
     QVERIFY(difference.low90 > 0.08 && difference.high90 < 0.1);
     QVERIFY(errorStats(a).rms_high90 > errorStats(b).rms_low90);
   }
