@@ -60,16 +60,13 @@ std::string inMm(double value_m) {
 nlohmann::json tableOf(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores) {
   nlohmann::json rows = nlohmann::json::array();
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    nlohmann::json row = {{"method", candidates[i].text},
-                          {"inner_rms_mm", nullptr},
-                          {"none_rms_mm", nullptr},
-                          {"folds", scores[i].n_folds},
-                          {"skipped", nullptr}};
+    nlohmann::json row = {
+        {"method", candidates[i].text}, {"inner_rms_mm", nullptr}, {"none_rms_mm", nullptr}, {"skipped", nullptr}};
     if (scores[i].skipped) {
       row["skipped"] = *scores[i].skipped;
     } else {
       row["inner_rms_mm"] = 1000.0 * scores[i].rms_m();
-      row["none_rms_mm"] = 1000.0 * scores.front().rms_m(&scores[i]);
+      row["none_rms_mm"] = 1000.0 * scores.front().rms_m();
     }
     rows.push_back(std::move(row));
   }
@@ -86,7 +83,7 @@ std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& c
                      "Chosen: " + positionLabel(candidates[chosen].method->id, candidates[chosen].settings) +
                      ", held-out RMS " + inMm(scores[chosen].rms_m());
   note += chosen == 0 ? ", since nothing else lowers it clearly"
-                      : " against " + inMm(scores.front().rms_m(&scores[chosen])) + " without correction";
+                      : " against " + inMm(scores.front().rms_m()) + " without correction";
   return note + "; " + std::to_string(n_scored) + " candidates scored over the same " + std::to_string(n_folds) +
          " folds.";
 }

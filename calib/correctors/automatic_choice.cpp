@@ -19,7 +19,8 @@ constexpr std::size_t kPlacesForFolds = 20;
 constexpr double kLeastGain = 0.05;
 constexpr double kOneSided95 = 1.645;
 
-/// Mean of a - b over the places that both were scored on, and its standard error.
+/// Mean of a - b over the places, and its standard error; of a candidate that is still being scored, over those that
+/// are.
 struct PairedDifference {
   double mean = 0.0;
   double standard_error = HUGE_VAL;
@@ -57,9 +58,9 @@ double squaredError_m2(const PositionModel& model, const FitData& data, std::siz
 
 using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const std::vector<std::size_t>& held_out)>;
 
-/// How a candidate's models without some rows are made: downdated from one fit, or fitted anew.
+/// How a candidate's models without some rows are made: downdated from one fit, or fitted anew where a fit is tuned.
 Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData& data, const RunControl& control) {
-  if (candidate.method->hold_out != nullptr) {
+  if (candidate.method->hold_out != nullptr && !candidate.method->tunes(candidate.settings)) {
     FT_TRY(auto fits, candidate.method->hold_out(data, candidate.settings, control));
     return [shared = std::shared_ptr<const HoldOutFits<PositionModel>>(std::move(fits))](
                const std::vector<std::size_t>& held_out) { return shared->without(held_out, Pose{}); };
@@ -76,10 +77,6 @@ Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData&
 bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
   const PairedDifference excess(score, best);
   return excess.mean > 0.0 && excess.mean > kDroppedFrom * excess.standard_error;
-}
-
-std::size_t foldsToScore(const AutomaticCandidate& candidate, std::size_t n_folds) {
-  return candidate.method->isCostly() ? std::min(n_folds, std::max<std::size_t>(2, (2 * n_folds + 4) / 5)) : n_folds;
 }
 
 InnerScore skippedScore(std::string why) {
@@ -112,14 +109,8 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set) {
   return candidates;
 }
 
-double InnerScore::rms_m(const InnerScore* elsewhere) const {
-  double sum_m2 = 0.0, n = 0.0;
-  for (std::size_t i = 0; i < squares_m2.size(); ++i) {
-    if (std::isnan(squares_m2[i]) || (elsewhere != nullptr && std::isnan(elsewhere->squares_m2[i]))) continue;
-    sum_m2 += squares_m2[i];
-    n += 1.0;
-  }
-  return std::sqrt(sum_m2 / n);
+double InnerScore::rms_m() const {
+  return std::sqrt(std::accumulate(squares_m2.begin(), squares_m2.end(), 0.0) / static_cast<double>(squares_m2.size()));
 }
 
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data) {
@@ -152,8 +143,7 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
   for (const std::size_t slot : slots) n_rows[slot] += 1.0;
   InnerScore score;
   score.squares_m2.assign(n_rows.size(), std::nan(""));
-  score.n_folds = foldsToScore(candidate, folds.size());
-  for (std::size_t k = 0; k < score.n_folds; ++k) {
+  for (std::size_t k = 0; k < folds.size(); ++k) {
     if (control.stop.stop_requested()) return cancelled();
     const auto model = (*model_without)(folds[k]);
     if (!model && model.error().code == ErrorCode::kCancelled) return tl::unexpected(model.error());
@@ -164,7 +154,7 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
       if (!std::isfinite(square_m2)) return skippedScore("its errors at held-out places are not finite");
       score.squares_m2[slots[row]] += square_m2 / n_rows[slots[row]];
     }
-    const bool may_drop = best != nullptr && candidate.method->isCostly() && k + 1 < score.n_folds;
+    const bool may_drop = best != nullptr && candidate.method->isCostly() && k + 1 < folds.size();
     if (may_drop && isClearlyWorse(score, *best))
       return skippedScore("dropped after " + std::to_string(k + 1) + " of " + std::to_string(folds.size()) +
                           " folds, clearly worse than another candidate");
@@ -210,8 +200,8 @@ std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, c
   }
   const InnerScore& none = scores.front();
   const PairedDifference gain(none, scores[chosen]);
-  const bool is_worth_it = scores[chosen].rms_m(&none) <= (1.0 - kLeastGain) * none.rms_m(&scores[chosen]) &&
-                           gain.mean > kOneSided95 * gain.standard_error;
+  const bool is_worth_it =
+      scores[chosen].rms_m() <= (1.0 - kLeastGain) * none.rms_m() && gain.mean > kOneSided95 * gain.standard_error;
   return is_worth_it ? chosen : 0;
 }
 

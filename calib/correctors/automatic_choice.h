@@ -30,18 +30,16 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set);
 
 /// What inner cross-validation found about one candidate.
 struct InnerScore {
-  std::vector<double> squares_m2;      ///< Held-out squared error of each place; NaN where it was not held out.
-  std::size_t n_folds = 0;             ///< Folds that were held out.
+  std::vector<double> squares_m2;      ///< Held-out squared error of each place.
   std::optional<std::string> skipped;  ///< Why it cannot be used here; then nothing else is set.
-  /// Over the places held out here and, where given, there [m].
-  double rms_m(const InnerScore* elsewhere = nullptr) const;
+  double rms_m() const;
 };
 
 /// Rows in folds by place, the same for every candidate: five, or one a place below twenty places.
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data);
 
-/// Scores a candidate on places its fits did not see: in closed form where the method has one, by refits otherwise. A
-/// costly method (FitCost) is scored on two fifths of the folds.
+/// Scores a candidate on places its fits did not see: in closed form where the method has one and is not tuned by the
+/// data, by refits otherwise.
 /// @param best so far, or null: a costly method that after any fold is worse by two standard errors is dropped
 /// @error kCancelled only; what a method cannot do is in the score
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
@@ -56,9 +54,8 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
                                                 const RunControl& control);
 
 /// The simplest candidate whose mean squared error exceeds the least by no more than one standard error of the
-/// difference, the better one among equally simple ones, each pair compared on the places that both were scored on; and
-/// the first, which must be none, unless that lowers its RMS by 5 % at least and its mean square by 1.645 standard
-/// errors (one-sided 95 %).
+/// difference, the better one among equally simple ones; and the first, which must be none, unless that lowers its RMS
+/// by 5 % at least and its mean square by 1.645 standard errors (one-sided 95 %).
 /// @source the one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984, section 3.4.3
 std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores);
 
