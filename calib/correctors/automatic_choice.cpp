@@ -18,6 +18,7 @@ constexpr double kDroppedFrom = 2.0;  ///< Standard errors.
 constexpr std::size_t kPlacesForFolds = 20;
 constexpr double kLeastGain = 0.05;
 constexpr double kOneSided95 = 1.645;
+constexpr double kOneSided99 = 2.326;
 
 /// Mean of a - b over the places, and its standard error; of a candidate that is still being scored, over those that
 /// are.
@@ -48,12 +49,28 @@ std::vector<std::size_t> slotsOf(const FitData& data) {
   return slots;
 }
 
-double squaredError_m2(const PositionModel& model, const FitData& data, std::size_t row) {
+/// True minus corrected position of a row.
+Eigen::Vector3d residual_m(const PositionModel& model, const FitData& data, std::size_t row) {
   const Eigen::Vector3d& p_m = data.p_tracked_m[row];
-  if (!model.covers(p_m)) return (p_m - data.p_true_m[row]).squaredNorm();
+  if (!model.covers(p_m)) return data.p_true_m[row] - p_m;
   const Eigen::Vector3d move_m =
       data.hasOrientation() ? model.displacementAt_m({p_m, data.q_tracked[row]}) : model.displacement_m(p_m);
-  return (p_m + move_m - data.p_true_m[row]).squaredNorm();
+  return data.p_true_m[row] - p_m - move_m;
+}
+
+/// Whether what one candidate corrects otherwise than another points to where the other errs, in SDs of chance: the
+/// cosines between both, weighted by how far they differ. Squares cannot tell where a few places carry them; a
+/// correction that knows nothing of a place left out points anywhere, however far that place errs.
+double pointsTheRightWay(const InnerScore& score, const InnerScore& other) {
+  double sum = 0.0, variance = 0.0;
+  for (std::size_t i = 0; i < std::min(score.residual_m.size(), other.residual_m.size()); ++i) {
+    const Eigen::Vector3d change_m = other.residual_m[i] - score.residual_m[i];
+    const double error_m = other.residual_m[i].norm();
+    if (!(error_m > 0.0)) continue;
+    sum += change_m.dot(other.residual_m[i]) / error_m;
+    variance += change_m.squaredNorm() / other.dimension;
+  }
+  return variance > 0.0 ? sum / std::sqrt(variance) : 0.0;
 }
 
 using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const std::vector<std::size_t>& held_out)>;
@@ -77,6 +94,13 @@ Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData&
 bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
   const PairedDifference excess(score, best);
   return excess.mean > 0.0 && excess.mean > kDroppedFrom * excess.standard_error;
+}
+
+/// Whether a candidate is better than correcting nothing: by its RMS, and by more than chance.
+bool isWorthIt(const InnerScore& score, const InnerScore& none) {
+  const PairedDifference gain(none, score);
+  const bool is_clear = gain.mean > kOneSided95 * gain.standard_error || pointsTheRightWay(score, none) > kOneSided99;
+  return is_clear && score.rms_m() <= (1.0 - kLeastGain) * none.rms_m();
 }
 
 InnerScore skippedScore(std::string why) {
@@ -143,6 +167,8 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
   for (const std::size_t slot : slots) n_rows[slot] += 1.0;
   InnerScore score;
   score.squares_m2.assign(n_rows.size(), std::nan(""));
+  score.residual_m.assign(n_rows.size(), Eigen::Vector3d::Zero());
+  score.dimension = data.dimension;
   for (std::size_t k = 0; k < folds.size(); ++k) {
     if (control.stop.stop_requested()) return cancelled();
     const auto model = (*model_without)(folds[k]);
@@ -150,9 +176,10 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
     if (!model) return skippedScore(model.error().message);
     for (const std::size_t row : folds[k]) score.squares_m2[slots[row]] = 0.0;
     for (const std::size_t row : folds[k]) {
-      const double square_m2 = squaredError_m2(**model, data, row);
-      if (!std::isfinite(square_m2)) return skippedScore("its errors at held-out places are not finite");
-      score.squares_m2[slots[row]] += square_m2 / n_rows[slots[row]];
+      const Eigen::Vector3d left_m = residual_m(**model, data, row);
+      if (!left_m.allFinite()) return skippedScore("its errors at held-out places are not finite");
+      score.squares_m2[slots[row]] += left_m.squaredNorm() / n_rows[slots[row]];
+      score.residual_m[slots[row]] += left_m / n_rows[slots[row]];
     }
     const bool may_drop = best != nullptr && candidate.method->isCostly() && k + 1 < folds.size();
     if (may_drop && isClearlyWorse(score, *best))
@@ -189,8 +216,9 @@ std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, c
   std::size_t best = 0;
   for (std::size_t i = 1; i < scores.size(); ++i)
     if (!scores[i].skipped && PairedDifference(scores[i], scores[best]).mean < 0.0) best = i;
+  if (best == 0) return 0;
   std::size_t chosen = best;
-  for (std::size_t i = 0; i < scores.size(); ++i) {
+  for (std::size_t i = 1; i < scores.size(); ++i) {
     if (scores[i].skipped) continue;
     const PairedDifference excess(scores[i], scores[best]);
     if (excess.mean > excess.standard_error) continue;
@@ -198,11 +226,8 @@ std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, c
     const bool is_as_simple = candidates[i].complexity == candidates[chosen].complexity;
     if (is_simpler || (is_as_simple && PairedDifference(scores[i], scores[chosen]).mean < 0.0)) chosen = i;
   }
-  const InnerScore& none = scores.front();
-  const PairedDifference gain(none, scores[chosen]);
-  const bool is_worth_it =
-      scores[chosen].rms_m() <= (1.0 - kLeastGain) * none.rms_m() && gain.mean > kOneSided95 * gain.standard_error;
-  return is_worth_it ? chosen : 0;
+  if (isWorthIt(scores[chosen], scores.front())) return chosen;
+  return isWorthIt(scores[best], scores.front()) ? best : 0;
 }
 
 }  // namespace fieldtrue::correctors

@@ -30,8 +30,10 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set);
 
 /// What inner cross-validation found about one candidate.
 struct InnerScore {
-  std::vector<double> squares_m2;      ///< Held-out squared error of each place.
-  std::optional<std::string> skipped;  ///< Why it cannot be used here; then nothing else is set.
+  std::vector<double> squares_m2;           ///< Held-out squared error of each place.
+  std::vector<Eigen::Vector3d> residual_m;  ///< True minus corrected there, mean over its rows.
+  int dimension = 3;                        ///< Of the places.
+  std::optional<std::string> skipped;       ///< Why it cannot be used here; then nothing else is set.
   double rms_m() const;
 };
 
@@ -53,9 +55,11 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
                                                 const std::vector<std::vector<std::size_t>>& folds,
                                                 const RunControl& control);
 
-/// The simplest candidate whose mean squared error exceeds the least by no more than one standard error of the
-/// difference, the better one among equally simple ones; and the first, which must be none, unless that lowers its RMS
-/// by 5 % at least and its mean square by 1.645 standard errors (one-sided 95 %).
+/// The simplest candidate that corrects at all and whose mean squared error exceeds the least by no more than one
+/// standard error of the difference, the better one among equally simple ones. None, which must be the first, where
+/// neither that one nor the best lowers its RMS by 5 % at least and clearly: its mean square by 1.645 standard errors
+/// (one-sided 95 %), or, where a few places carry the squares, by corrections that point to where the places left out
+/// err, by 2.326 SDs of the mean cosine of directions that know nothing (one-sided 99 %).
 /// @source the one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984, section 3.4.3
 std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores);
 

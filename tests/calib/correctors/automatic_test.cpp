@@ -105,6 +105,31 @@ class AutomaticTest : public QObject {
     QCOMPARE(chooseCandidate(ranked({0, 3}), scores), static_cast<std::size_t>(expected));
   }
 
+  /// Two places of fifty carry the squares, so the gain is 1.4 standard errors; yet at every place the correction
+  /// points to where the place errs: cosines of 1, weights 10, 10 and 48 times 0.1.
+  void aCorrectionThatPointsTheRightWayIsBelieved_data() {
+    QTest::addColumn<double>("turned");
+    QTest::addColumn<int>("expected");
+    // Sum of lengths 24.8 over sqrt((200 + 0.48) / 3) = 8.17: 3.03 SDs; half of it below the 2.326 that are asked for.
+    QTest::newRow("towards the errors") << 1.0 << 1;
+    QTest::newRow("60 degrees off") << 0.5 << 0;
+  }
+  void aCorrectionThatPointsTheRightWayIsBelieved() {
+    QFETCH(double, turned);
+    QFETCH(int, expected);
+    std::vector<InnerScore> scores(2);
+    for (int i = 0; i < 50; ++i) {
+      const double error_m = i < 2 ? 20.0 : 1.0, length_m = i < 2 ? 10.0 : 0.1;
+      const Eigen::Vector3d before_m(error_m, 0.0, 0.0);
+      const Eigen::Vector3d move_m = length_m * Eigen::Vector3d(turned, std::sqrt(1.0 - turned * turned), 0.0);
+      scores[0].residual_m.push_back(before_m);
+      scores[1].residual_m.push_back(before_m - move_m);
+    }
+    for (InnerScore& score : scores)
+      for (const Eigen::Vector3d& residual_m : score.residual_m) score.squares_m2.push_back(residual_m.squaredNorm());
+    QCOMPARE(chooseCandidate(ranked({0, 3}), scores), static_cast<std::size_t>(expected));
+  }
+
   void skippedCandidatesAreNeverChosen() {
     std::vector<InnerScore> scores(3);
     scores[0].squares_m2 = std::vector<double>(50, 1.0);
