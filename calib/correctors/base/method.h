@@ -35,9 +35,10 @@ class HoldOutFits {
 /// Where a method comes from. Baselines are looked at beside all others.
 enum class MethodOrigin { kBaseline, kSurvey, kLater };
 
-/// Ranks in simplicity, above none, rigid, affine and polynomials by degree (0 to 7).
+/// Ranks in simplicity, above none, rigid, affine and polynomials by degree (0 to 7). Physical and smoothing fits are
+/// alike in it: which errs less decides.
 namespace simplicity {
-inline constexpr int kPhysical = 9;        ///< Fields that obey the physics.
+inline constexpr int kPhysical = 10;       ///< Fields that obey the physics.
 inline constexpr int kSmoothing = 10;      ///< Smoothing fits that follow any field.
 inline constexpr int kInterpolating = 20;  ///< What passes through every place.
 }  // namespace simplicity

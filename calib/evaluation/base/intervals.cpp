@@ -16,8 +16,8 @@ namespace {
 constexpr double kBelow = 0.4;
 constexpr double kAbove = 1.4;
 constexpr double kTuned = 1.3;
-/// Of the end at which a gain is least, against Student's t of all places.
-constexpr double kLeastGain = 1.3;
+/// Of the end at which a gain is least, against Student's t of all places: it is that of the best of many methods.
+constexpr double kLeastGain = 1.75;
 
 double sumOfSquares(std::span<const double> values) {
   return std::inner_product(values.begin(), values.end(), values.begin(), 0.0);
@@ -83,12 +83,13 @@ double covariance(std::span<const double> a, std::span<const double> b) {
 /// @source Fieller 1954
 std::optional<double> fiellerRatio(std::span<const double> a, std::span<const double> b, double reach) {
   const double scale = reach * reach / static_cast<double>(a.size());
-  // (1 - r)^2 = scale (var a - 2 r cov + r^2 var b), a quadratic in r.
+  const std::vector<double> difference = differences(a, b);
+  // With e = r - 1: e^2 = scale (var(a - b) - 2 e cov(a - b, b) + e^2 var b).
   const double square = 1.0 - scale * sampleVariance(b);
-  const double half_linear = 1.0 - scale * covariance(a, b);
-  const double constant = 1.0 - scale * sampleVariance(a);
+  const double half_linear = scale * covariance(difference, b);
   if (!(square > 0.0)) return std::nullopt;
-  return (half_linear + std::sqrt(std::max(0.0, half_linear * half_linear - square * constant))) / square;
+  const double root = std::sqrt(half_linear * half_linear + square * scale * sampleVariance(difference));
+  return 1.0 + (root - half_linear) / square;
 }
 
 }  // namespace

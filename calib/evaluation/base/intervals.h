@@ -30,7 +30,7 @@ Interval rmsInterval90(std::span<const double> errors, bool is_tuned = false);
 /// What a correction gains on places its fits did not see: 1 - RMS after / RMS before, with its paired 90 % interval.
 /// With u = after^2 / mean(after^2) - before^2 / mean(before^2), c = SD of u, n_e and t as above: the ratio of mean
 /// squares is at least that seen times exp(-t c / sqrt(n) (1 + 1.4/sqrt(n_e))), and at most the largest r for which
-/// mean(after^2 - r before^2) lies within 1.3 times the 95 % point of Student's t (n - 1 degrees) of zero, in its SDs;
+/// mean(after^2 - r before^2) lies within 1.75 times the 95 % point of Student's t (n - 1 degrees) of zero, in its SDs;
 /// both 1.3 times as far for a tuned method.
 /// @source Fieller 1954 for the second
 struct PairedGain {

@@ -63,7 +63,7 @@ double lowGain(const std::vector<double>& before, const std::vector<double>& aft
     return squares / (n - 1.0);
   };
   const double a_mean = std::pow(rms(after), 2), b_mean = std::pow(rms(before), 2);
-  const double reach = 1.3 * widening * studentPoint95(n - 1.0);
+  const double reach = 1.75 * widening * studentPoint95(n - 1.0);
   double low = a_mean / b_mean, high = 1e4 * low;
   for (int i = 0; i < 200; ++i) {
     const double ratio = 0.5 * (low + high);
