@@ -15,6 +15,8 @@ namespace {
 /// A metal body turns the readings of a sensor that is set down in one orientation, some of them by several degrees;
 /// such turns foretell its other errors there, and mislead in every other orientation.
 constexpr double kTurnedAlike_rad = 15.0 * kRadPerDeg;
+/// Where the rig states one orientation, or none, the tracked ones must tell, which metal turns by tens of degrees.
+constexpr double kTrackedAlike_rad = 45.0 * kRadPerDeg;
 constexpr double kShareTurnedAlike = 0.9;
 constexpr std::size_t kMostPoses = 10000;  // 800 MB for the matrix.
 constexpr double kNatsAParameter = 3.0;
@@ -293,16 +295,18 @@ std::optional<PoseGain> gainOfPoses(const PoseSystem& system, const GaussianProc
 }  // namespace
 
 bool hasSeveralOrientations(const FitData& data) {
-  const auto n_alike = [&data](const Eigen::Quaterniond& q) {
-    return std::count_if(data.q_tracked.begin(), data.q_tracked.end(), [&q](const Eigen::Quaterniond& other) {
-      return angleBetween_rad(q, other) < kTurnedAlike_rad;
-    });
+  if (!data.hasOrientation()) return false;
+  const bool is_stated = distinctRotations(data.q_true, kSameOrientation_rad).size() > 1;
+  const std::vector<Eigen::Quaterniond>& turns = is_stated ? data.q_true : data.q_tracked;
+  const double alike_rad = is_stated ? kTurnedAlike_rad : kTrackedAlike_rad;
+  const auto n_alike = [&](const Eigen::Quaterniond& q) {
+    return std::count_if(turns.begin(), turns.end(),
+                         [&](const Eigen::Quaterniond& other) { return angleBetween_rad(q, other) < alike_rad; });
   };
-  const auto most_alike = kShareTurnedAlike * static_cast<double>(data.q_tracked.size());
-  const std::vector<Eigen::Quaterniond> distinct = distinctRotations(data.q_tracked, kSameOrientation_rad);
-  return data.hasOrientation() && std::none_of(distinct.begin(), distinct.end(), [&](const Eigen::Quaterniond& q) {
-           return static_cast<double>(n_alike(q)) > most_alike;
-         });
+  const auto most_alike = kShareTurnedAlike * static_cast<double>(turns.size());
+  const std::vector<Eigen::Quaterniond> distinct = distinctRotations(turns, kSameOrientation_rad);
+  return std::none_of(distinct.begin(), distinct.end(),
+                      [&](const Eigen::Quaterniond& q) { return static_cast<double>(n_alike(q)) > most_alike; });
 }
 
 Result<PoseChoice> choosePoses(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
@@ -310,11 +314,11 @@ Result<PoseChoice> choosePoses(const FitData& data, const Places& places, Radial
                                const RunControl& control) {
   if (!hasSeveralOrientations(data)) {
     if (must)
-      return fail(ErrorCode::kUnsupported,
-                  "inputs=pose needs rows in several orientations, and " +
-                      (data.hasOrientation() ? "nine of ten of these " + std::to_string(data.size()) +
-                                                   " rows are turned within 15 degrees of one"
-                                             : std::string("these have none")));
+      return fail(
+          ErrorCode::kUnsupported,
+          "inputs=pose needs rows in several orientations, and " +
+              (data.hasOrientation() ? "nine of ten of these " + std::to_string(data.size()) + " rows are turned alike"
+                                     : std::string("these have none")));
     return PoseChoice{};
   }
   if (data.size() > kMostPoses) {

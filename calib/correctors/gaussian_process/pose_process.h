@@ -29,7 +29,9 @@ struct PoseChoice {
   std::string note;  ///< Empty where there is nothing to choose.
 };
 
-/// Whether rows are turned so differently that orientation can be asked about.
+/// Whether rows are turned so differently that orientation can be asked about: fewer than nine of ten within 15 degrees
+/// of any one, as the rig states it; where it states one orientation or none, within 45 degrees as tracked. What metal
+/// does to the readings of a sensor that never turned says nothing of one that is turned.
 bool hasSeveralOrientations(const FitData& data);
 
 /// Chooses between position alone and poses, and finds the scales. Poses need 3 nats of restricted likelihood a further

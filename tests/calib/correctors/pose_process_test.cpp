@@ -314,6 +314,23 @@ class PoseProcessTest : public QObject {
       if (!takes) QVERIFY(model->displacement_m(p_m) == alone->displacement_m(p_m));
   }
 
+  /// Metal turns the readings of a sensor that the rig never turned, by up to 25 degrees and smoothly with the place:
+  /// the error of position follows them, and says nothing of what a turned sensor would read.
+  void aSensorThatNeverTurnedTellsNothingOfTurns() {
+    FitData data = turnedData(1, {});
+    for (std::size_t row = 0; row < data.size(); ++row) {
+      const Eigen::Vector3d& p_m = data.p_tracked_m[row];
+      const Eigen::Vector3d turn = 0.4 * Eigen::Vector3d(std::sin(9.0 * p_m.x()), std::cos(7.0 * p_m.y()), 0.0);
+      data.q_tracked[row] = rotationFromVector(turn);
+      data.q_true[row] = Eigen::Quaterniond::Identity();
+      data.p_true_m[row] = p_m + 0.02 * turn;
+    }
+    QVERIFY(!fittedWith(data, "auto")->takesOrientation());
+    // The same readings of a sensor that was turned so are asked about.
+    data.q_true = data.q_tracked;
+    QVERIFY(hasSeveralOrientations(data));
+  }
+
   void whatIsAskedForAndIsNotThereIsRefused() {
     const PositionMethod* method = *findPositionMethod("gaussian_process");
     const Settings settings = *resolveSettings(method->id, method->settings, {{"inputs", "pose"}});
