@@ -43,7 +43,9 @@ std::string orientationName(const evaluation::MethodScore& score) {
 Row statsRow(const std::string& name, const evaluation::ErrorStats& stats) {
   return {name,
           widgets::errorFigure(stats.rms),
-          widgets::errorFigure(stats.rms_low90) + " to " + widgets::errorFigure(stats.rms_high90),
+          std::isfinite(stats.rms_low90)
+              ? widgets::errorFigure(stats.rms_low90) + " to " + widgets::errorFigure(stats.rms_high90)
+              : "-",
           widgets::errorFigure(stats.median),
           widgets::errorFigure(stats.p95),
           widgets::errorFigure(stats.max)};

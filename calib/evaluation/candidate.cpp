@@ -82,7 +82,7 @@ Candidate makeCandidate(const correctors::CorrectionMethod<Model>& method, Setti
   candidate.is_position = std::is_same_v<Model, correctors::PositionModel>;
   candidate.is_costly = method.isCostly();
   candidate.is_tuned = method.tunes(settings);
-  if (method.hold_out)
+  if (method.holdsOutExactly(settings) || (method.hold_out && candidate.is_tuned))
     candidate.hold_out = [&method, settings](const correctors::FitData& data, const RunControl& control) {
       return method.hold_out(data, settings, control).map(fitWithout<Model>);
     };

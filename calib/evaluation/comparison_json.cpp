@@ -1,3 +1,4 @@
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "calib/calibration/alignment.h"
@@ -9,18 +10,18 @@ namespace {
 
 using nlohmann::json;
 
+/// What cannot be stated is null, never absent and never zero.
+json nullUnless(bool stated, const json& value) { return stated ? value : json(nullptr); }
+
 json statsToJson(const ErrorStats& stats) {
   return {{"mean", stats.mean},
           {"median", stats.median},
           {"rms", stats.rms},
           {"p95", stats.p95},
           {"max", stats.max},
-          {"rms_low90", stats.rms_low90},
-          {"rms_high90", stats.rms_high90}};
+          {"rms_low90", nullUnless(std::isfinite(stats.rms_low90), stats.rms_low90)},
+          {"rms_high90", nullUnless(std::isfinite(stats.rms_high90), stats.rms_high90)}};
 }
-
-/// What cannot be stated is null, never absent and never zero.
-json nullUnless(bool stated, const json& value) { return stated ? value : json(nullptr); }
 
 json optionalToJson(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
 

@@ -195,13 +195,18 @@ std::string limitedBy(const Comparison& comparison, const HeldOutJob& job, std::
            " mm)";
   if (auto one = onePlace(comparison, errors, rms_mm)) return *one;
   if (auto some = somePlaces(comparison, job, errors)) return *some;
+  if (!comparison.verdict.apply_position && comparison.verdict.position.gain >= kNeededGain)
+    return "a gain that these places do not show surely";
   if (!comparison.verdict.apply_position)
     return "error that no method predicts from the other places: the jig's or the noise's, or detail finer than the "
            "places are apart";
   const MethodScore& best = *bestScore(comparison);
   if (best.n_uncovered > 0 && best.rms_common_mm > 0.0 && rms_mm > kMuchLarger * best.rms_common_mm)
     return countText(static_cast<std::size_t>(best.n_uncovered), "place", "places") + " that the method does not reach";
-  if (with_half_mm && *with_half_mm > kHelps * rms_mm)
+  if (!with_half_mm)
+    return "error of which it cannot be told whether more places would remove it: half of these are too few for the "
+           "method, or too costly";
+  if (*with_half_mm > kHelps * rms_mm)
     return "detail of the field between the places: fits on half of them err by " + errorText(*with_half_mm) +
            " mm, so more places would help";
   return "error that more places like these would hardly remove: the jig's or the noise's beyond what is stated, or "

@@ -11,7 +11,6 @@
 namespace fieldtrue::evaluation {
 namespace {
 
-constexpr double kNeededGain = 0.10;
 constexpr std::size_t kFewestPlaces = 3;
 /// Validation places that span less of the box around all places do not stand for the region.
 constexpr double kWholeRegion = 0.5;
@@ -55,7 +54,8 @@ std::string intervalText(const GainTest& test) {
 /// Why a best method fails the rule; the sentence's middle, without a full stop.
 std::string whyNot(const GainTest& test, const Comparison& comparison) {
   const std::size_t n_places = comparison.places.size();
-  if (n_places < kFewestPlaces) return ", and " + std::to_string(n_places) + " places are too few to judge by";
+  if (n_places < kFewestPlaces)
+    return ", and " + countText(n_places, "place is", "places are") + " too few to judge by";
   if (test.gain < kNeededGain) return ", and at least 10 % is needed";
   if (test.low90 <= 0.0) return ", and the interval does not exclude zero";
   const std::string without = ", and without " + comparison.names.of(test.worst_place) + " it is " +
@@ -65,7 +65,7 @@ std::string whyNot(const GainTest& test, const Comparison& comparison) {
 }
 
 std::string placesText(const Comparison& comparison) {
-  const std::string text = "on " + std::to_string(comparison.places.size()) + " places the fits did not see";
+  const std::string text = "on " + countText(comparison.places.size(), "place", "places") + " the fits did not see";
   return comparison.validated_share < kWholeRegion
              ? text + ", which span only " + percentText(comparison.validated_share) + " % of the region"
              : text;

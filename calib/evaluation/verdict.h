@@ -8,6 +8,9 @@ namespace fieldtrue::evaluation {
 /// larger floor is overstated.
 constexpr double kOverstatedFloor = 3.0;
 
+/// A smaller gain is not worth a correction.
+constexpr double kNeededGain = 0.10;
+
 /// Whether a method may be called best: scored as the comparison says, and not tuned by the places it is judged at.
 bool isRanked(const MethodScore& score, const Comparison& comparison);
 

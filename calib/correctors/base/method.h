@@ -76,6 +76,9 @@ struct CorrectionMethod {
   std::unique_ptr<Model> (*read)(const JsonReader& parameters) = nullptr;
   /// Fits with rows left out, without fitting anew; null where the method has no closed form.
   Result<std::unique_ptr<HoldOutFits<Model>>> (*hold_out)(const FitData&, const Settings&, const RunControl&) = nullptr;
+  /// The fits of hold_out keep lengths and weights that all rows gave, even with every setting told: only near to fits
+  /// anew, so they stand where what all rows chose is kept anyway.
+  bool keeps_scales = false;
   FitCost cost = FitCost::kLight;
   Tuning tuning = Tuning::kBySettings;
   MethodOrigin origin = MethodOrigin::kSurvey;
@@ -83,6 +86,9 @@ struct CorrectionMethod {
   std::vector<AutomaticTry> tries = {};
   /// How the source is read where a sentence of it leaves more than one way; empty where none does.
   std::string reading = {};
+
+  /// Whether hold_out gives what fits anew would.
+  bool holdsOutExactly(const Settings& given) const { return hold_out != nullptr && !keeps_scales && !tunes(given); }
 
   bool isCostly() const { return cost != FitCost::kLight; }
 

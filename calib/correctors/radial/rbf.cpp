@@ -194,6 +194,7 @@ PositionMethod rbfPosition() {
           .fit = fitRbf,
           .read = loadRbf,
           .hold_out = holdOutRbf,
+          .keeps_scales = true,
           .origin = MethodOrigin::kLater,
           .tries = {{"", simplicity::kSmoothing}, {"kernel=thin_plate", simplicity::kSmoothing}}};
 }

@@ -166,6 +166,7 @@ PositionMethod bsplinePosition() {
       .fit = fitBspline,
       .read = loadBspline,
       .hold_out = holdOutBspline,
+      .keeps_scales = true,
       .origin = MethodOrigin::kLater,
       .tries = {{"", simplicity::kSmoothing}}};
 }

@@ -100,6 +100,7 @@ double rootMeanSquare(std::span<const double> values) {
 
 Interval rmsInterval90(std::span<const double> errors, bool is_tuned) {
   FT_CHECK(!errors.empty());
+  if (errors.size() < 2) return {std::nan(""), std::nan("")};
   const double rms = rootMeanSquare(errors);
   const std::vector<double> relative = relativeSquares(errors);
   const double sd = sdOfMean(relative) * (is_tuned ? kTuned : 1.0);

@@ -24,7 +24,7 @@ struct Interval {
 
 double rootMeanSquare(std::span<const double> values);
 
-/// 90 % interval of the RMS of places' errors.
+/// 90 % interval of the RMS of places' errors; not a number for one place, which tells nothing of others.
 Interval rmsInterval90(std::span<const double> errors, bool is_tuned = false);
 
 /// What a correction gains on places its fits did not see: 1 - RMS after / RMS before, with its paired 90 % interval.

@@ -1,3 +1,5 @@
+#include "calib/correctors/gaussian_process/pose_process.h"
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <QTest>

@@ -99,8 +99,7 @@ class GainTestTest : public QObject {
 
   void oneErrorHasNoInterval() {
     const Interval interval = rmsInterval90(std::vector<double>{2.0});
-    QCOMPARE(interval.low, 2.0);
-    QCOMPARE(interval.high, 2.0);
+    QVERIFY(std::isnan(interval.low) && std::isnan(interval.high));
   }
 
   void indicesAreDrawnEvenly() {
