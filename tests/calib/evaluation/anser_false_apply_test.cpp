@@ -101,7 +101,7 @@ void AnserFalseApplyTest::isNotFooledByRecordings() {
 void AnserFalseApplyTest::seesAMixedRoom() {
   const simulation::Scene scene = readRoom(FIELDTRUE_RESOURCES, "mixed");
   int n_harmonic = 0;
-  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
     const CalibrationTable split = splitForVerdict(tableToFit(recordRoom(scene, seed, 0, 2)), seed);
     const VerdictOutcome polynomial = verdictOutcome(split, {MethodText{"polynomial", {{"degree", "2"}}}});
     QVERIFY(polynomial.applied);
