@@ -92,6 +92,7 @@ class CommandLine {
 void addDataCommands(CommandLine& line);     ///< simulate, tables, import, export
 void addApplyCommand(CommandLine& line);     ///< apply
 void addFitCommands(CommandLine& line);      ///< fit, compare, report
+void addDifferenceCommand(CommandLine& line);  ///< difference
 void addAcquireCommand(CommandLine& line);   ///< acquire
 void addEmulateCommand(CommandLine& line);   ///< emulate
 void addResampleCommand(CommandLine& line);  ///< resample

@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "acquisition/devices/registry.h"
 #include "acquisition/plan/place_state.h"
@@ -37,6 +38,7 @@ struct AcquireOptions {
   std::string session;
   int samples_per_node = 60;
   bool automatic = false;
+  std::vector<std::string> setup;
 };
 
 std::string placeText(const PlannedPlace& place) {
@@ -92,8 +94,9 @@ class Acquisition {
     connectSignals();
   }
 
-  Outcome run(const QString& plan_json) {
+  Outcome run(const QString& plan_json, const Setup& setup) {
     const EndRequest end_request([this] { end("stopped"); });
+    controller_.setSetup(setup);
     controller_.openSession(QString::fromStdString(options_.session), plan_json);
     if (failure_) return tl::unexpected(*failure_);
     if (controller_.status().session->read_only) return notPossible(remarks_.front());
@@ -327,6 +330,8 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   if (!scene) return tl::unexpected(scene.error());
   // Made only to see that its text can be read, before a session file is made; it is not started.
   if (const auto device = acquisition::makeDevice(options.device, *scene); !device) return wrongUsage(device.error());
+  const auto setup = readSetupArgument(options.setup);
+  if (!setup) return tl::unexpected(setup.error());
   const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
   if (!resumes && options.plan.empty()) {
     return wrongUsage(options.session + " does not exist yet; a new session needs --plan");
@@ -341,7 +346,7 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   }
   Acquisition acquisition(options, common);
   if (resumes && plan_json) acquisition.expectPlan(*plan_json);
-  return acquisition.run(create_plan_json);
+  return acquisition.run(create_plan_json, *setup);
 }
 
 }  // namespace
@@ -360,6 +365,7 @@ void addAcquireCommand(CommandLine& line) {
   command->add_option("--samples-per-node", options->samples_per_node, "Good samples at each place (default 60)")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
+  addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
   command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
   command->add_option("--session", options->session, "Session file (*.fieldtrue); made new, or resumed if it exists")
       ->type_name("FILE")

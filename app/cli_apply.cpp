@@ -4,15 +4,19 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "app/cli.h"
 #include "app/cli_values.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/file_io.h"
+#include "calib/core/setup.h"
 #include "calib/core/trimmed.h"
 #include "calib/core/units.h"
 #include "calib/recording/unit_slip.h"
@@ -23,9 +27,10 @@ namespace fieldtrue::cli {
 namespace {
 
 constexpr std::size_t kBatch = 4096;
-constexpr std::array<const char*, 10> kAppended = {
+constexpr std::array<const char*, 11> kAppended = {
     "x_corrected_m", "y_corrected_m", "z_corrected_m", "qw_corrected", "qx_corrected",
-    "qy_corrected",  "qz_corrected",  "uncertainty_m", "covered",      "nearest_orientation_deg"};
+    "qy_corrected",  "qz_corrected",  "uncertainty_m", "covered",      "nearest_orientation_deg",
+    "setup_matches"};
 
 /// The fields of one line; commas inside double quotes do not separate.
 std::vector<std::string_view> splitFields(std::string_view line) {
@@ -49,21 +54,60 @@ struct Columns {
   std::array<std::size_t, 3> position{};
   std::optional<std::array<std::size_t, 4>> orientation;  ///< w x y z.
   std::optional<std::size_t> status;
+  std::optional<std::size_t> sensor;
 };
 
 /// A row waiting for its batch.
 struct PendingRow {
   std::string text;
   std::optional<std::size_t> pose;  ///< Index into the batch's poses; none for a row that the tracker marked as lost.
+  SetupMatch setup = SetupMatch::kUnknown;
+};
+
+/// Whether the rows of a table are of the set-up that was calibrated: by what the table's head states, what a person
+/// states, which wins, and each row's sensor.
+class SetupCheck {
+ public:
+  SetupCheck(Setup calibrated, Setup stated) : calibrated_(std::move(calibrated)), stated_(std::move(stated)) {}
+
+  /// @param line of metadata, "# setup.room: Lab 2", or anything else
+  void readHead(std::string_view line) {
+    const std::size_t colon = line.find(':');
+    if (colon == std::string_view::npos) return;
+    const std::string_view key = trimmed(line.substr(1, colon - 1));
+    // What is no fact of a set-up is somebody else's.
+    if (key.starts_with(kSetupPrefix)) (void)state(head_, key.substr(kSetupPrefix.size()), line.substr(colon + 1));
+  }
+
+  /// @param sensor of the row, empty where the table does not tell
+  SetupMatch ofRow(std::string_view sensor) {
+    const auto known = by_sensor_.find(sensor);
+    if (known != by_sensor_.end()) return known->second;
+    Setup row = head_;
+    (void)state(row, "sensor", sensor.empty() ? factOf(head_, "sensor").value_or("") : sensor);
+    for (const auto& [key, value] : stated_) row[key] = value;
+    const SetupMatch answer = match(calibrated_, row);
+    if (answer == SetupMatch::kNo && difference_.empty()) difference_ = differenceText(calibrated_, row);
+    return by_sensor_.emplace(sensor, answer).first->second;
+  }
+
+  /// What differs in the first rows that are of another set-up; empty where none is.
+  const std::string& difference() const { return difference_; }
+
+ private:
+  Setup calibrated_, stated_, head_;
+  std::map<std::string, SetupMatch, std::less<>> by_sensor_;
+  std::string difference_;
 };
 
 class TableCorrector {
  public:
-  TableCorrector(const calibration::Corrector& corrector, std::istream& in, std::string name)
+  TableCorrector(const calibration::Corrector& corrector, Setup stated, std::istream& in, std::string name)
       : corrector_(corrector),
         orientations_seen_(corrector.orientationsSeen()),
         lines_(in, std::move(name)),
-        units_(corrector.region(), trackedPositions(corrector)) {}
+        units_(corrector.region(), trackedPositions(corrector)),
+        setup_(corrector.setup(), std::move(stated)) {}
 
   /// Copies the table with the corrected columns appended.
   Result<void> run(std::ostream& out) {
@@ -74,6 +118,7 @@ class TableCorrector {
       if (line_.empty() || line_.front() == '#') {
         // Between rows the order of rows and remarks is kept by emptying the batch first.
         flush(out);
+        if (!columns_ && !line_.empty()) setup_.readHead(line_);
         out << line_ << '\n';
         continue;
       }
@@ -93,6 +138,8 @@ class TableCorrector {
   std::size_t n_rows() const { return n_rows_; }
   std::size_t n_outside() const { return n_outside_; }
   std::size_t n_lost() const { return n_lost_; }
+  std::size_t n_other_setup() const { return n_other_setup_; }
+  const std::string& setupDifference() const { return setup_.difference(); }
   /// The correction takes orientation and the table has none.
   bool isPositionOnly() const { return corrector_.takesOrientation() && columns_ && !columns_->orientation; }
 
@@ -128,6 +175,7 @@ class TableCorrector {
     if (!orientation) return tl::unexpected(orientation.error());
     columns.orientation = *orientation;
     columns.status = find(names, "status");
+    columns.sensor = find(names, "sensor");
     columns_ = columns;
     names_ = std::move(names);
     out << line_;
@@ -196,7 +244,9 @@ class TableCorrector {
     const auto read = pose(fields);
     // A reading the tracker itself marked may hold anything; it is kept, and corrected only when it is a pose.
     if (!read && !marked) return tl::unexpected(read.error());
-    PendingRow row{line_, std::nullopt};
+    const std::string_view sensor =
+        columns_->sensor ? trimmed(fields[*columns_->sensor], kBlankOrQuote) : std::string_view();
+    PendingRow row{line_, std::nullopt, setup_.ofRow(sensor)};
     if (read) {
       row.pose = poses_.size();
       if (!marked) units_.add(read->position_m);
@@ -220,7 +270,8 @@ class TableCorrector {
         out << ",,,,,,,,,0,";
         ++n_lost_;
       }
-      out << '\n';
+      out << ',' << nameOf(row.setup) << '\n';
+      if (row.setup == SetupMatch::kNo) ++n_other_setup_;
     }
     n_rows_ += rows_.size();
     rows_.clear();
@@ -256,6 +307,7 @@ class TableCorrector {
   std::vector<Eigen::Quaterniond> orientations_seen_;
   LineReader lines_;
   recording::ReadingUnits units_;
+  SetupCheck setup_;
   std::string line_;
   std::optional<Columns> columns_;
   std::vector<std::string> names_;
@@ -264,16 +316,20 @@ class TableCorrector {
   std::size_t n_rows_ = 0;
   std::size_t n_outside_ = 0;
   std::size_t n_lost_ = 0;
+  std::size_t n_other_setup_ = 0;
 };
 
 struct ApplyOptions {
   std::string calibration;
   std::string in;
   std::string out;
+  std::vector<std::string> setup;
   bool force = false;
 };
 
 Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
+  auto setup = readSetupArgument(options.setup);
+  if (!setup) return tl::unexpected(setup.error());
   const auto corrector = calibration::Corrector::load(options.calibration);
   if (!corrector) return notPossible(corrector.error());
   if (std::filesystem::is_directory(options.in)) return notPossible(options.in + " is a folder, not a table");
@@ -282,7 +338,7 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
     const auto reason = readFile(options.in);
     return notPossible(reason ? options.in + " cannot be opened" : reason.error().message);
   }
-  TableCorrector table(*corrector, in, options.in);
+  TableCorrector table(*corrector, *std::move(setup), in, options.in);
   std::optional<Error> in_error;
   const auto written = writeFileAtomically(options.out, [&](std::ostream& out) {
     auto corrected = table.run(out);
@@ -296,8 +352,11 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
   if (in_error) return notPossible(*in_error);
   if (!written) return notPossible(written.error());
   Answer answer;
-  answer.json = {
-      {"file", options.out}, {"rows", table.n_rows()}, {"outside", table.n_outside()}, {"lost", table.n_lost()}};
+  answer.json = {{"file", options.out},
+                 {"rows", table.n_rows()},
+                 {"outside", table.n_outside()},
+                 {"lost", table.n_lost()},
+                 {"other_setup", table.n_other_setup()}};
   answer.text = std::to_string(table.n_rows()) + " rows written to " + options.out + "; " +
                 std::to_string(table.n_outside()) + " outside the calibrated region (covered = 0), " +
                 std::to_string(table.n_lost()) + " without a pose\n";
@@ -305,6 +364,10 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
     answer.remarks.push_back(options.in + " has no orientations (qw, qx, qy, qz), on which this correction depends: " +
                              "positions are corrected as for the mean of the " +
                              std::to_string(corrector->orientationsSeen().size()) + " orientations it was fitted on");
+  if (table.n_other_setup() > 0)
+    answer.remarks.push_back(std::to_string(table.n_other_setup()) + " of " + std::to_string(table.n_rows()) +
+                             " rows of " + options.in + " are of another set-up than the calibration (" +
+                             table.setupDifference() + "): its correction is not theirs; setup_matches is no");
   if (const auto units = table.checkUnits(); !units)
     answer.remarks.push_back(options.in + ": " + units.error().message + "; used all the same");
   return answer;
@@ -323,6 +386,7 @@ void addApplyCommand(CommandLine& line) {
   command->add_option("--out", options->out, "The same table with the corrected columns appended")
       ->type_name("CSV")
       ->required();
+  addSetupOption(*command, options->setup, "What the table does not state of its set-up");
   addForceOption(*command, options->force, "Go on although the readings seem to be in another unit than metres");
 }
 

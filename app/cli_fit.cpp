@@ -2,6 +2,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "acquisition/session/session_store.h"
 #include "app/cli.h"
@@ -28,6 +29,7 @@ struct FitOptions {
   std::string align;
   std::optional<double> bake_um;
   std::string out;
+  std::vector<std::string> setup;
   TableArguments table;
 };
 
@@ -68,9 +70,12 @@ Answer fitAnswer(const FitOptions& options, const calibration::Corrector& correc
 Outcome runFit(const FitOptions& options, const CommonOptions& common) {
   const auto choice = calibration::parseCorrectorChoice(options.position, options.orientation);
   if (!choice) return wrongUsage(choice.error());
-  const auto reading = readRowsArgument(options.nodes, options.table);
+  const auto setup = readSetupArgument(options.setup);
+  if (!setup) return tl::unexpected(setup.error());
+  auto reading = readRowsArgument(options.nodes, options.table);
   if (!reading) return tl::unexpected(reading.error());
-  const CalibrationTable& table = reading->table;
+  CalibrationTable& table = reading->table;
+  for (const auto& [key, value] : *setup) table.metadata.setup[key] = value;
   const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(table.metadata));
   if (!align) return tl::unexpected(align.error());
   const std::vector<Node> rows = fitRows(table);
@@ -98,6 +103,7 @@ void addFit(CommandLine& line) {
                    "none or rigid; default rigid unless the table says the alignment is known")
       ->type_name("MODE");
   addTableOptions(*command, options->table);
+  addSetupOption(*command, options->setup, "What the table does not state of its set-up");
   command
       ->add_option("--bake-um", options->bake_um,
                    "Bake the position part to a lattice that deviates by at most so much inside the region")

@@ -113,6 +113,23 @@ Read<calibration::AlignMode> readAlignArgument(const std::string& text, calibrat
 
 std::string toText(calibration::AlignMode align) { return align == calibration::AlignMode::kRigid ? "rigid" : "none"; }
 
+void addSetupOption(CLI::App& command, std::vector<std::string>& given, const std::string& help) {
+  std::string keys;
+  for (const SetupFact& fact : setupFacts()) keys += (keys.empty() ? "" : ", ") + std::string(fact.key);
+  command.add_option("--setup", given, help + ", e.g. room=Lab2; may be given again: " + keys)->type_name("KEY=VALUE");
+}
+
+Read<Setup> readSetupArgument(const std::vector<std::string>& given) {
+  Setup setup;
+  for (const std::string& text : given) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos) return wrongUsage("--setup is '" + text + "'; it must be KEY=VALUE, as room=Lab2");
+    const auto stated = state(setup, text.substr(0, equals), text.substr(equals + 1));
+    if (!stated) return wrongUsage(stated.error());
+  }
+  return setup;
+}
+
 void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
   command
       .add_option(
@@ -129,7 +146,7 @@ void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
       .add_option("--align", arguments.align,
                   "none or rigid; default rigid unless the table says the alignment is known")
       ->type_name("MODE");
-  command.add_option("--seed", arguments.seed, "Seed of folds and bootstrap (default 1)")->type_name("N");
+  command.add_option("--seed", arguments.seed, "Seed of folds (default 1)")->type_name("N");
 }
 
 Read<evaluation::ComparisonOptions> readComparisonArguments(const ComparisonArguments& arguments) {

@@ -10,6 +10,7 @@
 #include "calib/calibration/corrector.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/settings.h"
+#include "calib/core/setup.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/simulation/scene.h"
 #include "calib/tables/table_io.h"
@@ -48,6 +49,10 @@ Read<TableReading<CalibrationTable>> readRowsArgument(const std::string& path, c
 /// `none` or `rigid`; `fallback` when empty.
 Read<calibration::AlignMode> readAlignArgument(const std::string& text, calibration::AlignMode fallback);
 std::string toText(calibration::AlignMode align);
+
+/// `--setup KEY=VALUE`, any number of times: facts about the set-up that files do not state.
+void addSetupOption(CLI::App& command, std::vector<std::string>& given, const std::string& help);
+Read<Setup> readSetupArgument(const std::vector<std::string>& given);
 
 /// What `--methods`, `--validate`, `--align` and `--seed` say about a comparison.
 struct ComparisonArguments {

@@ -206,6 +206,7 @@ TableMetadata FastrakDevice::describe() const {
   TableMetadata metadata;
   metadata.tracker = "Polhemus Fastrak";
   metadata.excitation = "ac";
+  metadata.setup["tracker_kind"] = "fastrak";
   if (!identity_) return metadata;
   const FastrakStatus& status = identity_->status;
   metadata.tracker = "Polhemus Fastrak " + status.version + (status.identity.empty() ? "" : ", " + status.identity);
@@ -217,6 +218,9 @@ TableMetadata FastrakDevice::describe() const {
   other["fastrak_format"] = status.format == FastrakFormat::kBinary ? "binary" : "ascii";
   other["fastrak_filter"] = setup_.filter;
   other["fastrak_compensation"] = status.compensation ? "on" : "off";
+  metadata.setup["units"] = other["fastrak_units"];
+  metadata.setup["filter"] = other["fastrak_filter"];
+  metadata.setup["factory_compensation"] = other["fastrak_compensation"];
   other["fastrak_hemisphere"] = setup_.hemisphere;
   other["fastrak_raw_frame"] = setup_.raw_frame ? "yes" : "no";
   if (!status.self_test_error.empty()) other["fastrak_self_test"] = status.self_test_error;

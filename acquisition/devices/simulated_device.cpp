@@ -102,6 +102,7 @@ TableMetadata SimulatedDevice::describe() const {
   metadata.tracker = "simulated tracker in " + scene_.name;
   // How the emulated line was set up says nothing of this tracker, and names another.
   std::erase_if(metadata.other, [](const auto& entry) { return entry.first.starts_with("fastrak_"); });
+  metadata.setup = {{"tracker_kind", "simulated"}, {"room", scene_.name}};
   metadata.excitation = scene_.tracker.excitation;
   metadata.carrier_hz = scene_.tracker.carrier_hz;
   metadata.rate_hz = scene_.tracker.rate_hz;

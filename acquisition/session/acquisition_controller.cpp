@@ -118,6 +118,8 @@ void AcquisitionController::setAutomatic(bool automatic) {
 
 void AcquisitionController::setReconnects(bool reconnects) { impl_->tracker.reconnects = reconnects; }
 
+void AcquisitionController::setSetup(const Setup& stated) { impl_->correctSetup(stated); }
+
 void AcquisitionController::setSamplesPerNode(int count) {
   if (count < 1 || count > 100000) {
     emit failed(QStringLiteral("Samples per place must be 1 to 100000, got %1.").arg(count));

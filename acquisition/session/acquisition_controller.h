@@ -110,6 +110,9 @@ class AcquisitionController : public QObject {
   void setAutomatic(bool automatic);
   void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
   void setSamplesPerNode(int count);
+  /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said
+  /// before; a session that is opened later and was begun with another set-up tells so.
+  void setSetup(const fieldtrue::Setup& stated);
   void setSessionState(const QString& key, const QString& value);  ///< SessionStore::setState.
   void storeFit(const QString& name, const QString& ftcal_text);
   /// Answers with tablesReady, or failed. Reads every sample: once for a session, then placeChanged and looseKept tell.

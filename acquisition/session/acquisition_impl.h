@@ -25,6 +25,9 @@ struct AcquisitionController::Impl {
   void beginStream();
   void guide();
   double sessionTime_s(double device_time_s);
+  /// What the tracker says of itself, and a person of the set-up.
+  TableMetadata said() const;
+  void correctSetup(const Setup& stated);
   void mergeMetadata();
   /// Sets other_tracker where the session was begun with another one; before the first take that one is forgotten.
   void compareTrackers(TableMetadata& known, const TableMetadata& said);
@@ -70,8 +73,11 @@ struct AcquisitionController::Impl {
   std::function<QDateTime()> now = [] { return QDateTime::currentDateTimeUtc(); };
   std::optional<SessionStore> store;
   LooseReadings loose;
-  bool loose_refused = false;                ///< The newest loose readings could not be written; said once.
-  std::optional<std::string> other_tracker;  ///< The one that records now, where the session was begun with another.
+  bool loose_refused = false;  ///< The newest loose readings could not be written; said once.
+  /// The tracker or set-up that records now, where the session was begun with another.
+  std::optional<std::string> other_tracker;
+
+  Setup stated_setup;  ///< By a person.
 
   TrackerLink tracker;
   KnownPlaces places;

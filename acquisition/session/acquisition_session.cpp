@@ -26,7 +26,7 @@ Result<Plan> planOf(const QString& text, const QString& path) {
 
 Result<SessionStore> AcquisitionController::Impl::createSession(const QString& path, const QString& plan_text) const {
   FT_TRY(const Plan plan, planOf(plan_text, path));
-  TableMetadata metadata = tracker.device ? tracker.device->describe() : TableMetadata{};
+  TableMetadata metadata = said();
   if (!metadata.rig) metadata.rig = kDefaultRig;
   metadata.date = now().toLocalTime().date().toString(Qt::ISODate).toStdString();
   return SessionStore::create(path, plan, metadata, now());

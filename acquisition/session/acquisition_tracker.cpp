@@ -1,6 +1,7 @@
 #include "acquisition/session/acquisition_tracker.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "acquisition/session/acquisition_impl.h"
 #include "acquisition/session/guarded_call.h"
@@ -173,14 +174,18 @@ void AcquisitionController::Impl::onSamples(const std::vector<Sample>& samples) 
 
 void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {
   other_tracker.reset();
-  if (!known.tracker || !said.tracker || *known.tracker == *said.tracker) return;
+  const bool is_other = known.tracker && said.tracker && *known.tracker != *said.tracker;
+  const std::string change = differenceText(known.setup, said.setup);
+  if (!is_other && change.empty()) return;
   const auto has_take = [](const std::optional<Node>& node) { return node.has_value(); };
   if (std::none_of(places.nodes.begin(), places.nodes.end(), has_take)) {
-    known.tracker = said.tracker;
+    if (is_other) known.tracker = said.tracker;
+    for (const auto& [key, value] : said.setup) known.setup[key] = value;
     return;
   }
-  other_tracker = said.tracker;
-  note("tracker", "recorded with " + *said.tracker + " from here on; the session was begun with " + *known.tracker);
+  other_tracker = is_other ? *said.tracker : "a set-up with " + change;
+  note("tracker", "recorded with " + *other_tracker + " from here on; the session was begun with " +
+                      known.tracker.value_or("another tracker"));
 }
 
 void AcquisitionController::Impl::remarkOnTracker() {
@@ -200,13 +205,30 @@ Result<void> AcquisitionController::Impl::markOtherTracker() {
   return stored;
 }
 
+TableMetadata AcquisitionController::Impl::said() const {
+  TableMetadata said = tracker.device ? tracker.device->describe() : TableMetadata{};
+  for (const auto& [key, value] : stated_setup) said.setup[key] = value;
+  return said;
+}
+
+void AcquisitionController::Impl::correctSetup(const Setup& stated) {
+  const Setup before = std::exchange(stated_setup, stated);
+  if (!store || store->isReadOnly() || before == stated) return;
+  TableMetadata metadata = store->metadata();
+  for (const SetupFact& fact : setupFacts()) {
+    const auto was = factOf(before, fact.key), is = factOf(stated, fact.key);
+    if (was != is) told(state(metadata.setup, fact.key, is.value_or("")));
+  }
+  if (told(store->setMetadata(metadata))) emit owner->metadataChanged(metadata);
+}
+
 void AcquisitionController::Impl::mergeMetadata() {
   if (!store || store->isReadOnly() || !tracker.running()) return;
-  const TableMetadata said = tracker.device->describe();
+  const TableMetadata now_said = said();
   TableMetadata known = store->metadata();
-  if (known.rig == kDefaultRig && said.rig) known.rig = said.rig;
-  compareTrackers(known, said);
-  const TableMetadata both = merged(known, said);
+  if (known.rig == kDefaultRig && now_said.rig) known.rig = now_said.rig;
+  compareTrackers(known, now_said);
+  const TableMetadata both = merged(known, now_said);
   if (toJson(both) == toJson(store->metadata())) return;
   if (told(store->setMetadata(both))) emit owner->metadataChanged(both);
 }

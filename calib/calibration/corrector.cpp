@@ -10,6 +10,7 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
+#include "calib/tables/table_setup.h"
 
 namespace fieldtrue::calibration {
 namespace {
@@ -82,6 +83,7 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   corrector.choice_ = choice;
   corrector.align_ = align;
   corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
+  corrector.setup_ = setupOf(corrector.table_);
   if (align == AlignMode::kRigid) {
     FT_TRY(auto alignment, fitAlignment(nodes));
     corrector.alignment_ = alignment;

@@ -13,6 +13,7 @@
 #include "calib/core/geometry.h"
 #include "calib/core/run_control.h"
 #include "calib/core/settings.h"
+#include "calib/core/setup.h"
 #include "calib/correctors/base/fit_data.h"
 #include "calib/correctors/base/orientation_model.h"
 #include "calib/correctors/base/position_model.h"
@@ -59,6 +60,8 @@ class Corrector {
   bool takesOrientation() const { return position_->takesOrientation(); }
   /// The distinct orientations it was fitted on, tracker_from_sensor: none within 5 degrees of another.
   std::vector<Eigen::Quaterniond> orientationsSeen() const;
+  /// What it is good for, as far as its table stated it.
+  const Setup& setup() const { return setup_; }
 
   /// SD of the corrected position [m]; at a pose, or for any of the orientations that were fitted.
   std::optional<double> uncertaintyAt_m(const Pose& tracker_from_sensor) const;
@@ -103,6 +106,7 @@ class Corrector {
   Region region_;
   FitReport report_;
   CalibrationTable table_;
+  Setup setup_;
 };
 
 }  // namespace fieldtrue::calibration

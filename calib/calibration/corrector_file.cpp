@@ -11,6 +11,7 @@
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "calib/tables/table_json.h"
+#include "calib/tables/table_setup.h"
 
 namespace fieldtrue::calibration {
 namespace {
@@ -82,6 +83,16 @@ LoadedPart<Model> partFrom(const JsonReader& part,
   return loaded;
 }
 
+/// Every fact, null where it is not stated.
+json setupToJson(const Setup& setup) {
+  json to = json::object();
+  for (const SetupFact& fact : setupFacts()) {
+    const auto value = factOf(setup, fact.key);
+    to[std::string(fact.key)] = value ? json(*value) : json(nullptr);
+  }
+  return to;
+}
+
 /// Schema and checksum: whether this is a whole calibration file that this version can read.
 void checkEnvelope(const JsonReader& content) {
   if (!content.schema(kSchemaName, kSchemaVersion, "a Fieldtrue calibration"))
@@ -116,6 +127,7 @@ std::string Corrector::toText() const {
       {"inputs", takesOrientation() ? "pose" : "position"},
       {"orientations_seen", std::move(orientations)},
       {"region", region_.toJson()},
+      {"setup", setupToJson(setup_)},
       {"report", reportToJson(report_)},
       {"table", fieldtrue::toJson(table_)},
   };
@@ -152,6 +164,8 @@ Corrector Corrector::fromJson(const JsonReader& content) {
   corrector.region_ = Region::fromJson(content["region"]);
   corrector.report_ = reportFrom(content["report"]);
   corrector.table_ = tableFrom(content["table"]);
+  const auto setup = content.find("setup");
+  corrector.setup_ = setup ? setupFrom(*setup) : setupOf(corrector.table_);
   return corrector;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calib/core/pose.h"
+#include "calib/core/setup.h"
 
 namespace fieldtrue {
 
@@ -80,6 +81,7 @@ struct TableMetadata {
   bool alignment_known = false;
   std::optional<double> alignment_tolerance_m;
   std::optional<double> alignment_tolerance_rad;
+  Setup setup;                               ///< What a calibration of this recording is good for.
   std::map<std::string, std::string> other;  ///< Keys this program does not interpret; kept and written back.
 };
 

@@ -75,6 +75,7 @@ nlohmann::json toJson(const TableMetadata& metadata) {
                        {"alignment", metadata.alignment_known ? "known" : "unknown"},
                        {"other", metadata.other}};
   forEachStatement([&](std::string_view key, auto member) { put(to, key, metadata.*member); });
+  if (!metadata.setup.empty()) to["setup"] = metadata.setup;
   return to;
 }
 
@@ -83,8 +84,17 @@ TableMetadata metadataFrom(const JsonReader& json) {
   metadata.frame = json["frame"].text();
   metadata.alignment_known = json["alignment"].oneOf({"known", "unknown"}) == "known";
   forEachStatement([&](const char* key, auto member) { take(json, key, metadata.*member); });
+  if (const auto setup = json.find("setup")) metadata.setup = setupFrom(*setup);
   if (const auto other = json.find("other")) metadata.other = other->namedTexts();
   return metadata;
+}
+
+Setup setupFrom(const JsonReader& json) {
+  Setup setup;
+  for (const SetupFact& fact : setupFacts())
+    if (const auto value = json.find(std::string(fact.key)); value && !value->isNull())
+      (void)state(setup, fact.key, value->text());  // The key is a fact's.
+  return setup;
 }
 
 nlohmann::json toJson(const CalibrationTable& table) {

@@ -11,6 +11,9 @@ namespace fieldtrue {
 nlohmann::json toJson(const TableMetadata& metadata);
 TableMetadata metadataFrom(const JsonReader& json);
 
+/// Of an object with the facts' keys; null is not stated, and so is what is missing.
+Setup setupFrom(const JsonReader& json);
+
 /// A node table as JSON: {"metadata": {...}, "nodes": [{...}]} with the names and units of the node table's columns;
 /// what is not stated is absent.
 nlohmann::json toJson(const CalibrationTable& table);

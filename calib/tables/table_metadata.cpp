@@ -66,7 +66,7 @@ std::string store(TableMetadata& metadata, const std::string& key, const std::st
     metadata.frame = value;
   } else if (key == "alignment") {
     metadata.alignment_known = value == "known";
-  } else {
+  } else if (!key.starts_with(kSetupPrefix) || !state(metadata.setup, key.substr(kSetupPrefix.size()), value)) {
     std::string& kept = metadata.other[key];
     kept += (kept.empty() ? "" : "; ") + value;
   }
@@ -78,6 +78,7 @@ const std::vector<std::string_view>& knownKeys() {
     std::vector<std::string_view> all;
     forEachStatement([&](std::string_view key, auto) { all.push_back(key); });
     for (const WordKey& row : wordKeys()) all.push_back(row.key);
+    for (const SetupFact& fact : setupFacts()) all.push_back(fact.file_key);
     return all;
   }();
   return keys;
@@ -154,6 +155,8 @@ void writeMetadata(std::ostream& out, const TableMetadata& metadata) {
     if (metadata.*member) line(key, valueText(*(metadata.*member)));
   });
   if (metadata.alignment_known) line("alignment", "known");
+  for (const SetupFact& fact : setupFacts())
+    if (const auto value = factOf(metadata.setup, fact.key)) line(fact.file_key, *value);
   for (const auto& [key, value] : metadata.other) line(key, value);
 }
 
@@ -162,6 +165,7 @@ TableMetadata merged(TableMetadata known, const TableMetadata& more) {
     if (!(known.*member)) known.*member = more.*member;
   });
   known.alignment_known = known.alignment_known || more.alignment_known;
+  known.setup.insert(more.setup.begin(), more.setup.end());
   known.other.insert(more.other.begin(), more.other.end());
   return known;
 }

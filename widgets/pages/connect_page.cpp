@@ -9,10 +9,12 @@
 #include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
+#include <QSettings>
 #include <QVBoxLayout>
 #include <algorithm>
 
 #include "acquisition/devices/registry.h"
+#include "calib/core/setup.h"
 #include "widgets/forms/settings_form.h"
 #include "widgets/style/unit_texts.h"
 
@@ -77,6 +79,8 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   scene_->setCurrentIndex(std::max(0, scene_->findData(QString(kDemonstrationScene))));
   scene_->addItem(tr("Another scene file..."), QString());
   settings_ = new SettingsForm(column);
+  setup_label_ = new QLabel(tr("This set-up"), column);
+  setup_ = makeSetup();
 
   auto* form = new QFormLayout;
   form->addRow(tr("Tracker"), kind_);
@@ -84,6 +88,7 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   form->addRow(address_label_, address_row);
   form->addRow(scene_label_, scene_);
   form->addRow(tr("Settings"), settings_);
+  form->addRow(setup_label_, setup_);
 
   connect_ = new QPushButton(tr("Connect"), column);
   connect_->setObjectName(QStringLiteral("connectButton"));
@@ -120,6 +125,7 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
     if (device == acquisition::DeviceState::kRunning || device == acquisition::DeviceState::kConnecting) {
       workbench_.disconnectDevice();
     } else {
+      tellSetup();
       workbench_.connectDevice(deviceText(), scenePath());
     }
   });
@@ -131,6 +137,42 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   onStatus(workbench_.status());
 }
 
+QWidget* ConnectPage::makeSetup() {
+  auto* fields = new QWidget(this);
+  auto* form = new QFormLayout(fields);
+  form->setContentsMargins(0, 0, 0, 0);
+  for (const SetupFact& fact : setupFacts()) {
+    if (!fact.is_asked) continue;
+    const QString key = QString::fromLatin1(fact.file_key.data(), static_cast<qsizetype>(fact.file_key.size()));
+    const QString label = QString::fromLatin1(fact.label.data(), static_cast<qsizetype>(fact.label.size()));
+    auto* field = new QLineEdit(QSettings().value(key).toString(), fields);
+    field->setObjectName(key);
+    field->setAccessibleName(label);
+    field->setPlaceholderText(tr("not known"));
+    field->setToolTip(tr("Kept with every session and calibration; leave it empty if you do not know it."));
+    form->addRow(label.left(1).toUpper() + label.mid(1), field);
+    setup_facts_.push_back(field);
+    connect(field, &QLineEdit::editingFinished, this, [this, field, key] {
+      QSettings().setValue(key, field->text().trimmed());
+      tellSetup();
+    });
+  }
+  return fields;
+}
+
+void ConnectPage::tellSetup() {
+  Setup setup;
+  const bool simulated = kind_->currentIndex() == 0;
+  std::size_t next = 0;
+  for (const SetupFact& fact : setupFacts()) {
+    if (!fact.is_asked) continue;
+    const auto stated = state(setup, fact.key, simulated ? "" : setup_facts_[next]->text().toStdString());
+    FT_CHECK(stated.has_value());
+    ++next;
+  }
+  workbench_.setSetup(setup);
+}
+
 void ConnectPage::onKind() {
   const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
   const bool simulated = kind_->currentIndex() == 0;
@@ -139,6 +181,9 @@ void ConnectPage::onKind() {
   for (QWidget* widget :
        {static_cast<QWidget*>(address_label_), static_cast<QWidget*>(address_), static_cast<QWidget*>(refresh_)})
     widget->setVisible(!simulated);
+  // A simulated room has no serial numbers, and says which room it is.
+  setup_label_->setVisible(!simulated);
+  setup_->setVisible(!simulated);
   scene_label_->setVisible(simulated);
   scene_->setVisible(simulated);
   settings_->setSettings(kind.settings);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <QWidget>
+#include <vector>
 
 #include "widgets/workbench/workbench.h"
 
@@ -26,6 +27,8 @@ class ConnectPage : public QWidget {
   QString deviceText() const;
   void chooseScene();
   QString scenePath() const;
+  QWidget* makeSetup();
+  void tellSetup();
 
   Workbench& workbench_;
   QComboBox* kind_;
@@ -36,6 +39,9 @@ class ConnectPage : public QWidget {
   QLabel* scene_label_;
   QComboBox* scene_;
   SettingsForm* settings_;
+  QLabel* setup_label_;
+  QWidget* setup_;
+  std::vector<QLineEdit*> setup_facts_;  ///< In the order of the facts that are asked for.
   QPushButton* connect_;
   QPushButton* next_;
   QLabel* state_;

@@ -14,6 +14,7 @@
 #include <QStackedWidget>
 #include <QVBoxLayout>
 
+#include "calib/core/setup.h"
 #include "calib/core/thread_pool.h"
 #include "calib/exporters/exporter.h"
 #include "calib/exporters/registry.h"
@@ -214,6 +215,11 @@ QString ExportPage::verdictOnCalibration() const {
   return {};
 }
 
+QString ExportPage::setupOfCalibration() const {
+  const Setup& setup = workbench_.corrector()->setup();
+  return setup.empty() ? tr("not stated") : QString::fromStdString(setupText(setup));
+}
+
 void ExportPage::showCalibration() {
   const bool corrects = workbench_.correctorCorrects();
   if (!workbench_.corrector()) {
@@ -227,11 +233,11 @@ void ExportPage::showCalibration() {
             ? QString()
             : tr(" It was fitted before the session's places changed: fit again on the compare page.");
     calibration_->setText(
-        tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows.%4%5")
+        tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows.%4%5 Set-up: %6.")
             .arg(methodLabel(MethodPart::kPosition, choice.position_id, choice.position_settings),
                  methodLabel(MethodPart::kOrientation, choice.orientation_id, choice.orientation_settings))
             .arg(workbench_.corrector()->report().n_nodes)
-            .arg(warning, verdictOnCalibration()));
+            .arg(warning, verdictOnCalibration(), setupOfCalibration()));
   } else {
     calibration_->setText(
         tr("The calibration kept in this session corrects nothing, neither position nor orientation: "

@@ -43,6 +43,7 @@ class ExportPage : public QWidget {
   void showCalibration();
   /// What the comparison says of the calibration; empty where there is none of the present places.
   QString verdictOnCalibration() const;
+  QString setupOfCalibration() const;
   void browse();
   void write();
   void onWritten(const QString& path, const Result<std::string>& written);

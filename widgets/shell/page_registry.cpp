@@ -10,6 +10,7 @@
 #include "widgets/pages/acquire_page.h"
 #include "widgets/pages/compare_page.h"
 #include "widgets/pages/connect_page.h"
+#include "widgets/pages/difference_page.h"
 #include "widgets/pages/export_page.h"
 #include "widgets/pages/gap_page.h"
 #include "widgets/pages/plan_page.h"
@@ -97,6 +98,8 @@ constexpr std::array kRows = {
     PageRow{"gap", QT_TRANSLATE_NOOP("StepRail", "Gap"), "gap", "diagnosis", makeGapPage, markGap},
     PageRow{"export", QT_TRANSLATE_NOOP("StepRail", "Export"), "export", "files-and-commands", make<ExportPage>,
             markExport},
+    PageRow{"difference", QT_TRANSLATE_NOOP("StepRail", "Changes"), "difference", "comparing", make<DifferencePage>,
+            markStart},
 };
 
 }  // namespace

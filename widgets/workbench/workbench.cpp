@@ -382,6 +382,8 @@ void Workbench::connectDevice(const QString& device, const QString& scene_path) 
 
 void Workbench::disconnectDevice() { post(&acquisition::AcquisitionController::disconnectDevice); }
 
+void Workbench::setSetup(const Setup& stated) { post(&acquisition::AcquisitionController::setSetup, stated); }
+
 void Workbench::createSession(const QString& path, const acquisition::Plan& plan, int samples_per_node) {
   post(&acquisition::AcquisitionController::setSamplesPerNode, samples_per_node);
   post(&acquisition::AcquisitionController::openSession, path, QString::fromStdString(toJson(plan).dump()));

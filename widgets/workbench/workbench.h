@@ -89,6 +89,7 @@ class Workbench : public QObject {
   void startDemonstration();
   void connectDevice(const QString& device, const QString& scene_path);
   void disconnectDevice();
+  void setSetup(const Setup& stated);  ///< AcquisitionController::setSetup.
   void createSession(const QString& path, const acquisition::Plan& plan, int samples_per_node);
   void openSession(const QString& path);
   void take();

@@ -1,0 +1,377 @@
+#include "calib/evaluation/calibration_difference.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "calib/core/geometry.h"
+#include "calib/core/json_reader.h"
+#include "calib/core/number_text.h"
+#include "calib/core/statistics.h"
+#include "calib/core/units.h"
+#include "calib/evaluation/comparison.h"
+#include "calib/evaluation/region/region_lattice.h"
+
+namespace fieldtrue::evaluation {
+
+namespace {
+
+using calibration::Corrector;
+
+constexpr double kMmPerM = 1000.0;
+constexpr std::size_t kMostPoints = 4000;
+constexpr std::size_t kFewestPlaces = 6;
+/// Times the largest error of the first at places of its own: farther off, the sensor slipped or the field changed.
+constexpr double kFar = 3.0;
+constexpr double kRare = 0.01;
+
+std::vector<Eigen::Vector3d> trackedPlaces(const Corrector& corrector) {
+  std::vector<Eigen::Vector3d> places_m;
+  for (const Node& node : corrector.table().nodes) places_m.push_back(node.tracker_from_sensor.position_m);
+  return places_m;
+}
+
+bool coversBoth(const Corrector& first, const Corrector& second, const Eigen::Vector3d& p_tracked_m) {
+  return first.covers(p_tracked_m) && second.covers(p_tracked_m);
+}
+
+/// Points spread evenly over what both cover, tracker frame; places of the second where no lattice fits in.
+std::vector<Eigen::Vector3d> commonPoints(const Corrector& first, const Corrector& second) {
+  const std::vector<Eigen::Vector3d> places_m = trackedPlaces(first);
+  const int dimension = std::clamp(pointSpread(places_m).dimension, 0, 3);
+  std::vector<Eigen::Vector3d> points_m = latticeInside(places_m, dimension, first.region(), kMostPoints).points_m;
+  const auto is_outside = [&](const Eigen::Vector3d& p_m) { return !coversBoth(first, second, p_m); };
+  std::erase_if(points_m, is_outside);
+  if (!points_m.empty()) return points_m;
+  points_m = trackedPlaces(second);
+  std::erase_if(points_m, is_outside);
+  return points_m;
+}
+
+double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
+
+/// The field's change over the common region, and the rigid motion that was taken out of it.
+void measureField(const Corrector& first, const Corrector& second, const std::vector<Eigen::Vector3d>& points_m,
+                  CalibrationDifference& to) {
+  std::vector<Eigen::Vector3d> by_first_m, by_second_m;
+  std::vector<double> whole_mm;
+  for (const Eigen::Vector3d& p_m : points_m) {
+    by_first_m.push_back(first.correctPosition_m(p_m));
+    by_second_m.push_back(second.correctPosition_m(p_m));
+    whole_mm.push_back(kMmPerM * (by_second_m.back() - by_first_m.back()).norm());
+  }
+  to.n_points = points_m.size();
+  to.whole_rms_mm = rootMeanSquare(whole_mm);
+  to.whole_max_mm = largest(whole_mm);
+  // Fewer points, or points on a line, tell no rotation: then nothing is taken out.
+  const Pose second_from_first = fitRigid(by_first_m, by_second_m).value_or(Pose{});
+  const Eigen::Vector3d middle_m = pointSpread(by_first_m).center_m;
+  to.moved_mm = kMmPerM * (second_from_first * middle_m - middle_m).norm();
+  to.turned_deg = kDegPerRad * angleBetween_rad(second_from_first.orientation, Eigen::Quaterniond::Identity());
+  std::vector<double> change_mm;
+  double expected_mm2 = 0.0;
+  bool is_expected_known = true;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    const Eigen::Vector3d change_m =
+        second_from_first.orientation.conjugate() * (by_second_m[i] - second_from_first * by_first_m[i]);
+    to.points.push_back({by_first_m[i], change_m});
+    change_mm.push_back(kMmPerM * change_m.norm());
+    const auto first_m = first.uncertainty_m(points_m[i]), second_m = second.uncertainty_m(points_m[i]);
+    is_expected_known = is_expected_known && first_m && second_m;
+    if (is_expected_known) expected_mm2 += kMmPerM * kMmPerM * (*first_m * *first_m + *second_m * *second_m);
+  }
+  to.rms_mm = rootMeanSquare(change_mm);
+  to.p95_mm = quantile(change_mm, 0.95);
+  to.max_mm = largest(change_mm);
+  to.worst = static_cast<std::size_t>(std::max_element(change_mm.begin(), change_mm.end()) - change_mm.begin());
+  if (is_expected_known) to.expected_mm = std::sqrt(expected_mm2 / static_cast<double>(points_m.size()));
+}
+
+/// What is left between corrected orientations once the rotation that both share at all points is taken out.
+void measureOrientation(const Corrector& first, const Corrector& second, const std::vector<Eigen::Vector3d>& points_m,
+                        CalibrationDifference& to) {
+  if (first.choice().orientation_id == "none" && second.choice().orientation_id == "none") return;
+  std::vector<Eigen::Quaterniond> turns;
+  for (const Eigen::Vector3d& p_m : points_m) {
+    const Pose tracked{p_m, Eigen::Quaterniond::Identity()};
+    turns.push_back(second.correct(tracked).orientation * first.correct(tracked).orientation.conjugate());
+  }
+  const Eigen::Quaterniond shared = meanRotation(turns);
+  std::vector<double> angles_deg;
+  for (const Eigen::Quaterniond& turn : turns) angles_deg.push_back(kDegPerRad * angleBetween_rad(turn, shared));
+  to.angle_rms_deg = rootMeanSquare(angles_deg);
+  to.angle_max_deg = largest(angles_deg);
+}
+
+/// A calibration's method, judged on its own rows at places its fits did not see.
+Result<Comparison> heldOut(const Corrector& corrector, const RunControl& control) {
+  MethodText method{corrector.choice().position_id, {}};
+  for (const auto& [key, value] : corrector.choice().position_settings)
+    if (const std::string text = textOf(value); !text.empty()) method.given.emplace(key, text);
+  ComparisonOptions options;
+  options.position_methods = {std::move(method)};
+  options.orientation_methods = {{"none", {}}};
+  options.align = corrector.align();
+  options.with_surroundings = false;
+  return compareMethods(corrector.table(), options, control);
+}
+
+const MethodScore* scoreOf(const Comparison& comparison, const Corrector& corrector) {
+  for (const MethodScore& score : comparison.position)
+    if (score.method == corrector.choice().position_id && !score.skipped) return &score;
+  return nullptr;
+}
+
+PlaceErrors placeErrors(std::vector<double> errors_mm, bool is_tuned) {
+  PlaceErrors errors;
+  errors.rms_mm = errors_mm.empty() ? 0.0 : rootMeanSquare(errors_mm);
+  errors.rms_90_mm = errors_mm.empty() ? Interval{} : rmsInterval90(errors_mm, is_tuned);
+  errors.mm = std::move(errors_mm);
+  return errors;
+}
+
+PlaceErrors ownErrors(const MethodScore* score) {
+  return score ? placeErrors(score->place_errors, score->is_tuned) : PlaceErrors{};
+}
+
+struct PlaceError {
+  double mm = 0.0;
+  Eigen::Vector3d true_m = Eigen::Vector3d::Zero();
+};
+
+/// RMS error of a calibration at each place of another's rows that it covers, alignment fitted anew to them unless
+/// both know it. Empty where the places are too few.
+std::map<int, PlaceError> errorsAt(const Corrector& corrector, const Corrector& other) {
+  std::vector<Eigen::Vector3d> corrected_m, true_m;
+  std::vector<int> places;
+  for (const Node& node : other.table().nodes) {
+    if (!corrector.covers(node.tracker_from_sensor.position_m)) continue;
+    const bool takes_pose = corrector.takesOrientation() && node.has_orientation;
+    corrected_m.push_back(takes_pose ? corrector.correct(node.tracker_from_sensor).position_m
+                                     : corrector.correctPosition_m(node.tracker_from_sensor.position_m));
+    true_m.push_back(node.reference_from_sensor.position_m);
+    places.push_back(node.node);
+  }
+  const bool are_frames_known =
+      corrector.align() == calibration::AlignMode::kNone && other.align() == calibration::AlignMode::kNone;
+  const Result<Pose> moved = are_frames_known ? Pose{} : fitRigid(corrected_m, true_m);
+  if (!moved) return {};
+  std::map<int, std::vector<double>> by_place;
+  std::map<int, PlaceError> errors;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    std::vector<double>& of_rows_mm = by_place[places[i]];
+    of_rows_mm.push_back(kMmPerM * (*moved * corrected_m[i] - true_m[i]).norm());
+    errors[places[i]] = {rootMeanSquare(of_rows_mm), true_m[i]};
+  }
+  return errors.size() < kFewestPlaces ? std::map<int, PlaceError>() : errors;
+}
+
+/// Holds the first calibration against the second's rows.
+void measureAtPlaces(const Corrector& first, const Corrector& second, const MethodScore* second_score,
+                     const Comparison& of_second, CalibrationDifference& to) {
+  const std::map<int, PlaceError> at_second = errorsAt(first, second);
+  std::vector<double> first_mm, second_mm;
+  for (std::size_t k = 0; k < of_second.places.size(); ++k) {
+    const auto found = at_second.find(of_second.places[k]);
+    if (found == at_second.end()) continue;
+    if (first_mm.empty() || found->second.mm > largest(first_mm)) {
+      to.worst_place = of_second.names.of(found->first);
+      to.worst_place_m = found->second.true_m;
+    }
+    first_mm.push_back(found->second.mm);
+    if (second_score) second_mm.push_back(second_score->place_errors[k]);
+  }
+  to.first_at_second = placeErrors(std::move(first_mm), false);
+  const std::vector<double>& at_mm = to.first_at_second.mm;
+  const double most_own_mm = to.first_own.mm.empty() ? INFINITY : largest(to.first_own.mm);
+  const auto n_above = [&](double limit_mm) {
+    return static_cast<std::size_t>(
+        std::count_if(at_mm.begin(), at_mm.end(), [&](double error_mm) { return error_mm > limit_mm; }));
+  };
+  to.n_beyond = n_above(most_own_mm);
+  to.n_far = n_above(kFar * most_own_mm);
+  if (!at_mm.empty() && at_mm.size() == second_mm.size()) to.first_less_second_mm = pairedDifference(at_mm, second_mm);
+}
+
+/// The chance that so many of the largest errors all fall to the second's places where nothing changed and each place
+/// is as likely as any other to have them.
+/// @source Rosenbaum 1954, Annals of Mathematical Statistics 25
+double chanceOfLargest(const PlaceErrors& own, const CalibrationDifference& difference) {
+  auto n_there = static_cast<double>(difference.first_at_second.mm.size());
+  auto n_all = n_there + static_cast<double>(own.mm.size());
+  double chance = 1.0;
+  for (std::size_t k = 0; k < difference.n_beyond; ++k) chance *= n_there-- / n_all--;
+  return chance;
+}
+
+/// The largest change that would not be seen: evenly spread, it would not bring the intervals apart.
+double unseen_mm(const CalibrationDifference& difference) {
+  const PlaceErrors& there = difference.first_at_second;
+  return excessError(difference.first_own.rms_90_mm.high * there.rms_mm / there.rms_90_mm.low, there.rms_mm);
+}
+
+DifferenceVerdict verdictOn(const CalibrationDifference& difference) {
+  const PlaceErrors& there = difference.first_at_second;
+  const PlaceErrors& own = difference.first_own;
+  if (there.mm.empty() || own.mm.empty() || !difference.first_less_second_mm) return DifferenceVerdict::kCannotTell;
+  const bool is_apart = there.rms_90_mm.low > own.rms_90_mm.high;
+  if ((is_apart && difference.first_less_second_mm->low90 > 0.0) || chanceOfLargest(own, difference) < kRare)
+    return DifferenceVerdict::kChanged;
+  return is_apart || difference.n_far > 0 ? DifferenceVerdict::kCannotTell : DifferenceVerdict::kNotShown;
+}
+
+std::string metres(const Eigen::Vector3d& p_m) {
+  return "(" + fixedText(p_m.x(), 2) + ", " + fixedText(p_m.y(), 2) + ", " + fixedText(p_m.z(), 2) + ") m";
+}
+
+std::string withInterval(const PlaceErrors& errors) {
+  return significantText(errors.rms_mm) + " mm (" + significantText(errors.rms_90_mm.low) + " to " +
+         significantText(errors.rms_90_mm.high) + ")";
+}
+
+std::string when(const CalibrationDifference& difference) {
+  const auto first = factOf(difference.first_setup, "date"), second = factOf(difference.second_setup, "date");
+  if (!first || !second || *first == *second) return "between the two recordings";
+  return "between " + *first + " and " + *second;
+}
+
+/// What the largest errors tell; empty where they tell nothing.
+std::string beyond(const CalibrationDifference& difference) {
+  if (difference.n_beyond == 0) return {};
+  return "; " + std::to_string(difference.n_beyond) +
+         (difference.n_beyond == 1 ? " of the second's places is" : " of the second's places are") +
+         " worse than any of its own, most " + difference.worst_place + " at " + metres(difference.worst_place_m) +
+         (difference.n_far > 0 ? "; " + std::to_string(difference.n_far) + " more than three times as bad" : "");
+}
+
+std::string sentences(const CalibrationDifference& difference) {
+  const std::string field = " The corrections differ by " + significantText(difference.rms_mm) +
+                            " mm RMS over the common region, most, " + significantText(difference.max_mm) + " mm, at " +
+                            metres(difference.points[difference.worst].reference_m) + ".";
+  const std::string other =
+      difference.setup_matches == SetupMatch::kNo
+          ? " They are of different set-ups: " + differenceText(difference.first_setup, difference.second_setup) + "."
+          : std::string();
+  if (difference.first_at_second.mm.empty())
+    return "Nobody can tell whether the field changed: too few places of the second lie where the first holds." +
+           field + other;
+  const std::string errs = "the first errs by " + withInterval(difference.first_at_second) +
+                           " at the second's places, and by " + withInterval(difference.first_own) +
+                           " at places of its own that its fits did not see" + beyond(difference) + ".";
+  switch (difference.verdict) {
+    case DifferenceVerdict::kChanged:
+      return "The field changed " + when(difference) + ": " + errs + field + other;
+    case DifferenceVerdict::kNotShown:
+      return "No change is shown, and one of up to " + significantText(*difference.unseen_mm) +
+             " mm RMS everywhere would not show: " + errs + field + other;
+    case DifferenceVerdict::kCannotTell:
+      break;
+  }
+  const std::string ask = difference.n_far > 0 ? " Take the places again that are farthest off: the sensor slipped "
+                                                 "there, or something stands near them."
+                                               : "";
+  return "Nobody can tell whether the field changed: " + errs + field + ask + other;
+}
+
+std::string_view nameOf(DifferenceVerdict verdict) {
+  switch (verdict) {
+    case DifferenceVerdict::kChanged:
+      return "changed";
+    case DifferenceVerdict::kNotShown:
+      return "not_shown";
+    case DifferenceVerdict::kCannotTell:
+      break;
+  }
+  return "cannot_tell";
+}
+
+nlohmann::json orNull(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
+
+nlohmann::json nullUnlessTold(const std::string& text) {
+  return text.empty() ? nlohmann::json(nullptr) : nlohmann::json(text);
+}
+
+nlohmann::json toJson(const PlaceErrors& errors) {
+  if (errors.mm.empty()) return nullptr;
+  return {{"places", errors.mm.size()},
+          {"rms_mm", errors.rms_mm},
+          {"rms_low90_mm", errors.rms_90_mm.low},
+          {"rms_high90_mm", errors.rms_90_mm.high}};
+}
+
+nlohmann::json setupDifferencesToJson(const Setup& first, const Setup& second) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const SetupFact& fact : differences(first, second))
+    list.push_back({{"key", fact.key}, {"first", *factOf(first, fact.key)}, {"second", *factOf(second, fact.key)}});
+  return list;
+}
+
+}  // namespace
+
+Result<CalibrationDifference> compareCalibrations(const Corrector& first, const Corrector& second,
+                                                  const RunControl& control) {
+  const std::vector<Eigen::Vector3d> points_m = commonPoints(first, second);
+  if (points_m.empty())
+    return fail(ErrorCode::kUnsupported,
+                "The two calibrations cover no reading in common: they are of different trackers, or of different "
+                "places before the transmitter");
+  CalibrationDifference difference;
+  difference.first_setup = first.setup();
+  difference.second_setup = second.setup();
+  difference.setup_matches = match(first.setup(), second.setup());
+  measureField(first, second, points_m, difference);
+  measureOrientation(first, second, points_m, difference);
+  RunControl half = control;
+  half.progress = [&](double fraction) { control.progress(0.5 * fraction); };
+  FT_TRY(const Comparison of_first, heldOut(first, half));
+  half.progress = [&](double fraction) { control.progress(0.5 + 0.5 * fraction); };
+  FT_TRY(const Comparison of_second, heldOut(second, half));
+  const MethodScore* second_score = scoreOf(of_second, second);
+  difference.first_own = ownErrors(scoreOf(of_first, first));
+  difference.second_own = ownErrors(second_score);
+  measureAtPlaces(first, second, second_score, of_second, difference);
+  difference.verdict = verdictOn(difference);
+  if (difference.verdict == DifferenceVerdict::kNotShown) difference.unseen_mm = unseen_mm(difference);
+  difference.text = sentences(difference);
+  return difference;
+}
+
+nlohmann::json toJson(const CalibrationDifference& difference) {
+  const ChangeAt& worst = difference.points[difference.worst];
+  const auto& paired = difference.first_less_second_mm;
+  return {
+      {"schema", "fieldtrue.difference/1"},
+      {"software", std::string("Fieldtrue ") + FIELDTRUE_VERSION},
+      {"verdict", nameOf(difference.verdict)},
+      {"unseen_mm", orNull(difference.unseen_mm)},
+      {"text", difference.text},
+      {"setup_matches", fieldtrue::nameOf(difference.setup_matches)},
+      {"setup_differences", setupDifferencesToJson(difference.first_setup, difference.second_setup)},
+      {"common_points", difference.n_points},
+      {"whole", {{"rms_mm", difference.whole_rms_mm}, {"max_mm", difference.whole_max_mm}}},
+      {"rigid", {{"moved_mm", difference.moved_mm}, {"turned_deg", difference.turned_deg}}},
+      {"field",
+       {{"rms_mm", difference.rms_mm},
+        {"p95_mm", difference.p95_mm},
+        {"max_mm", difference.max_mm},
+        {"max_at_m", jsonOf(worst.reference_m)},
+        {"max_change_mm", jsonOf(Eigen::Vector3d(kMmPerM * worst.change_m))},
+        {"expected_mm", orNull(difference.expected_mm)}}},
+      {"orientation", {{"rms_deg", orNull(difference.angle_rms_deg)}, {"max_deg", orNull(difference.angle_max_deg)}}},
+      {"first_held_out", toJson(difference.first_own)},
+      {"second_held_out", toJson(difference.second_own)},
+      {"first_at_second", toJson(difference.first_at_second)},
+      {"worst_place", nullUnlessTold(difference.worst_place)},
+      {"worst_place_m", jsonOf(difference.worst_place_m)},
+      {"places_beyond", difference.n_beyond},
+      {"places_far_beyond", difference.n_far},
+      {"first_less_second_mm",
+       paired ? nlohmann::json{{"difference", paired->difference}, {"low90", paired->low90}, {"high90", paired->high90}}
+              : nlohmann::json(nullptr)}};
+}
+
+}  // namespace fieldtrue::evaluation
