@@ -72,6 +72,8 @@ void readTake(const QSqlQuery& row, int first, Node& node) {
   const auto value = [&](int offset) { return row.value(first + offset).toDouble(); };
   Eigen::Matrix3d covariance;
   covariance << value(8), value(11), value(12), value(11), value(9), value(13), value(12), value(13), value(10);
+  // Tables hold SDs. The square of the rounded root is what they read back, and so what every reader of a session gets.
+  covariance.diagonal() = covariance.diagonal().cwiseSqrt().cwiseAbs2().eval();
   node.covariance_m2 = covariance;
   node.sd_rot_rad = value(14);
   node.n_effective = value(16);

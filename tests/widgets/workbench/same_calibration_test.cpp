@@ -1,0 +1,65 @@
+#include <QTemporaryDir>
+#include <QTest>
+#include <QThreadPool>
+
+#include "tests/app/cli_program.h"
+#include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
+#include "widgets/workbench/workbench.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::testing;
+using namespace fieldtrue::widgets;
+
+/// Window and command line make the same calibration of the same session.
+class SameCalibrationTest : public QObject {
+  Q_OBJECT
+
+  QTemporaryDir folder_;
+  QString at(const char* name) const { return folder_.filePath(QLatin1String(name)); }
+
+ private slots:
+  void initTestCase() {
+    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
+    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    FT_VERIFY_STATUS(runCli({"acquire", "--device", "simulated:speed=50,travel_s=0.5", "--plan",
+                             "grid:4x3x3@0.2:orientations=2", "--auto", "--samples-per-node", "12", "--session",
+                             at("s.fieldtrue"), "--setup", "transmitter_serial=TX 17"}),
+                     0);
+    FT_VERIFY_STATUS(runCli({"tables", "--session", at("s.fieldtrue"), "--nodes", at("n.csv")}), 0);
+  }
+  void cleanupTestCase() { QThreadPool::globalInstance()->waitForDone(); }
+
+  void bytesAreTheSame_data() {
+    QTest::addColumn<QString>("position");
+    QTest::addColumn<QString>("orientation");
+    QTest::newRow("polynomial") << "polynomial:degree=2"
+                                << "none";
+    QTest::newRow("splines") << "bspline"
+                             << "polynomial_quaternion";
+    QTest::newRow("kriging") << "gaussian_process"
+                             << "none";
+    QTest::newRow("network") << "neural_network"
+                             << "none";
+  }
+  void bytesAreTheSame() {
+    QFETCH(QString, position);
+    QFETCH(QString, orientation);
+    FT_VERIFY_STATUS(runCli({"fit", "--nodes", at("n.csv"), "--position", position, "--orientation", orientation,
+                             "--out", at("command.ftcal.json")}),
+                     0);
+    Workbench workbench;
+    workbench.openSession(at("s.fieldtrue"));
+    QTRY_COMPARE_WITH_TIMEOUT(workbench.recordedTable().nodes.size(), std::size_t{72}, 60000);
+    const auto choice = calibration::parseCorrectorChoice(position.toStdString(), orientation.toStdString());
+    FT_VERIFY_OK(choice);
+    workbench.fit(*choice, calibration::defaultAlignMode(workbench.table().metadata));
+    QTRY_VERIFY_WITH_TIMEOUT(workbench.correctorCorrects() && !workbench.isFitting(), 120000);
+    FT_VERIFY_OK(workbench.corrector()->save(at("window.ftcal.json").toStdString()));
+    QCOMPARE(readWhole(at("window.ftcal.json")), readWhole(at("command.ftcal.json")));
+    QVERIFY(readWhole(at("window.ftcal.json")).contains("TX 17"));
+  }
+};
+
+FIELDTRUE_TEST(SameCalibrationTest)
+#include "same_calibration_test.moc"
