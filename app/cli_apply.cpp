@@ -64,6 +64,14 @@ struct PendingRow {
   SetupMatch setup = SetupMatch::kUnknown;
 };
 
+/// The number of a sensor as a table writes it; none where it is something else.
+std::optional<int> sensorNumber(std::string_view text) {
+  int sensor = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), sensor);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return sensor;
+}
+
 /// Whether the rows of a table are of the set-up that was calibrated: by what the table's head states, what a person
 /// states, which wins, and each row's sensor.
 class SetupCheck {
@@ -251,6 +259,7 @@ class TableCorrector {
       row.pose = poses_.size();
       if (!marked) units_.add(read->position_m);
       poses_.push_back(*read);
+      sensors_.push_back(sensorNumber(sensor));
     }
     rows_.push_back(std::move(row));
     return {};
@@ -258,7 +267,7 @@ class TableCorrector {
 
   void flush(std::ostream& out) {
     std::vector<Pose> corrected(poses_.size());
-    corrector_.correct(poses_, corrected);
+    corrector_.correct(poses_, corrected, sensors_);
     if (isPositionOnly())
       for (std::size_t i = 0; i < poses_.size(); ++i)
         corrected[i].position_m = corrector_.correctPosition_m(poses_[i].position_m);
@@ -276,6 +285,7 @@ class TableCorrector {
     n_rows_ += rows_.size();
     rows_.clear();
     poses_.clear();
+    sensors_.clear();
   }
 
   void writeCorrected(std::ostream& out, const Pose& tracked, const Pose& corrected) {
@@ -313,6 +323,7 @@ class TableCorrector {
   std::vector<std::string> names_;
   std::vector<PendingRow> rows_;
   std::vector<Pose> poses_;
+  std::vector<std::optional<int>> sensors_;  ///< Of each pose.
   std::size_t n_rows_ = 0;
   std::size_t n_outside_ = 0;
   std::size_t n_lost_ = 0;

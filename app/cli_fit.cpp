@@ -72,7 +72,7 @@ Outcome runFit(const FitOptions& options, const CommonOptions& common) {
   if (!choice) return wrongUsage(choice.error());
   const auto setup = readSetupArgument(options.setup);
   if (!setup) return tl::unexpected(setup.error());
-  auto reading = readRowsArgument(options.nodes, options.table);
+  auto reading = readRowsArgument(options.nodes, options.table, SensorRows::kAll);
   if (!reading) return tl::unexpected(reading.error());
   CalibrationTable& table = reading->table;
   for (const auto& [key, value] : *setup) table.metadata.setup[key] = value;
@@ -135,7 +135,7 @@ widgets::ReportInput reportInput(CalibrationTable table, evaluation::Comparison 
 Outcome runCompare(const CompareOptions& options, const CommonOptions& common) {
   const auto arguments = readComparisonArguments(options.comparison);
   if (!arguments) return tl::unexpected(arguments.error());
-  const auto reading = readRowsArgument(options.nodes, options.table);
+  const auto reading = readRowsArgument(options.nodes, options.table, SensorRows::kAll);
   if (!reading) return tl::unexpected(reading.error());
   const auto comparison = evaluation::compareMethods(reading->table, *arguments, runControl(common, "comparing"));
   if (!comparison) return notPossible(comparison.error());
@@ -182,7 +182,7 @@ struct ReportOptions {
 Read<widgets::ReportInput> readReportInput(const ReportOptions& options) {
   widgets::ReportInput input;
   if (options.session.empty()) {
-    auto reading = readRowsArgument(options.nodes, options.table);
+    auto reading = readRowsArgument(options.nodes, options.table, SensorRows::kAll);
     if (!reading) return tl::unexpected(reading.error());
     input.table = std::move(reading->table);
     input.notes = std::move(reading->notes);
@@ -204,7 +204,7 @@ Read<widgets::ReportInput> readReportInput(const ReportOptions& options) {
   if (input.table.nodes.empty()) {
     return notPossible(options.session + " holds no recorded place yet; record at least four with acquire");
   }
-  auto rows = chooseRows({std::move(input.table), {}}, options.session, options.table);
+  auto rows = chooseRows({std::move(input.table), {}}, options.session, options.table, SensorRows::kAll);
   if (!rows) return tl::unexpected(rows.error());
   input.table = std::move(rows->table);
   input.notes = std::move(rows->notes);

@@ -48,12 +48,12 @@ struct DiagnosisInput {
 
 Read<DiagnosisInput> readDiagnosisInput(const DiagnoseOptions& options) {
   DiagnosisInput input;
-  auto nodes = readRowsArgument(options.nodes, options.table);
+  auto nodes = readRowsArgument(options.nodes, options.table, SensorRows::kOne);
   if (!nodes) return tl::unexpected(nodes.error());
   input.table = std::move(nodes->table);
   input.notes = std::move(nodes->notes);
   if (!options.against.empty()) {
-    auto before = readRowsArgument(options.against, options.table);
+    auto before = readRowsArgument(options.against, options.table, SensorRows::kOne);
     if (!before) return tl::unexpected(before.error());
     auto change = recording::changeSince(before->table, input.table);
     if (!change) return notPossible(change.error());
@@ -165,7 +165,7 @@ Read<std::vector<PlannedPlace>> readPlaces(const PlanCheckOptions& options) {
     if (!plan) return tl::unexpected(plan.error());
     return places(*plan);
   }
-  const auto reading = readRowsArgument(options.nodes, options.table);
+  const auto reading = readRowsArgument(options.nodes, options.table, SensorRows::kOne);
   if (!reading) return tl::unexpected(reading.error());
   return placesOf(reading->table);
 }

@@ -73,7 +73,7 @@ Outcome runResample(const ResampleOptions& options, const CommonOptions& common)
   if (!plan) return tl::unexpected(plan.error());
   const auto grid = readGrid(*plan);
   if (!grid) return tl::unexpected(grid.error());
-  const auto reading = readRowsArgument(options.nodes, options.table);
+  const auto reading = readRowsArgument(options.nodes, options.table, SensorRows::kOne);
   if (!reading) return tl::unexpected(reading.error());
   const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(reading->table.metadata));
   if (!align) return tl::unexpected(align.error());

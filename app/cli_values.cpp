@@ -72,7 +72,7 @@ Read<TableReading<CalibrationTable>> readNodesArgument(const std::string& path) 
 void addTableOptions(CLI::App& command, TableArguments& arguments) {
   command
       .add_option("--sensor", arguments.sensor,
-                  "Use the rows of this sensor; needed where a table holds several, each with a mounting of its own")
+                  "Use the rows of this sensor only; a table may hold several, each with a mounting of its own")
       ->type_name("N");
   addForceOption(command, arguments.force, "Go on although true positions and readings seem to be in different units");
 }
@@ -82,11 +82,13 @@ void addForceOption(CLI::App& command, bool& force, const std::string& help) {
 }
 
 Read<TableReading<CalibrationTable>> chooseRows(TableReading<CalibrationTable> reading, const std::string& name,
-                                                const TableArguments& arguments) {
+                                                const TableArguments& arguments, SensorRows sensors) {
   const std::size_t n_all = reading.table.nodes.size();
-  auto rows = rowsOfSensor(reading.table, arguments.sensor);
-  if (!rows) return notPossible(name + ": " + rows.error().message + (arguments.sensor ? "" : ": --sensor N"));
-  reading.table = *std::move(rows);
+  if (arguments.sensor || sensors == SensorRows::kOne) {
+    auto rows = rowsOfSensor(reading.table, arguments.sensor);
+    if (!rows) return notPossible(name + ": " + rows.error().message + (arguments.sensor ? "" : ": --sensor N"));
+    reading.table = *std::move(rows);
+  }
   if (const std::size_t n_used = reading.table.nodes.size(); n_used < n_all) {
     reading.notes.push_back(name + ": " + std::to_string(n_used) + " of " + std::to_string(n_all) +
                             " rows are of sensor " + std::to_string(*arguments.sensor));
@@ -98,10 +100,11 @@ Read<TableReading<CalibrationTable>> chooseRows(TableReading<CalibrationTable> r
   return reading;
 }
 
-Read<TableReading<CalibrationTable>> readRowsArgument(const std::string& path, const TableArguments& arguments) {
+Read<TableReading<CalibrationTable>> readRowsArgument(const std::string& path, const TableArguments& arguments,
+                                                      SensorRows sensors) {
   auto reading = readNodesArgument(path);
   if (!reading) return reading;
-  return chooseRows(*std::move(reading), std::filesystem::path(path).filename().string(), arguments);
+  return chooseRows(*std::move(reading), std::filesystem::path(path).filename().string(), arguments, sensors);
 }
 
 Read<calibration::AlignMode> readAlignArgument(const std::string& text, calibration::AlignMode fallback) {

@@ -39,12 +39,15 @@ struct TableArguments {
 void addTableOptions(CLI::App& command, TableArguments& arguments);
 void addForceOption(CLI::App& command, bool& force, const std::string& help);
 
-/// The rows of the chosen sensor, in units that can be right; what was noticed goes to the notes.
+/// Whether a command takes the rows of all sensors at once, or those of one only.
+enum class SensorRows { kAll, kOne };
+/// The rows of the chosen sensor, or all, in units that can be right; what was noticed goes to the notes.
 /// @param name of the table, in messages
 Read<TableReading<CalibrationTable>> chooseRows(TableReading<CalibrationTable> reading, const std::string& name,
-                                                const TableArguments& arguments);
+                                                const TableArguments& arguments, SensorRows sensors);
 /// A node table whose rows are fitted or scored.
-Read<TableReading<CalibrationTable>> readRowsArgument(const std::string& path, const TableArguments& arguments);
+Read<TableReading<CalibrationTable>> readRowsArgument(const std::string& path, const TableArguments& arguments,
+                                                      SensorRows sensors);
 
 /// `none` or `rigid`; `fallback` when empty.
 Read<calibration::AlignMode> readAlignArgument(const std::string& text, calibration::AlignMode fallback);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <map>
 #include <vector>
 
 #include "calib/calibration/corrector.h"
@@ -67,6 +68,13 @@ void improveMounting(const std::vector<OrientationPair>& pairs, Eigen::Quaternio
   sensor_from_mount = (sensor_from_mount * rotationFromVector(mean_r - mean_a * e)).normalized();
 }
 
+/// The rows of each sensor.
+std::map<int, std::vector<Node>> bySensor(std::span<const Node> nodes) {
+  std::map<int, std::vector<Node>> rows;
+  for (const Node& node : nodes) rows[node.sensor].push_back(node);
+  return rows;
+}
+
 /// The constant rotation between holder and sensor that the orientations show once the frames are aligned.
 Eigen::Quaterniond fitMounting(std::span<const Node> nodes, const Eigen::Quaterniond& reference_from_tracker) {
   std::vector<OrientationPair> pairs;
@@ -85,6 +93,19 @@ Eigen::Quaterniond fitMounting(std::span<const Node> nodes, const Eigen::Quatern
   return canonical(mounting);
 }
 
+constexpr double kSideBySide_m = 0.005;
+
+/// Sensors that ride side by side stand at several positions of one index, which tells none of them apart.
+bool isIndexShared(std::span<const Node> nodes) {
+  std::map<std::array<int, 3>, const Node*> first_there;
+  return std::any_of(nodes.begin(), nodes.end(), [&](const Node& node) {
+    if (!node.index) return false;
+    const Node& first = *first_there.emplace(*node.index, &node).first->second;
+    const Eigen::Vector3d apart_m = node.reference_from_sensor.position_m - first.reference_from_sensor.position_m;
+    return first.sensor != node.sensor && apart_m.norm() > kSideBySide_m;
+  });
+}
+
 /// The table's own grid index, or the one its true positions show; empty when they are scattered.
 std::vector<std::array<int, 3>> indexOf(std::span<const Node> nodes) {
   std::vector<std::array<int, 3>> index;
@@ -93,10 +114,17 @@ std::vector<std::array<int, 3>> indexOf(std::span<const Node> nodes) {
     if (node.index) index.push_back(*node.index);
     p_true_m.push_back(node.reference_from_sensor.position_m);
   }
-  return index.size() == nodes.size() ? index : gridIndex(p_true_m).value_or(std::vector<std::array<int, 3>>());
+  return index.size() == nodes.size() && !isIndexShared(nodes)
+             ? index
+             : gridIndex(p_true_m).value_or(std::vector<std::array<int, 3>>());
 }
 
 }  // namespace
+
+const Eigen::Quaterniond& Alignment::mountOf(std::optional<int> sensor) const {
+  const auto found = sensor ? mounts.find(*sensor) : mounts.end();
+  return found == mounts.end() ? sensor_from_mount : found->second;
+}
 
 AlignMode defaultAlignMode(const TableMetadata& metadata) {
   return metadata.alignment_known ? AlignMode::kNone : AlignMode::kRigid;
@@ -114,14 +142,19 @@ Result<Alignment> fitAlignment(std::span<const Node> nodes) {
   if (!reference_from_tracker)
     return fail(reference_from_tracker.error().code,
                 "The alignment of rig and tracker cannot be found: " + reference_from_tracker.error().message);
-  return Alignment{*reference_from_tracker, fitMounting(nodes, reference_from_tracker->orientation)};
+  Alignment alignment{*reference_from_tracker, {}, {}};
+  const std::map<int, std::vector<Node>> rows = bySensor(nodes);
+  for (const auto& [sensor, of_sensor] : rows)
+    alignment.mounts[sensor] = fitMounting(of_sensor, reference_from_tracker->orientation);
+  alignment.sensor_from_mount = alignment.mounts.begin()->second;
+  if (alignment.mounts.size() == 1) alignment.mounts.clear();
+  return alignment;
 }
 
 correctors::FitData makeFitData(std::span<const Node> nodes, const TableMetadata& metadata,
                                 const Alignment& alignment) {
   correctors::FitData data;
   const Pose tracker_from_reference = inverse(alignment.reference_from_tracker);
-  const Eigen::Quaterniond mount_from_sensor = alignment.sensor_from_mount.conjugate();
   const auto all_have = [&](const auto& has) { return !nodes.empty() && std::all_of(nodes.begin(), nodes.end(), has); };
   const bool has_orientation = all_have([](const Node& node) { return node.has_orientation; });
   const bool has_noise = all_have([](const Node& node) { return node.covariance_m2.has_value(); });
@@ -133,7 +166,7 @@ correctors::FitData makeFitData(std::span<const Node> nodes, const TableMetadata
     if (!has_orientation) continue;
     data.q_tracked.push_back(node.tracker_from_sensor.orientation);
     data.q_true.push_back(tracker_from_reference.orientation * node.reference_from_sensor.orientation *
-                          mount_from_sensor);
+                          alignment.mountOf(node.sensor).conjugate());
   }
   data.index = indexOf(nodes);
   data.jig_sd_m = metadata.jig_tolerance_m.value_or(0.0);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+#include <optional>
 #include <span>
 
 #include "calib/core/calibration_table.h"
@@ -12,8 +14,12 @@ namespace fieldtrue::calibration {
 /// reference_from_sensor = reference_from_tracker * tracker_from_sensor * sensor_from_mount.
 struct Alignment {
   Pose reference_from_tracker;
-  /// Constant rotation of the sensor in its holder.
+  /// Constant rotation of the sensor in its holder; of the first sensor where there are several.
   Eigen::Quaterniond sensor_from_mount = Eigen::Quaterniond::Identity();
+  std::map<int, Eigen::Quaterniond> mounts;  ///< Of each sensor, where there are several; else empty.
+
+  /// Of a sensor; the first one's for a sensor that was not fitted or is not told.
+  const Eigen::Quaterniond& mountOf(std::optional<int> sensor) const;
 };
 
 enum class AlignMode { kNone, kRigid };
@@ -21,8 +27,9 @@ enum class AlignMode { kNone, kRigid };
 /// `rigid` unless the table says the alignment is known.
 AlignMode defaultAlignMode(const TableMetadata& metadata);
 
-/// Fits the rigid part from positions, and the constant mounting rotation from orientations when present. Sensors held
-/// in several orientations tell the mounting from a mean rotation error of the tracker, which is left to be corrected.
+/// Fits the rigid part from positions, and the constant mounting rotation of each sensor from orientations when
+/// present. Sensors held in several orientations tell the mounting from a mean rotation error of the tracker, which is
+/// left to be corrected.
 /// @error kTooFewNodes, kDegenerate as fitRigid
 Result<Alignment> fitAlignment(std::span<const Node> nodes);
 

@@ -36,7 +36,7 @@ FitReport reportOf(std::span<const Node> nodes, const Corrector& corrector) {
   std::size_t n_orientations = 0;
   for (const Node& node : nodes) {
     const Eigen::Vector3d& p_true_m = node.reference_from_sensor.position_m;
-    const Pose corrected = corrector.correct(node.tracker_from_sensor);
+    const Pose corrected = corrector.correct(node.tracker_from_sensor, node.sensor);
     before_squares_m2 +=
         (alignment.reference_from_tracker * node.tracker_from_sensor.position_m - p_true_m).squaredNorm();
     const double after_m = (corrected.position_m - p_true_m).norm();
@@ -127,7 +127,7 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
   return corrector;
 }
 
-Pose Corrector::correct(const Pose& tracker_from_sensor) const {
+Pose Corrector::correct(const Pose& tracker_from_sensor, std::optional<int> sensor) const {
   const Eigen::Vector3d& p_tracked_m = tracker_from_sensor.position_m;
   Pose corrected;
   corrected.position_m = p_tracked_m;
@@ -136,12 +136,14 @@ Pose Corrector::correct(const Pose& tracker_from_sensor) const {
   const Eigen::Quaterniond q_true = orientation_->covers(p_tracked_m)
                                         ? orientation_->correct(p_tracked_m, tracker_from_sensor.orientation)
                                         : tracker_from_sensor.orientation;
-  corrected.orientation = alignment_.reference_from_tracker.orientation * q_true * alignment_.sensor_from_mount;
+  corrected.orientation = alignment_.reference_from_tracker.orientation * q_true * alignment_.mountOf(sensor);
   return corrected;
 }
 
-void Corrector::correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor) const {
+void Corrector::correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
+                        std::span<const std::optional<int>> sensors) const {
   FT_CHECK(tracker_from_sensor.size() == reference_from_sensor.size());
+  FT_CHECK(sensors.empty() || sensors.size() == tracker_from_sensor.size());
   std::vector<Eigen::Vector3d> p_m;
   std::vector<std::size_t> covered;
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
@@ -164,8 +166,8 @@ void Corrector::correct(std::span<const Pose> tracker_from_sensor, std::span<Pos
                                           ? orientation_->correct(tracked.position_m, tracked.orientation)
                                           : tracked.orientation;
     reference_from_sensor[i].position_m = alignment_.reference_from_tracker * p_true_m;
-    reference_from_sensor[i].orientation =
-        alignment_.reference_from_tracker.orientation * q_true * alignment_.sensor_from_mount;
+    reference_from_sensor[i].orientation = alignment_.reference_from_tracker.orientation * q_true *
+                                           alignment_.mountOf(sensors.empty() ? std::nullopt : sensors[i]);
   }
 }
 

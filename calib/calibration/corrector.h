@@ -52,8 +52,11 @@ class Corrector {
                                const CorrectorChoice& choice, AlignMode align, const RunControl& control = {});
 
   /// reference_from_sensor of a tracked pose. Where a part does not cover the position, only the alignment is applied.
-  Pose correct(const Pose& tracker_from_sensor) const;
-  void correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor) const;
+  /// @param sensor whose mounting counts, where several were fitted
+  Pose correct(const Pose& tracker_from_sensor, std::optional<int> sensor = {}) const;
+  /// @param sensors of each pose; empty where they are not told
+  void correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
+               std::span<const std::optional<int>> sensors = {}) const;
   /// Where the position part takes orientation: the mean over the orientations that were fitted.
   Eigen::Vector3d correctPosition_m(const Eigen::Vector3d& p_tracked_m) const;
   /// Whether the position part is a function of the tracked pose, not of position alone.

@@ -1,3 +1,4 @@
+#include <charconv>
 #include <limits>
 #include <type_traits>
 
@@ -93,6 +94,15 @@ json setupToJson(const Setup& setup) {
   return to;
 }
 
+/// A key of the mountings: the sensor's number.
+int sensorFrom(const JsonReader& mounts, const std::string& key) {
+  int sensor = 0;
+  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), sensor);
+  if (error != std::errc() || end != key.data() + key.size())
+    mounts.fail("has the key '" + key + "', which is not a sensor's number");
+  return sensor;
+}
+
 /// Schema and checksum: whether this is a whole calibration file that this version can read.
 void checkEnvelope(const JsonReader& content) {
   if (!content.schema(kSchemaName, kSchemaVersion, "a Fieldtrue calibration"))
@@ -131,6 +141,8 @@ std::string Corrector::toText() const {
       {"report", reportToJson(report_)},
       {"table", fieldtrue::toJson(table_)},
   };
+  for (const auto& [sensor, sensor_from_mount] : alignment_.mounts)
+    content["alignment"]["mounts_wxyz"][std::to_string(sensor)] = jsonOf(sensor_from_mount);
   content["checksum"] = checksumOf(content);
   // One line a top-level key: readable at the head, and compact where thousands of numbers stand.
   std::string text = "{";
@@ -160,6 +172,9 @@ Corrector Corrector::fromJson(const JsonReader& content) {
   corrector.alignment_.sensor_from_mount = alignment["sensor_from_mount_wxyz"].quaternion();
   corrector.position_ = position.model;
   corrector.is_baked_ = position.is_baked;
+  if (const auto mounts = alignment.find("mounts_wxyz"))
+    for (const auto& [sensor, raw] : mounts->object().items())
+      corrector.alignment_.mounts[sensorFrom(*mounts, sensor)] = (*mounts)[sensor].quaternion();
   corrector.orientation_ = orientation.model;
   corrector.region_ = Region::fromJson(content["region"]);
   corrector.report_ = reportFrom(content["report"]);

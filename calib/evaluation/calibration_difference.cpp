@@ -8,9 +8,10 @@
 
 #include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
-#include "calib/core/number_text.h"
 #include "calib/core/statistics.h"
 #include "calib/core/units.h"
+#include "calib/correctors/base/method_text.h"
+#include "calib/evaluation/base/figures.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/region/region_lattice.h"
 
@@ -107,11 +108,11 @@ void measureOrientation(const Corrector& first, const Corrector& second, const s
 
 /// A calibration's method, judged on its own rows at places its fits did not see.
 Result<Comparison> heldOut(const Corrector& corrector, const RunControl& control) {
-  MethodText method{corrector.choice().position_id, {}};
-  for (const auto& [key, value] : corrector.choice().position_settings)
-    if (const std::string text = textOf(value); !text.empty()) method.given.emplace(key, text);
+  const calibration::CorrectorChoice& choice = corrector.choice();
+  FT_TRY(const MethodText method,
+         parseMethodText(correctors::methodText(choice.position_id, choice.position_settings)));
   ComparisonOptions options;
-  options.position_methods = {std::move(method)};
+  options.position_methods = {method};
   options.orientation_methods = {{"none", {}}};
   options.align = corrector.align();
   options.with_surroundings = false;
@@ -222,13 +223,9 @@ DifferenceVerdict verdictOn(const CalibrationDifference& difference) {
   return is_apart || difference.n_far > 0 ? DifferenceVerdict::kCannotTell : DifferenceVerdict::kNotShown;
 }
 
-std::string metres(const Eigen::Vector3d& p_m) {
-  return "(" + fixedText(p_m.x(), 2) + ", " + fixedText(p_m.y(), 2) + ", " + fixedText(p_m.z(), 2) + ") m";
-}
-
 std::string withInterval(const PlaceErrors& errors) {
-  return significantText(errors.rms_mm) + " mm (" + significantText(errors.rms_90_mm.low) + " to " +
-         significantText(errors.rms_90_mm.high) + ")";
+  return errorText(errors.rms_mm) + " mm (" + errorText(errors.rms_90_mm.low) + " to " +
+         errorText(errors.rms_90_mm.high) + ")";
 }
 
 std::string when(const CalibrationDifference& difference) {
@@ -242,14 +239,14 @@ std::string beyond(const CalibrationDifference& difference) {
   if (difference.n_beyond == 0) return {};
   return "; " + std::to_string(difference.n_beyond) +
          (difference.n_beyond == 1 ? " of the second's places is" : " of the second's places are") +
-         " worse than any of its own, most " + difference.worst_place + " at " + metres(difference.worst_place_m) +
+         " worse than any of its own, most " + difference.worst_place + " at " + pointText(difference.worst_place_m) +
          (difference.n_far > 0 ? "; " + std::to_string(difference.n_far) + " more than three times as bad" : "");
 }
 
 std::string sentences(const CalibrationDifference& difference) {
-  const std::string field = " The corrections differ by " + significantText(difference.rms_mm) +
-                            " mm RMS over the common region, most, " + significantText(difference.max_mm) + " mm, at " +
-                            metres(difference.points[difference.worst].reference_m) + ".";
+  const std::string field = " The corrections differ by " + errorText(difference.rms_mm) +
+                            " mm RMS over the common region, most, " + errorText(difference.max_mm) + " mm, at " +
+                            pointText(difference.points[difference.worst].reference_m) + ".";
   const std::string other =
       difference.setup_matches == SetupMatch::kNo
           ? " They are of different set-ups: " + differenceText(difference.first_setup, difference.second_setup) + "."
@@ -264,7 +261,7 @@ std::string sentences(const CalibrationDifference& difference) {
     case DifferenceVerdict::kChanged:
       return "The field changed " + when(difference) + ": " + errs + field + other;
     case DifferenceVerdict::kNotShown:
-      return "No change is shown, and one of up to " + significantText(*difference.unseen_mm) +
+      return "No change is shown, and one of up to " + errorText(*difference.unseen_mm) +
              " mm RMS everywhere would not show: " + errs + field + other;
     case DifferenceVerdict::kCannotTell:
       break;

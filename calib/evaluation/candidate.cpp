@@ -18,7 +18,7 @@ RowScore positionScore(const Eigen::Vector3d& p_corrected_m, const Node& node,
 RowScore orientationScore(const Eigen::Quaterniond& q_corrected, const Node& node,
                           const calibration::Alignment& alignment) {
   const Eigen::Quaterniond reference_from_mount =
-      alignment.reference_from_tracker.orientation * q_corrected * alignment.sensor_from_mount;
+      alignment.reference_from_tracker.orientation * q_corrected * alignment.mountOf(node.sensor);
   RowScore score;
   score.error = kDegPerRad * angleBetween_rad(reference_from_mount, node.reference_from_sensor.orientation);
   return score;

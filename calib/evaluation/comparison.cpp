@@ -13,6 +13,7 @@
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/limits.h"
 #include "calib/evaluation/place_scores.h"
+#include "calib/evaluation/sensor_scores.h"
 #include "calib/evaluation/surroundings.h"
 #include "calib/evaluation/verdict.h"
 #include "calib/tables/true_box.h"
@@ -37,6 +38,7 @@ MethodScore methodScore(const Candidate& candidate, CandidateScores scores, cons
   score.settings = candidate.settings;
   score.skipped = std::move(scores.skipped);
   if (score.skipped) return score;
+  score.sensors = scoresBySensor(scored, scores.held_out, candidate.is_tuned);
   PlaceScores held_out = gatherByPlace(places, scored, scores.held_out);
   score.stats = errorStats(held_out.errors, candidate.is_tuned);
   score.inside = statsWhere(held_out.errors, is_edge, false, candidate.is_tuned);
@@ -85,6 +87,7 @@ void scoreMethods(const HeldOutJob& job, HeldOutScores& held_out, const std::vec
 
 void scoreBefore(const HeldOutJob& job, const HeldOutScores& held_out, const std::vector<Node>& scored,
                  Comparison& comparison) {
+  comparison.before_sensors = scoresBySensor(scored, held_out.before_position, false);
   PlaceScores position = gatherByPlace(comparison.places, scored, held_out.before_position);
   comparison.before_position_mm = errorStats(position.errors);
   comparison.before_place_mm = std::move(position.errors);
@@ -170,6 +173,7 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
                                   const RunControl& control) {
   FT_TRY(const auto job, makeJob(table, options));
   const double scores_end = options.with_surroundings ? 0.9 : 1.0;
+  constexpr double surroundings_end = 0.95;
   FT_TRY(auto held_out, scoreHeldOut(job, partOf(control, 0.0, scores_end)));
 
   const std::vector<Node> scored = rowsOf(job, job.scored);
@@ -185,7 +189,12 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
   pickBest(comparison);
   judgePlaces(comparison);
   if (control.stop.stop_requested()) return comparisonStopped();
-  if (options.with_surroundings) FT_TRY_VOID(addSurroundings(comparison, table, job, partOf(control, scores_end, 1.0)));
+  if (options.with_surroundings)
+    FT_TRY_VOID(addSurroundings(comparison, table, job, partOf(control, scores_end, surroundings_end)));
+  if (options.with_surroundings) {
+    FT_TRY(comparison.split, splitOf(comparison, table, options, partOf(control, surroundings_end, 1.0)));
+    if (comparison.split) comparison.notes.push_back(comparison.split->text);
+  }
   writeVerdictText(comparison);
   return comparison;
 }

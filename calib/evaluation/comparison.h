@@ -12,6 +12,7 @@
 #include "calib/core/error.h"
 #include "calib/core/place_name.h"
 #include "calib/core/run_control.h"
+#include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/error_stats.h"
 #include "calib/evaluation/orientation/orientation_dependence.h"
 #include "calib/evaluation/region/coverage.h"
@@ -45,6 +46,24 @@ struct ComparisonOptions {
   bool closed_form = true;  ///< False refits every fold of every method: the slow way, for checking the fast one.
 };
 
+/// What is left at one sensor's rows, where the table holds several sensors.
+struct SensorScore {
+  int sensor = 0;
+  std::vector<int> places;           ///< Node numbers.
+  std::vector<double> place_errors;  ///< Of each place.
+  ErrorStats stats;                  ///< mm or deg.
+};
+
+/// Whether each sensor corrected by itself, from its own rows, errs less than with the correction that all share: RMS
+/// over the sensors of a place, both at places that the fits did not see.
+struct SensorSplit {
+  double shared_mm = 0;
+  double separate_mm = 0;
+  PairedDifference separate_less_shared_mm;
+  bool is_better = false;  ///< Separate: the paired 90 % interval is below zero.
+  std::string text;        ///< One sentence.
+};
+
 /// One method's score on the places its fits did not see.
 struct MethodScore {
   std::string method;
@@ -55,7 +74,8 @@ struct MethodScore {
   std::vector<double> place_errors;  ///< Same order as Comparison::places.
   std::vector<Eigen::Vector3d>
       residual_m;  ///< Position only: corrected minus true at each place, reference frame (mean over its rows).
-  std::vector<bool> place_covered;  ///< Same order; where false the input stood unchanged.
+  std::vector<SensorScore> sensors;  ///< In order; empty where there is one.
+  std::vector<bool> place_covered;   ///< Same order; where false the input stood unchanged.
   int n_uncovered = 0;
   double rms_common_mm = 0;  ///< Position only: over the places all methods cover.
   double rms_to_best = 0;    ///< RMS minus the best method's, mm or deg, with its paired 90 % interval.
@@ -143,6 +163,7 @@ struct Comparison {
   std::string floor_from;  ///< "samples and jig tolerance", and the like.
   ErrorStats before_position_mm;
   std::optional<ErrorStats> before_orientation_deg;  ///< None without orientation.
+  std::vector<SensorScore> before_sensors;           ///< Of positions; empty with one sensor.
   std::vector<double> before_place_mm;
   std::vector<double> before_place_deg;  ///< Empty without orientation.
   std::vector<Eigen::Vector3d> before_residual_m;
@@ -158,6 +179,7 @@ struct Comparison {
   std::optional<FoldBack> fold_back;  ///< With the best position method fitted to all rows it may see.
   std::optional<OrientationDependence> orientation_dependence;  ///< None without orientation.
   std::vector<ResamplingError> resampling;                      ///< Empty for places in one plane.
+  std::optional<SensorSplit> split;                             ///< Of the best position method; none with one sensor.
   std::vector<std::string> notes;                               ///< E.g. that the nodes lie in one plane.
 };
 

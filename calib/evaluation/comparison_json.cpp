@@ -25,6 +25,27 @@ json statsToJson(const ErrorStats& stats) {
 
 json optionalToJson(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
 
+json sensorsToJson(const std::vector<SensorScore>& sensors) {
+  json to = json::array();
+  for (const SensorScore& score : sensors) {
+    json one = statsToJson(score.stats);
+    one["sensor"] = score.sensor;
+    one["n_places"] = score.places.size();
+    to.push_back(std::move(one));
+  }
+  return to;
+}
+
+json splitToJson(const SensorSplit& split) {
+  return {{"shared_mm", split.shared_mm},
+          {"separate_mm", split.separate_mm},
+          {"separate_less_shared_mm", split.separate_less_shared_mm.difference},
+          {"low90", split.separate_less_shared_mm.low90},
+          {"high90", split.separate_less_shared_mm.high90},
+          {"separate_is_better", split.is_better},
+          {"text", split.text}};
+}
+
 json scoreToJson(const MethodScore& score, const char* stats_key, bool is_position) {
   const bool used = !score.skipped;
   json to = {{"method", score.method},
@@ -45,6 +66,7 @@ json scoreToJson(const MethodScore& score, const char* stats_key, bool is_positi
              {"notes", score.notes},
              {"skipped", nullUnless(!used, score.skipped.value_or(""))}};
   if (is_position) to["rms_common_mm"] = nullUnless(used, score.rms_common_mm);
+  if (!score.sensors.empty()) to["sensors"] = sensorsToJson(score.sensors);
   const std::string key = stats_key;
   to[key + "_inside"] = score.inside ? statsToJson(*score.inside) : json(nullptr);
   to[key + "_edge"] = score.edge ? statsToJson(*score.edge) : json(nullptr);
@@ -143,6 +165,8 @@ json toJson(const Comparison& comparison) {
           {"fold_back", partToJson(comparison.fold_back)},
           {"orientation_dependence", partToJson(comparison.orientation_dependence)},
           {"resampling", resamplingToJson(comparison.resampling)},
+          {"sensors", sensorsToJson(comparison.before_sensors)},
+          {"split", comparison.split ? splitToJson(*comparison.split) : json(nullptr)},
           {"notes", comparison.notes}};
 }
 

@@ -36,11 +36,11 @@ CalibrationTable describedTable(const calibration::Corrector& corrector) {
 std::string addedFields(const calibration::Corrector& corrector, const Node& node) {
   const calibration::Alignment& alignment = corrector.alignment();
   const Pose& tracked = node.tracker_from_sensor;
-  const Pose corrected = corrector.correct(tracked);
+  const Pose corrected = corrector.correct(tracked, node.sensor);
   const Pose& truth = node.reference_from_sensor;
   const Eigen::Vector3d p_before_m = alignment.reference_from_tracker * tracked.position_m;
   const Eigen::Quaterniond q_before =
-      alignment.reference_from_tracker.orientation * tracked.orientation * alignment.sensor_from_mount;
+      alignment.reference_from_tracker.orientation * tracked.orientation * alignment.mountOf(node.sensor);
   const Eigen::Quaterniond q_after = canonical(corrected.orientation);
   const auto field = [](double value) { return "," + formatNumber(value); };
 

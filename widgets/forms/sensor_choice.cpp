@@ -8,19 +8,22 @@ SensorChoice::SensorChoice(Workbench& workbench, const QString& name, QWidget* p
     : QComboBox(parent), workbench_(workbench) {
   setObjectName(name);
   setAccessibleName(tr("Sensor"));
-  setPlaceholderText(tr("Choose a sensor"));
   connect(&workbench_, &Workbench::tableChanged, this, &SensorChoice::refresh);
   connect(&workbench_, &Workbench::sessionChanged, this, &SensorChoice::refresh);
-  connect(this, &QComboBox::activated, this, [this](int index) { workbench_.chooseSensor(itemData(index).toInt()); });
+  connect(this, &QComboBox::activated, this, [this](int index) {
+    const QVariant sensor = itemData(index);
+    workbench_.chooseSensor(sensor.isValid() ? std::optional(sensor.toInt()) : std::nullopt);
+  });
   refresh();
 }
 
 void SensorChoice::refresh() {
   clear();
+  addItem(tr("All sensors"));
   for (const int sensor : workbench_.sensors()) addItem(tr("Sensor %1").arg(sensor), sensor);
   const std::optional<int> chosen = workbench_.chosenSensor();
-  setCurrentIndex(chosen ? findData(*chosen) : -1);
-  setVisible(count() > 1);
+  setCurrentIndex(chosen ? findData(*chosen) : 0);
+  setVisible(count() > 2);
 }
 
 }  // namespace fieldtrue::widgets

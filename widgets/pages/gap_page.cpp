@@ -197,7 +197,7 @@ void GapPage::runOrStop() {
 
 void GapPage::run() {
   jobs_.stop();
-  if (!workbench_.mayUse(table_, [page = QPointer(this)] {
+  if (!workbench_.mayUse(table_, Workbench::SensorRows::kOne, [page = QPointer(this)] {
         if (page) page->run();
       }))
     return showReport();

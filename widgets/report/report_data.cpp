@@ -176,6 +176,27 @@ std::string truenessText(const evaluation::Comparison& comparison) {
   return text.empty() ? text : "Systematic error apart from the noise floor: " + text + ".";
 }
 
+std::string insideAndEdgeText(const evaluation::Comparison& comparison) {
+  const evaluation::Verdict& verdict = comparison.verdict;
+  if (!verdict.inside_mm || !verdict.edge_mm) return {};
+  return "Left out, places with others on all sides err by " + errorFigure(*verdict.inside_mm) +
+         " mm, the outermost ones by " + errorFigure(*verdict.edge_mm) +
+         " mm: a left-out outermost place is no fresh place inside.";
+}
+
+std::string sensorsText(const evaluation::Comparison& comparison) {
+  std::string text;
+  const auto& best = comparison.best_position_row;
+  for (std::size_t i = 0; i < comparison.before_sensors.size(); ++i) {
+    const evaluation::SensorScore& before = comparison.before_sensors[i];
+    text += (text.empty() ? "Sensor " : " Sensor ") + std::to_string(before.sensor) + ": " +
+            errorFigure(before.stats.rms) + " mm before";
+    if (best) text += ", " + errorFigure(comparison.position[*best].sensors[i].stats.rms) + " mm with the best method";
+    text += ", at " + std::to_string(before.places.size()) + " places.";
+  }
+  return text;
+}
+
 std::string resamplingText(const evaluation::Comparison& comparison) {
   std::string text;
   for (const evaluation::ResamplingError& error : comparison.resampling) {

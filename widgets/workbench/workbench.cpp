@@ -249,7 +249,7 @@ CalibrationTable Workbench::recordedTable() const {
 
 std::vector<int> Workbench::sensors() const { return sensorsOf(recordedTable()); }
 
-void Workbench::chooseSensor(int sensor) {
+void Workbench::chooseSensor(std::optional<int> sensor) {
   if (chosen_sensor_ == sensor) return;
   comparison_jobs_.stop();
   chosen_sensor_ = sensor;
@@ -262,10 +262,10 @@ void Workbench::chooseSensor(int sensor) {
   emit tableChanged();
 }
 
-bool Workbench::mayUse(const CalibrationTable& table, const std::function<void()>& then) {
+bool Workbench::mayUse(const CalibrationTable& table, SensorRows sensors, const std::function<void()>& then) {
   refusal_.clear();
   endCondition(QStringLiteral("session/table"));
-  if (const auto rows = rowsOfSensor(table, std::nullopt); !rows) {
+  if (const auto rows = rowsOfSensor(table, std::nullopt); sensors == SensorRows::kOne && !rows) {
     refuse(rows.error().message, {}, {});
   } else if (const auto units = recording::checkUnits(table); !units && !uses_any_units_) {
     refuse(units.error().message, tr("Use anyway"), [this, then, path = session_path_] {
@@ -404,7 +404,7 @@ void Workbench::setAutomatic(bool automatic) { post(&acquisition::AcquisitionCon
 void Workbench::compare(const evaluation::ComparisonOptions& options, MethodCount count) {
   comparison_jobs_.stop();
   endCondition(QStringLiteral("session/compare"));
-  if (!mayUse(table())) {
+  if (!mayUse(table(), SensorRows::kAll)) {
     comparison_.reset();
     emit comparisonChanged();
     return;
@@ -437,7 +437,7 @@ void Workbench::stopComparing() {
 }
 
 void Workbench::fit(const calibration::CorrectorChoice& choice, calibration::AlignMode align) {
-  if (isFitting() || !mayUse(table())) return;
+  if (isFitting() || !mayUse(table(), SensorRows::kAll)) return;
   endCondition(QStringLiteral("session/fit"));
   fit_jobs_.run(
       [table = table(), choice, align](const RunControl& control) {

@@ -44,14 +44,16 @@ class Workbench : public QObject {
   const CalibrationTable& table() const;
   /// Every row of the session.
   CalibrationTable recordedTable() const;
-  /// With rows in the session; from two on, one must be chosen before methods are fitted or scored.
+  /// With rows in the session.
   std::vector<int> sensors() const;
+  /// None: the rows of all are used.
   std::optional<int> chosenSensor() const { return chosen_sensor_; }
-  void chooseSensor(int sensor);
-  /// Whether methods may be fitted or scored on a table: one sensor's rows, in units that can be right. If not, says
-  /// why in a message, whose action uses the units anyway.
+  void chooseSensor(std::optional<int> sensor);
+  /// Whether a table may be worked on: its units can be right, and where only one sensor's rows can be used there are
+  /// no others. If not, says why in a message, whose action uses the units anyway.
   /// @param then what goes on after that
-  bool mayUse(const CalibrationTable& table, const std::function<void()>& then = {});
+  enum class SensorRows { kAll, kOne };
+  bool mayUse(const CalibrationTable& table, SensorRows sensors, const std::function<void()>& then = {});
   /// Why not, as it was last said; empty when they may.
   const QString& refusal() const { return refusal_; }
   /// Every raw sample of the session; large, made on request.

@@ -98,7 +98,7 @@ class CorrectorTest : public QObject {
 
   void bringsTheTruthToTheTrackerFrame() {
     const CalibrationTable table = alignedTable();
-    const correctors::FitData data = makeFitData(table.nodes, table.metadata, {kReferenceFromTracker, kMounting});
+    const correctors::FitData data = makeFitData(table.nodes, table.metadata, {kReferenceFromTracker, kMounting, {}});
     QCOMPARE(data.size(), table.nodes.size());
     QVERIFY(data.hasOrientation());
     QCOMPARE(data.dimension, 3);
