@@ -75,8 +75,7 @@ std::string scoreTable(const ScoreTable& table) {
 std::string surroundingsText(const evaluation::Comparison& comparison) {
   std::string text;
   for (const std::string& line :
-       {widgets::truenessText(comparison), widgets::insideAndEdgeText(comparison),
-        comparison.coverage ? comparison.coverage->text : std::string(),
+       {widgets::truenessText(comparison), comparison.coverage ? comparison.coverage->text : std::string(),
         comparison.fold_back ? comparison.fold_back->text : std::string(),
         comparison.orientation_dependence ? comparison.orientation_dependence->text : std::string(),
         widgets::sensorsText(comparison), widgets::resamplingText(comparison)})

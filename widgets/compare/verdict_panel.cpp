@@ -139,7 +139,6 @@ void VerdictPanel::fillNotes() {
             tr("Noise and jig alone leave %1 mm (from %2). Beyond them: %3 mm before, %4 mm after.")
                 .arg(threeFigures(c.floor_position_mm), QString::fromStdString(c.floor_from),
                      threeFigures(c.trueness.before_position_mm), threeFigures(c.trueness.after_position_mm)));
-  addNote(tr("Inside and edge"), QString::fromStdString(insideAndEdgeText(c)));
   addNote(tr("Sensors"), QString::fromStdString(sensorsText(c)));
   if (c.coverage) addNote(tr("Coverage"), QString::fromStdString(c.coverage->text));
   if (c.fold_back) addNote(tr("One-to-one"), QString::fromStdString(c.fold_back->text));

@@ -124,7 +124,6 @@ void writeMeasured(HtmlWriter& html, const ReportInput& input) {
   facts.add("Lag-1 autocorrelation", summary.autocorrelation ? fixedText(*summary.autocorrelation, 2) : "");
   facts.add("Noise floor", floorText(comparison));
   facts.add("Trueness", truenessText(comparison));
-  facts.add("Inside and edge", insideAndEdgeText(comparison));
   facts.add("By sensor", sensorsText(comparison));
   facts.add("Position lattice of the tracker", optionalNumber(input.table.metadata.quantum_m, " mm", 1000.0));
   facts.add("Jig tolerance", optionalNumber(input.table.metadata.jig_tolerance_m, " mm", 1000.0));

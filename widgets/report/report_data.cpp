@@ -176,14 +176,6 @@ std::string truenessText(const evaluation::Comparison& comparison) {
   return text.empty() ? text : "Systematic error apart from the noise floor: " + text + ".";
 }
 
-std::string insideAndEdgeText(const evaluation::Comparison& comparison) {
-  const evaluation::Verdict& verdict = comparison.verdict;
-  if (!verdict.inside_mm || !verdict.edge_mm) return {};
-  return "Left out, places with others on all sides err by " + errorFigure(*verdict.inside_mm) +
-         " mm, the outermost ones by " + errorFigure(*verdict.edge_mm) +
-         " mm: a left-out outermost place is no fresh place inside.";
-}
-
 std::string sensorsText(const evaluation::Comparison& comparison) {
   std::string text;
   const auto& best = comparison.best_position_row;

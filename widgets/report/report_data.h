@@ -69,8 +69,6 @@ std::string truenessText(const evaluation::Comparison& comparison);
 
 /// What each way to bring the measured errors to a grid costs by itself, as a sentence; empty where none was tried.
 std::string resamplingText(const evaluation::Comparison& comparison);
-/// What the recommended correction leaves at left-out places inside the region and at its edge; empty without both.
-std::string insideAndEdgeText(const evaluation::Comparison& comparison);
 /// What is left at each sensor, before and with the best position method; empty with one sensor.
 std::string sensorsText(const evaluation::Comparison& comparison);
 
