@@ -3,10 +3,12 @@
 #include <cstdio>
 
 #include "calib/core/declare.h"
+#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
+#include "calib/correctors/base/soft_box.h"
 #include "calib/correctors/network/feed_forward_network.h"
 #include "calib/correctors/network/neural_network_training.h"
 
@@ -16,53 +18,85 @@ namespace {
 const std::string kName = "Neural network";
 constexpr int kSecondHidden = 4;
 
+/// Share of the longest side of the places' box by which the network is asked beyond it at most.
+constexpr double kReach = 0.15;
+/// By which a correction may exceed the largest that it was fitted to.
+constexpr double kExcess = 0.5;
+
 /// Positions moved to the middle of their box and divided by half its longest side.
 struct Scaling {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
   double half_m = 1.0;
 
-  static Scaling of(const std::vector<Eigen::Vector3d>& p_m) {
-    Eigen::Vector3d low_m = p_m.front();
-    Eigen::Vector3d high_m = p_m.front();
-    for (const Eigen::Vector3d& p : p_m) {
-      low_m = low_m.cwiseMin(p);
-      high_m = high_m.cwiseMax(p);
-    }
-    const double half_m = 0.5 * (high_m - low_m).maxCoeff();
-    return {0.5 * (low_m + high_m), half_m > 0.0 ? half_m : 1.0};
+  static Scaling of(const SoftBox& box) {
+    const double half_m = 0.5 * box.longest_m();
+    return {0.5 * (box.low_m + box.high_m), half_m > 0.0 ? half_m : 1.0};
   }
   Eigen::Vector3d scaled(const Eigen::Vector3d& p_m) const { return (p_m - center_m) / half_m; }
-
-  nlohmann::json toJson() const { return {{"center_m", jsonOf(center_m)}, {"half_m", half_m}}; }
-  static Scaling fromJson(const JsonReader& json) {
-    const Scaling scaling{json["center_m"].vector3(), json["half_m"].number()};
-    if (!(scaling.half_m > 0.0)) json["half_m"].refuse("above 0");
-    return scaling;
-  }
 };
 
-/// The network maps tracked positions to true ones.
+/// Outputs up to the length of the largest target as they are, longer ones bent towards 1 + kExcess, with two
+/// continuous derivatives.
+double boundedLength(double length) {
+  return length <= 1.0 ? length : 1.0 + kExcess * std::tanh((length - 1.0) / kExcess);
+}
+
+Eigen::Vector3d bounded(const Eigen::Vector3d& output) {
+  const double length = output.norm();
+  return length <= 1.0 ? output : Eigen::Vector3d(boundedLength(length) / length * output);
+}
+
+/// d bounded / d output.
+Eigen::Matrix3d boundedSlope(const Eigen::Vector3d& output) {
+  const double length = output.norm();
+  if (length <= 1.0) return Eigen::Matrix3d::Identity();
+  const double along = 1.0 - std::pow(std::tanh((length - 1.0) / kExcess), 2);
+  const double across = boundedLength(length) / length;
+  const Eigen::Vector3d way = output / length;
+  return across * Eigen::Matrix3d::Identity() + (along - across) * way * way.transpose();
+}
+
+/// What the network adds to a rigid motion of the tracked positions.
+struct NetworkParts {
+  FeedForwardNetwork network;
+  Pose true_from_tracked;
+  SoftBox box;             ///< Of the tracked places.
+  double largest_m = 1.0;  ///< The longest correction beyond the motion among the places: 1 of the network's output.
+  std::string note;
+};
+
 class NeuralNetworkPosition : public PositionModel {
  public:
-  NeuralNetworkPosition(FeedForwardNetwork network, const Scaling& tracked, const Scaling& truth, std::string note)
-      : network_(std::move(network)), tracked_(tracked), truth_(truth), note_(std::move(note)) {}
+  explicit NeuralNetworkPosition(NetworkParts parts) : parts_(std::move(parts)), tracked_(Scaling::of(parts_.box)) {}
 
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
-    return truth_.center_m + truth_.half_m * network_.output(tracked_.scaled(p_tracked_m)) - p_tracked_m;
+    return parts_.true_from_tracked * p_tracked_m + parts_.largest_m * bounded(outputAt(p_tracked_m)) - p_tracked_m;
   }
   Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const override {
-    return truth_.half_m / tracked_.half_m * network_.gradient(tracked_.scaled(p_tracked_m));
+    const Eigen::Vector3d input = tracked_.scaled(parts_.box.held_m(p_tracked_m));
+    const Eigen::Matrix3d by_held = parts_.largest_m / tracked_.half_m * boundedSlope(parts_.network.output(input)) *
+                                    parts_.network.gradient(input);
+    return parts_.true_from_tracked.orientation.toRotationMatrix() +
+           by_held * parts_.box.slope(p_tracked_m).asDiagonal();
   }
-  std::string note() const override { return note_; }
+  std::string note() const override { return parts_.note; }
   nlohmann::json parameters() const override {
-    return {{"network", network_.toJson()}, {"tracked", tracked_.toJson()}, {"true", truth_.toJson()}, {"note", note_}};
+    return {{"network", parts_.network.toJson()},
+            {"true_from_tracked", jsonOf(parts_.true_from_tracked)},
+            {"low_m", jsonOf(parts_.box.low_m)},
+            {"high_m", jsonOf(parts_.box.high_m)},
+            {"reach_m", parts_.box.reach_m},
+            {"largest_m", parts_.largest_m},
+            {"note", parts_.note}};
   }
 
  private:
-  FeedForwardNetwork network_;
+  Eigen::Vector3d outputAt(const Eigen::Vector3d& p_tracked_m) const {
+    return parts_.network.output(tracked_.scaled(parts_.box.held_m(p_tracked_m)));
+  }
+
+  NetworkParts parts_;
   Scaling tracked_;
-  Scaling truth_;
-  std::string note_;
 };
 
 Result<void> checkPlaces(const FitData& data, const Places& places, int n_weights) {
@@ -85,6 +119,9 @@ std::string unfinishedNote(const BackPropagationResult& result, double mean_erro
   return text;
 }
 
+constexpr const char* kNothingForetold =
+    "The network foretells places left out no better than no correction does: only the alignment is corrected";
+
 /// A trained network and what is to be told of its training.
 struct Trained {
   FeedForwardNetwork network;
@@ -94,7 +131,7 @@ struct Trained {
 /// From one too light to smooth to one that does, or the one asked for. The other way round the strong ones lead
 /// astray: they end where the network says next to nothing.
 std::vector<double> penaltiesOf(const Settings& settings) {
-  if (std::holds_alternative<std::string>(settings.at("weight_penalty"))) return {1e-7, 1e-6, 1e-5, 1e-4, 1e-3};
+  if (std::holds_alternative<std::string>(settings.at("weight_penalty"))) return {1e-6, 1e-5, 1e-4, 1e-3, 1e-2};
   return {numberSetting(settings, "weight_penalty")};
 }
 
@@ -108,7 +145,8 @@ Result<Trained> train(const TrainingSet& set, const Settings& settings, double u
     options.weight_penalties = penaltiesOf(settings);
     options.seed = seed;
     return trainByLevenbergMarquardt(layers, set, options, control).map([](FeedForwardNetwork network) {
-      return Trained{std::move(network), {}};
+      const bool is_silent = network.weights().isZero();
+      return Trained{std::move(network), is_silent ? kNothingForetold : ""};
     });
   }
   const double stop_error_m = numberSetting(settings, "stop_error_m");
@@ -123,6 +161,18 @@ Result<Trained> train(const TrainingSet& set, const Settings& settings, double u
   });
 }
 
+/// All but the network and the note.
+Result<NetworkParts> untrained(const Places& places) {
+  NetworkParts parts;
+  FT_TRY(parts.true_from_tracked, fitRigid(places.p_tracked_m, places.p_true_m));
+  parts.box = SoftBox::around(places.p_tracked_m, kReach);
+  double largest_m = 0.0;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    largest_m = std::max(largest_m, (places.p_true_m[i] - parts.true_from_tracked * places.p_tracked_m[i]).norm());
+  if (largest_m > 0.0) parts.largest_m = largest_m;
+  return parts;
+}
+
 Result<std::unique_ptr<PositionModel>> fitNeuralNetwork(const FitData& data, const Settings& settings,
                                                         const RunControl& control) {
   FT_TRY_VOID(checkPositions(data, kName));
@@ -130,23 +180,30 @@ Result<std::unique_ptr<PositionModel>> fitNeuralNetwork(const FitData& data, con
   const int n_weights =
       FeedForwardNetwork::weightCount(static_cast<int>(integerSetting(settings, "hidden")), kSecondHidden);
   FT_TRY_VOID(checkPlaces(data, places, n_weights));
-  const Scaling tracked = Scaling::of(places.p_tracked_m);
-  const Scaling truth = Scaling::of(places.p_true_m);
+  FT_TRY(NetworkParts parts, untrained(places));
   TrainingSet set;
+  const Scaling tracked = Scaling::of(parts.box);
   for (std::size_t i = 0; i < places.size(); ++i) {
     set.input.push_back(tracked.scaled(places.p_tracked_m[i]));
-    set.target.push_back(truth.scaled(places.p_true_m[i]));
+    set.target.push_back((places.p_true_m[i] - parts.true_from_tracked * places.p_tracked_m[i]) / parts.largest_m);
   }
-  FT_TRY(auto trained, train(set, settings, truth.half_m, control));
+  FT_TRY(auto trained, train(set, settings, parts.largest_m, control));
+  parts.network = std::move(trained.network);
   const std::string plane = planeNote(data, "nothing is claimed off it");
-  const std::string note = plane + (plane.empty() || trained.note.empty() ? "" : " ") + trained.note;
-  return std::make_unique<NeuralNetworkPosition>(std::move(trained.network), tracked, truth, note);
+  parts.note = plane + (plane.empty() || trained.note.empty() ? "" : " ") + trained.note;
+  return std::make_unique<NeuralNetworkPosition>(std::move(parts));
 }
 
 std::unique_ptr<PositionModel> loadNeuralNetwork(const JsonReader& parameters) {
-  return std::make_unique<NeuralNetworkPosition>(FeedForwardNetwork::fromJson(parameters["network"]),
-                                                 Scaling::fromJson(parameters["tracked"]),
-                                                 Scaling::fromJson(parameters["true"]), parameters["note"].text());
+  NetworkParts parts;
+  parts.network = FeedForwardNetwork::fromJson(parameters["network"]);
+  parts.true_from_tracked = parameters["true_from_tracked"].pose();
+  parts.box = {parameters["low_m"].vector3(), parameters["high_m"].vector3(), parameters["reach_m"].number()};
+  if (!(parts.box.longest_m() > 0.0)) parameters["high_m"].refuse("above low_m");
+  if (!(parts.box.reach_m >= 0.0)) parameters["reach_m"].refuse("0 or above");
+  parts.largest_m = parameters["largest_m"].number();
+  parts.note = parameters["note"].text();
+  return std::make_unique<NeuralNetworkPosition>(std::move(parts));
 }
 
 std::vector<Setting> neuralNetworkSettings() {
@@ -163,8 +220,9 @@ std::vector<Setting> neuralNetworkSettings() {
       declare::autoNumber(
           "weight_penalty", "Weight penalty", {0.0, 1.0}, "auto",
           "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "
-          "keeps weights from running away; 0 = none, auto = of 1e-7 to 1e-3 the one that foretells left-out places "
-          "best."),
+          "keeps weights from running away; 0 = none, auto = of 1e-6 to 1e-2 the one that foretells left-out parts "
+          "best, or "
+          "no network where none does."),
       declare::number("learning_rate", "Learning rate", {0.001, 1.0}, 0.05,
                       "Of back_propagation; 0.01 to 0.1 are published."),
       declare::number("momentum", "Momentum", {0.0, 0.99}, 0.5,

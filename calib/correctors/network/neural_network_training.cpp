@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <random>
 
 namespace fieldtrue::correctors {
@@ -52,10 +53,12 @@ class Watch : public ceres::IterationCallback {
   Watch(const RunControl& control, std::atomic<int>& n_done, int n_planned)
       : control_(control), n_done_(n_done), n_planned_(n_planned) {}
 
+  bool isStopped() const { return control_.stop.stop_requested(); }
+
   ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
     const int n_done = ++n_done_;
     control_.progress(std::min(1.0, static_cast<double>(n_done) / n_planned_));
-    return control_.stop.stop_requested() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+    return isStopped() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
   }
 
  private:
@@ -64,9 +67,9 @@ class Watch : public ceres::IterationCallback {
   int n_planned_;
 };
 
-/// Where one start ends with one penalty.
+/// Where one start ends.
 struct Ending {
-  FeedForwardNetwork::Weights weights;
+  FeedForwardNetwork network;
   double held_out = HUGE_VAL;  ///< Mean square of the error at each pair without it, to first order.
 };
 
@@ -90,17 +93,18 @@ double heldOutError(const FeedForwardNetwork& network, const TrainingSet& set, d
   return std::isfinite(sum) ? sum / static_cast<double>(n_pairs) : HUGE_VAL;
 }
 
-Ending trainFrom(const FeedForwardNetwork& start, const TrainingSet& set, double weight_penalty, int max_iterations,
-                 Watch& watch) {
-  Ending ending{start.weights(), HUGE_VAL};
+/// Nothing where the solver failed.
+std::optional<FeedForwardNetwork> trainFrom(const FeedForwardNetwork& start, const TrainingSet& set,
+                                            double weight_penalty, int max_iterations, Watch& watch) {
+  FeedForwardNetwork::Weights weights = start.weights();
   ceres::Problem problem;
-  problem.AddResidualBlock(new SetCost(start, set), nullptr, ending.weights.data());
+  problem.AddResidualBlock(new SetCost(start, set), nullptr, weights.data());
   if (weight_penalty > 0.0) {
-    const auto n_weights = ending.weights.size();
+    const auto n_weights = weights.size();
     const double factor = std::sqrt(weight_penalty * static_cast<double>(set.input.size()));
     problem.AddResidualBlock(
         new ceres::NormalPrior(factor * ceres::Matrix::Identity(n_weights, n_weights), ceres::Vector::Zero(n_weights)),
-        nullptr, ending.weights.data());
+        nullptr, weights.data());
   }
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
@@ -110,11 +114,10 @@ Ending trainFrom(const FeedForwardNetwork& start, const TrainingSet& set, double
   solver.callbacks.push_back(&watch);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
-  if (!summary.IsSolutionUsable()) return ending;
+  if (!summary.IsSolutionUsable()) return std::nullopt;
   FeedForwardNetwork network = start;
-  network.setWeights(ending.weights);
-  ending.held_out = heldOutError(network, set, weight_penalty);
-  return ending;
+  network.setWeights(weights);
+  return network;
 }
 
 tl::unexpected<Error> stopped() {
@@ -128,6 +131,83 @@ void shuffle(std::vector<std::size_t>& order, std::mt19937_64& generator) {
 
 /// Of the iterations of a start's first penalty, what a further one has: it begins where the one before ended.
 constexpr int kFurtherShare = 4;
+/// Parts that are left out one after the other to choose the penalty.
+constexpr std::size_t kParts = 4;
+
+int furtherIterations(const LevenbergMarquardtOptions& options) {
+  return std::max(1, options.max_iterations / kFurtherShare);
+}
+
+/// The start of that number.
+FeedForwardNetwork startOf(const FeedForwardNetwork& network, const LevenbergMarquardtOptions& options,
+                           std::size_t number) {
+  FeedForwardNetwork start = network;
+  start.setRandomWeights(1000003 * options.seed + number);
+  return start;
+}
+
+double squaredError(const FeedForwardNetwork& network, const TrainingSet& set) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < set.input.size(); ++i)
+    sum += (network.output(set.input[i]) - set.target[i]).squaredNorm();
+  return std::isfinite(sum) ? sum : HUGE_VAL;
+}
+
+/// The pairs of one part, in a shuffled order, and all others.
+struct Split {
+  TrainingSet kept;
+  TrainingSet left_out;
+};
+
+Split splitOf(const TrainingSet& set, std::size_t part, std::uint64_t seed) {
+  std::vector<std::size_t> order(set.input.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::mt19937_64 generator(seed);
+  shuffle(order, generator);
+  Split split;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    TrainingSet& side = i % kParts == part ? split.left_out : split.kept;
+    side.input.push_back(set.input[order[i]]);
+    side.target.push_back(set.target[order[i]]);
+  }
+  return split;
+}
+
+/// Squared errors of the left-out part, a penalty each: one start goes from the first penalty to the last.
+std::vector<double> leftOutErrors(const FeedForwardNetwork& network, const Split& split,
+                                  const LevenbergMarquardtOptions& options, std::size_t part, Watch& watch) {
+  FeedForwardNetwork start = startOf(network, options, part);
+  std::vector<double> errors;
+  for (const double penalty : options.weight_penalties) {
+    if (watch.isStopped()) break;
+    const int iterations = errors.empty() ? options.max_iterations : furtherIterations(options);
+    const auto end = trainFrom(start, split.kept, penalty, iterations, watch);
+    if (end) start = *end;
+    errors.push_back(end ? squaredError(*end, split.left_out) : HUGE_VAL);
+  }
+  return errors;
+}
+
+/// The penalty whose networks foretell the parts left out best; none when no network, an output of zero, does better.
+std::optional<double> penaltyByParts(const FeedForwardNetwork& network, const TrainingSet& set,
+                                     const LevenbergMarquardtOptions& options, const RunControl& control,
+                                     Watch& watch) {
+  std::vector<std::vector<double>> errors(kParts);
+  control.parallel_for(kParts, [&](std::size_t part) {
+    errors[part] = leftOutErrors(network, splitOf(set, part, options.seed), options, part, watch);
+  });
+  if (watch.isStopped()) return std::nullopt;
+  double least = squaredError(FeedForwardNetwork(network.firstHidden(), network.secondHidden()), set);
+  std::optional<double> best;
+  for (std::size_t k = 0; k < options.weight_penalties.size(); ++k) {
+    double sum = 0.0;
+    for (const std::vector<double>& of_part : errors) sum += of_part[k];
+    if (sum >= least) continue;
+    least = sum;
+    best = options.weight_penalties[k];
+  }
+  return best;
+}
 
 }  // namespace
 
@@ -136,22 +216,19 @@ Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& n
                                                      const RunControl& control) {
   FT_CHECK(set.input.size() == set.target.size() && !set.input.empty() && options.n_starts > 0 &&
            !options.weight_penalties.empty());
-  const std::size_t n_penalties = options.weight_penalties.size();
-  const int further_iterations = std::max(1, options.max_iterations / kFurtherShare);
-  const int n_planned =
-      options.n_starts * (options.max_iterations + static_cast<int>(n_penalties - 1) * further_iterations);
-  std::vector<Ending> endings(static_cast<std::size_t>(options.n_starts) * n_penalties);
+  const auto n_starts = static_cast<std::size_t>(options.n_starts);
+  const auto n_further = static_cast<int>(options.weight_penalties.size()) - 1;
+  const int n_by_parts = static_cast<int>(kParts) * (options.max_iterations + n_further * furtherIterations(options));
   std::atomic<int> n_done = 0;
-  control.parallel_for(static_cast<std::size_t>(options.n_starts), [&](std::size_t k) {
-    FeedForwardNetwork start = network;
-    start.setRandomWeights(1000003 * options.seed + k);
-    Watch watch(control, n_done, n_planned);
-    for (std::size_t penalty = 0; penalty < n_penalties && !control.stop.stop_requested(); ++penalty) {
-      Ending& ending = endings[k * n_penalties + penalty];
-      ending = trainFrom(start, set, options.weight_penalties[penalty],
-                         penalty == 0 ? options.max_iterations : further_iterations, watch);
-      if (std::isfinite(ending.held_out)) start.setWeights(ending.weights);
-    }
+  Watch watch(control, n_done, options.n_starts * options.max_iterations + (n_further > 0 ? n_by_parts : 0));
+  std::optional<double> penalty = options.weight_penalties.front();
+  if (n_further > 0) penalty = penaltyByParts(network, set, options, control, watch);
+  if (control.stop.stop_requested()) return stopped();
+  if (!penalty) return FeedForwardNetwork(network.firstHidden(), network.secondHidden());
+  std::vector<Ending> endings(n_starts);
+  control.parallel_for(n_starts, [&](std::size_t k) {
+    const auto end = trainFrom(startOf(network, options, k), set, *penalty, options.max_iterations, watch);
+    if (end) endings[k] = {*end, heldOutError(*end, set, *penalty)};
   });
   if (control.stop.stop_requested()) return stopped();
   const auto best = std::min_element(endings.begin(), endings.end(),
@@ -159,9 +236,7 @@ Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& n
   if (!std::isfinite(best->held_out))
     return fail(ErrorCode::kDegenerate, "The training of the network failed from each of its " +
                                             std::to_string(options.n_starts) + " starts; try another seed");
-  FeedForwardNetwork trained = network;
-  trained.setWeights(best->weights);
-  return trained;
+  return best->network;
 }
 
 Result<BackPropagationResult> trainByBackPropagation(const FeedForwardNetwork& network, const TrainingSet& set,

@@ -16,15 +16,16 @@ struct TrainingSet {
   std::vector<Eigen::Vector3d> target;
 };
 
-/// Least squares by Levenberg-Marquardt from several random starts, each with one penalty of the weights after the
-/// other. The end that foretells pairs it was not fitted to best wins: by the error at each pair without it, to first
-/// order e_i / (1 - H_ii), H the hat matrix of the linearised fit.
+/// Least squares by Levenberg-Marquardt with a penalty of the weights. Of several penalties the one is taken whose
+/// networks foretell best the pairs of four parts, each left out in turn, and no network (all weights zero) where an
+/// output of zero foretells them as well. All pairs are then fitted from several random starts, and the end that
+/// foretells single pairs best is kept: by the error at each pair without it, to first order e_i / (1 - H_ii), H the
+/// hat matrix of the linearised fit.
 /// @source of that error: Cook, Weisberg 1982, section 2.2.3, with Gauss and Newton's matrix
 struct LevenbergMarquardtOptions {
   int n_starts = 4;
   int max_iterations = 150;
-  /// Factors of the squared weights beside the squared errors of a pair, on average; each start goes from the first to
-  /// the last.
+  /// Factors of the squared weights beside the squared errors of a pair, on average, the lightest first.
   std::vector<double> weight_penalties = {0.0};
   std::uint64_t seed = 1;
 };

@@ -7,6 +7,7 @@
 #include "calib/correctors/network/neural_network_training.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
+#include "tests/support/random_geometry.h"
 #include "tests/support/test_main.h"
 
 using namespace fieldtrue;
@@ -239,6 +240,64 @@ class NeuralNetworkTest : public QObject {
       const auto midway = method.fit(data, settings, control);
       QVERIFY(!midway && midway.error().code == ErrorCode::kCancelled);
       QVERIFY(n_reports < 10);
+    }
+  }
+
+  // Beside noise of the places there is nothing to learn, so a network that foretells less than nothing is not kept.
+  void correctsNothingWhereThereIsNoiseOnly() {
+    for (const unsigned seed : {1U, 2U, 3U}) {
+      RandomGeometry random(seed);
+      const auto noise_m = [&](const Eigen::Vector3d&) {
+        return Eigen::Vector3d(0.01 * Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
+      };
+      const FitData data = fitDataOf(shakenGrid({4, 3, 3}, 0.3, 0.02), noise_m);
+      const auto model = fitPosition("neural_network", data);
+      const auto rigid = fitPosition("rigid", data);
+      FT_VERIFY_OK(model);
+      FT_VERIFY_OK(rigid);
+      FT_VERIFY_MATCH(holdsAll((*model)->note(), {"no better than no correction"}));
+      for (const Eigen::Vector3d& p_m : randomPoints(50))
+        FT_VERIFY_MATCH(near((*model)->displacement_m(p_m), (*rigid)->displacement_m(p_m), 1e-12));
+    }
+  }
+
+  // Whatever the weights: beyond the motion no correction is longer than one and a half of the longest at the places,
+  // and far out it is level.
+  void staysBoundedEverywhere() {
+    const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), curved_m);
+    const auto rigid = fitPosition("rigid", data);
+    FT_VERIFY_OK(rigid);
+    double longest_m = 0.0;
+    for (const Eigen::Vector3d& p_m : data.p_tracked_m)
+      longest_m = std::max(longest_m, (curved_m(p_m) - (*rigid)->displacement_m(p_m)).norm());
+    for (const char* penalty : {"auto", "0"}) {
+      const auto model = fitPosition("neural_network", data, {{"weight_penalty", penalty}, {"starts", "1"}});
+      FT_VERIFY_OK(model);
+      const auto beyond_m = [&](const Eigen::Vector3d& p_m) -> Eigen::Vector3d {
+        return (*model)->displacement_m(p_m) - (*rigid)->displacement_m(p_m);
+      };
+      for (const Eigen::Vector3d& p_m : randomPoints(300)) {
+        QVERIFY(beyond_m(p_m).norm() <= 1.5 * longest_m + 1e-12);
+        QVERIFY(beyond_m(1000.0 * p_m).norm() <= 1.5 * longest_m + 1e-9);
+        FT_VERIFY_MATCH(near(beyond_m(1000.0 * p_m), beyond_m(2000.0 * p_m), 1e-9));
+      }
+    }
+  }
+
+  // Inside, across the faces of the places' box and where an output is held down.
+  void jacobianIsThatOfFiniteDifferences() {
+    const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), curved_m);
+    const auto model = fitPosition("neural_network", data, {{"weight_penalty", "0"}, {"starts", "1"}});
+    FT_VERIFY_OK(model);
+    constexpr double kStep_m = 1e-5;
+    for (const Eigen::Vector3d& p_m : randomPoints(100)) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const Eigen::Vector3d step_m = kStep_m * Eigen::Vector3d::Unit(axis);
+        const Eigen::Vector3d slope =
+            ((*model)->displacement_m(p_m + step_m) - (*model)->displacement_m(p_m - step_m)) / (2.0 * kStep_m) +
+            Eigen::Vector3d::Unit(axis);
+        FT_VERIFY_MATCH(near(Eigen::Vector3d((*model)->jacobian(p_m).col(axis)), slope, 1e-5));
+      }
     }
   }
 
