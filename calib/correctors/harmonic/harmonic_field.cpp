@@ -7,58 +7,43 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
+#include "calib/correctors/base/soft_box.h"
 #include "calib/correctors/harmonic/harmonic_field_fit.h"
 
 namespace fieldtrue::correctors {
 namespace {
 
 constexpr const char* kName = "The harmonic field";
-/// Share of the box's longest side by which it reaches beyond the places.
-constexpr double kMargin = 0.05;
-
-/// The box of tracked positions in which the model is evaluated: beyond it the sources are near and nothing is known.
-struct TrackedBox {
-  Eigen::Vector3d low_m;
-  Eigen::Vector3d high_m;
-
-  /// The nearest point of the box, and not the transmitter itself, where the field has no value.
-  Eigen::Vector3d nearest_m(const Eigen::Vector3d& p_m) const {
-    const Eigen::Vector3d inside_m = p_m.cwiseMax(low_m).cwiseMin(high_m);
-    const double least_m = 1e-3 * (high_m - low_m).norm();
-    if (inside_m.norm() >= least_m) return inside_m;
-    return inside_m.isZero() ? Eigen::Vector3d(least_m, 0.0, 0.0) : Eigen::Vector3d(least_m * inside_m.normalized());
-  }
-};
+/// How far beyond the places' box the field is asked at most: a share of its longest side, and of the way to the
+/// nearest source, near which the field varies on that scale.
+constexpr double kReachOfSide = 0.1;
+constexpr double kReachOfSourceDistance = 0.2;
 
 class HarmonicField : public PositionModel {
  public:
-  HarmonicField(DisturbedField field, const Pose& field_from_truth, const TrackedBox& box, FieldPosterior posterior,
-                std::string note)
+  HarmonicField(HeldField field, const Pose& field_from_truth, FieldPosterior posterior, std::string note)
       : field_(std::move(field)),
         field_from_truth_(field_from_truth),
         truth_from_field_(inverse(field_from_truth)),
-        box_(box),
         posterior_(std::move(posterior)),
         note_(std::move(note)) {}
 
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
-    const Eigen::Vector3d inside_m = box_.nearest_m(p_tracked_m);
-    const Eigen::Vector3d in_field_m =
-        p_tracked_m + (field_.truePosition_m(inside_m) - inside_m) + goneOn_m(inside_m, p_tracked_m - inside_m);
-    return truth_from_field_ * in_field_m - p_tracked_m;
+    return truth_from_field_ * field_.truePosition_m(p_tracked_m) - p_tracked_m;
   }
 
-  /// Outside the box that of its nearest point.
+  /// Beyond the box that of the position held at it.
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
-    return posterior_.sd_m(PlaceDerivative::of(field_, box_.nearest_m(p_tracked_m)));
+    const Eigen::Vector3d held_m = field_.heldPosition_m(field_.truePosition_m(p_tracked_m));
+    return posterior_.sd_m(PlaceDerivative::at(field_.field(), held_m));
   }
 
   std::string note() const override { return note_; }
 
   nlohmann::json parameters() const override {
-    Eigen::MatrixXd sources(static_cast<Eigen::Index>(field_.sources().size()), 12);
+    Eigen::MatrixXd sources(static_cast<Eigen::Index>(field_.field().sources().size()), 12);
     for (Eigen::Index k = 0; k < sources.rows(); ++k) {
-      const FieldSource& source = field_.sources()[static_cast<std::size_t>(k)];
+      const FieldSource& source = field_.field().sources()[static_cast<std::size_t>(k)];
       sources.row(k).head<3>() = source.at_m.transpose();
       sources.row(k).tail<9>() = Eigen::Map<const Eigen::RowVector<double, 9>>(source.response.data());
     }
@@ -70,30 +55,16 @@ class HarmonicField : public PositionModel {
             {"field_from_truth", jsonOf(field_from_truth_)},
             {"turned_about_m", jsonOf(posterior_.about_m)},
             {"covariance_root", std::move(root)},
-            {"low_m", jsonOf(box_.low_m)},
-            {"high_m", jsonOf(box_.high_m)},
+            {"low_m", jsonOf(field_.box().low_m)},
+            {"high_m", jsonOf(field_.box().high_m)},
+            {"reach_m", field_.box().reach_m},
             {"note", note_}};
   }
 
  private:
-  /// How the displacement in the field's frame goes on beyond the box: along its slope at the face, so that there is no
-  /// kink, and ever more slowly, since the slope holds near the face only.
-  Eigen::Vector3d goneOn_m(const Eigen::Vector3d& face_m, const Eigen::Vector3d& beyond_m) const {
-    constexpr double kStep_m = 1e-4;
-    const double distance_m = beyond_m.norm();
-    if (distance_m == 0.0) return Eigen::Vector3d::Zero();
-    const double reach_m = kMargin * (box_.high_m - box_.low_m).maxCoeff();
-    const Eigen::Vector3d step_m = kStep_m / distance_m * beyond_m;
-    const Eigen::Vector3d slope =
-        (field_.truePosition_m(face_m + step_m) - field_.truePosition_m(face_m - step_m) - 2.0 * step_m) /
-        (2.0 * kStep_m);
-    return distance_m / std::hypot(1.0, distance_m / reach_m) * slope;
-  }
-
-  DisturbedField field_;
+  HeldField field_;
   Pose field_from_truth_;
   Pose truth_from_field_;
-  TrackedBox box_;
   FieldPosterior posterior_;
   std::string note_;
 };
@@ -118,24 +89,28 @@ std::string noteOf(const FitData& data, const HarmonicFit& fit) {
   return "No disturbance stands out from the noise: only the alignment is corrected";
 }
 
+/// Of the places as they stand in the transmitter's frame.
+SoftBox boxOf(const FitData& data, const HarmonicFit& fit) {
+  std::vector<Eigen::Vector3d> p_m;
+  for (const Eigen::Vector3d& p_true_m : data.p_true_m) p_m.push_back(fit.field_from_truth * p_true_m);
+  SoftBox box = SoftBox::around(p_m, kReachOfSide);
+  for (const FieldSource& source : fit.field.sources())
+    if (!source.at_m.isZero())
+      box.reach_m = std::min(box.reach_m, kReachOfSourceDistance * box.distance_m(source.at_m));
+  return box;
+}
+
 Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Settings& settings,
                                                    const RunControl& control) {
   FT_TRY_VOID(checkPositions(data, kName));
   FT_TRY_VOID(checkSpread(data));
   FT_TRY_VOID(MemoryBooking::book(std::string(kName) + " on " + std::to_string(data.size()) + " rows",
                                   memory_bytes(data.size()), control.stop));
-  TrackedBox box{data.p_tracked_m.front(), data.p_tracked_m.front()};
-  for (const Eigen::Vector3d& p_m : data.p_tracked_m) {
-    box.low_m = box.low_m.cwiseMin(p_m);
-    box.high_m = box.high_m.cwiseMax(p_m);
-  }
-  const double margin_m = kMargin * (box.high_m - box.low_m).maxCoeff();
-  box.low_m.array() -= margin_m;
-  box.high_m.array() += margin_m;
   const HarmonicOptions options{numberSetting(settings, "least_gain"),
                                 static_cast<std::size_t>(integerSetting(settings, "most_sources"))};
   FT_TRY(auto fit, fitHarmonicField(data, options, control));
-  return std::make_unique<HarmonicField>(fit.field, fit.field_from_truth, box, fit.posterior, noteOf(data, fit));
+  return std::make_unique<HarmonicField>(HeldField(fit.field, boxOf(data, fit)), fit.field_from_truth, fit.posterior,
+                                         noteOf(data, fit));
 }
 
 FieldPosterior posteriorFrom(const JsonReader& parameters, const std::vector<FieldSource>& sources) {
@@ -161,10 +136,12 @@ std::unique_ptr<PositionModel> loadHarmonic(const JsonReader& parameters) {
     sources[static_cast<std::size_t>(k)] = {rows.row(k).head<3>().transpose(),
                                             Eigen::Map<const Eigen::Matrix3d>(response.data())};
   }
-  const TrackedBox box{parameters["low_m"].vector3(), parameters["high_m"].vector3()};
+  const SoftBox box{parameters["low_m"].vector3(), parameters["high_m"].vector3(), parameters["reach_m"].number()};
+  if (!(box.reach_m >= 0.0)) parameters["reach_m"].refuse("0 or above");
   FieldPosterior posterior = posteriorFrom(parameters, sources);
-  return std::make_unique<HarmonicField>(DisturbedField(std::move(sources)), parameters["field_from_truth"].pose(), box,
-                                         std::move(posterior), parameters["note"].text());
+  return std::make_unique<HarmonicField>(HeldField(DisturbedField(std::move(sources)), box),
+                                         parameters["field_from_truth"].pose(), std::move(posterior),
+                                         parameters["note"].text());
 }
 
 }  // namespace

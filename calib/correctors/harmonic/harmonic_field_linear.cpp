@@ -59,8 +59,12 @@ FieldSource sourceOf(const Eigen::Vector3d& at_m, const TensorAmplitudes& amplit
 }
 
 PlaceDerivative PlaceDerivative::of(const DisturbedField& field, const Eigen::Vector3d& p_tracked_m) {
+  return at(field, field.truePosition_m(p_tracked_m));
+}
+
+PlaceDerivative PlaceDerivative::at(const DisturbedField& field, const Eigen::Vector3d& p_true_m) {
   PlaceDerivative place;
-  place.at_m = field.truePosition_m(p_tracked_m);
+  place.at_m = p_true_m;
   place.by_field =
       -field.trackedJacobian(place.at_m).inverse() * field::solvedPositionDerivative(field.at(place.at_m), place.at_m);
   return place;

@@ -23,6 +23,8 @@ struct PlaceDerivative {
   Eigen::Vector3d at_m = Eigen::Vector3d::Zero();  ///< Where the field counts, transmitter frame.
   field::PositionDerivative by_field = field::PositionDerivative::Zero();  ///< d corrected / d field matrix.
 
+  /// At a true position.
+  static PlaceDerivative at(const DisturbedField& field, const Eigen::Vector3d& p_true_m);
   /// At the place that a field corrects a tracked position to.
   static PlaceDerivative of(const DisturbedField& field, const Eigen::Vector3d& p_tracked_m);
 };

@@ -6,6 +6,42 @@
 #include "calib/field/tracker_model.h"
 
 namespace fieldtrue::correctors {
+namespace {
+
+/// By Broyden's method; `Field` has trackedPosition_m.
+template <class Field>
+Eigen::Vector3d inverted(const Field& field, const Eigen::Vector3d& p_tracked_m) {
+  constexpr int kMostQuasiNewtonSteps = 60;
+  constexpr double kNear = 1e-11;        // Of the range: 30 pm at 3 m.
+  constexpr double kLongestStep = 0.25;  // Of the range: a longer one may end beyond a source.
+  const double range_m = p_tracked_m.norm();
+  Eigen::Matrix3d true_by_tracked = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_m = p_tracked_m;
+  Eigen::Vector3d miss_m = p_tracked_m - field.trackedPosition_m(p_m);
+  Eigen::Vector3d best_m = p_m;
+  double least_m = miss_m.norm();
+  for (int i = 0; i < kMostQuasiNewtonSteps && least_m > kNear * range_m; ++i) {
+    Eigen::Vector3d step_m = true_by_tracked * miss_m;
+    const double length_m = step_m.norm();
+    if (!(length_m > 0.0) || !std::isfinite(length_m)) break;
+    if (length_m > kLongestStep * range_m) step_m *= kLongestStep * range_m / length_m;
+    p_m += step_m;
+    const Eigen::Vector3d new_miss_m = p_tracked_m - field.trackedPosition_m(p_m);
+    const Eigen::Vector3d moved_m = true_by_tracked * (miss_m - new_miss_m);
+    const double scale = step_m.dot(moved_m);
+    if (std::abs(scale) > 1e-3 * step_m.squaredNorm())
+      true_by_tracked += (step_m - moved_m) * (step_m.transpose() * true_by_tracked) / scale;
+    miss_m = new_miss_m;
+    if (miss_m.norm() < least_m) {
+      least_m = miss_m.norm();
+      best_m = p_m;
+    }
+  }
+  return best_m;
+}
+
+}  // namespace
+
 Eigen::Matrix3d DisturbedField::at(const Eigen::Vector3d& p_true_m) const {
   Eigen::Matrix3d field = field::dipoleField(p_true_m, 1.0);
   for (const FieldSource& source : sources_) {
@@ -33,34 +69,24 @@ Eigen::Matrix3d DisturbedField::trackedJacobian(const Eigen::Vector3d& p_true_m)
 }
 
 Eigen::Vector3d DisturbedField::truePosition_m(const Eigen::Vector3d& p_tracked_m) const {
-  if (sources_.empty()) return p_tracked_m;
-  constexpr int kMostQuasiNewtonSteps = 60;
-  constexpr double kNear = 1e-11;        // Of the range: 30 pm at 3 m.
-  constexpr double kLongestStep = 0.25;  // Of the range: a longer one may end beyond a source.
-  const double range_m = p_tracked_m.norm();
-  Eigen::Matrix3d true_by_tracked = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p_m = p_tracked_m;
-  Eigen::Vector3d miss_m = p_tracked_m - trackedPosition_m(p_m);
-  Eigen::Vector3d best_m = p_m;
-  double least_m = miss_m.norm();
-  for (int i = 0; i < kMostQuasiNewtonSteps && least_m > kNear * range_m; ++i) {
-    Eigen::Vector3d step_m = true_by_tracked * miss_m;
-    const double length_m = step_m.norm();
-    if (!(length_m > 0.0) || !std::isfinite(length_m)) break;
-    if (length_m > kLongestStep * range_m) step_m *= kLongestStep * range_m / length_m;
-    p_m += step_m;
-    const Eigen::Vector3d new_miss_m = p_tracked_m - trackedPosition_m(p_m);
-    const Eigen::Vector3d moved_m = true_by_tracked * (miss_m - new_miss_m);
-    const double scale = step_m.dot(moved_m);
-    if (std::abs(scale) > 1e-3 * step_m.squaredNorm())
-      true_by_tracked += (step_m - moved_m) * (step_m.transpose() * true_by_tracked) / scale;
-    miss_m = new_miss_m;
-    if (miss_m.norm() < least_m) {
-      least_m = miss_m.norm();
-      best_m = p_m;
-    }
-  }
-  return best_m;
+  return sources_.empty() ? p_tracked_m : inverted(*this, p_tracked_m);
+}
+
+Eigen::Vector3d HeldField::heldPosition_m(const Eigen::Vector3d& p_true_m) const {
+  const double least_m = 1e-3 * box_.longest_m();
+  const Eigen::Vector3d held_m = box_.held_m(p_true_m);
+  if (held_m.norm() >= least_m) return held_m;
+  return least_m * (held_m.isZero() ? Eigen::Vector3d::UnitX() : held_m.normalized());
+}
+
+Eigen::Vector3d HeldField::trackedPosition_m(const Eigen::Vector3d& p_true_m) const {
+  const Eigen::Vector3d held_m = heldPosition_m(p_true_m);
+  const Eigen::Vector3d tracked_m = field_.trackedPosition_m(held_m);
+  return held_m == p_true_m ? tracked_m : Eigen::Vector3d(p_true_m + (tracked_m - held_m));
+}
+
+Eigen::Vector3d HeldField::truePosition_m(const Eigen::Vector3d& p_tracked_m) const {
+  return field_.sources().empty() ? p_tracked_m : inverted(*this, p_tracked_m);
 }
 
 }  // namespace fieldtrue::correctors

@@ -2,7 +2,10 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <utility>
 #include <vector>
+
+#include "calib/correctors/base/soft_box.h"
 
 namespace fieldtrue::correctors {
 
@@ -33,6 +36,27 @@ class DisturbedField {
 
  private:
   std::vector<FieldSource> sources_;
+};
+
+/// A disturbed field that is known in a box of true positions only: beyond it the tracker errs as it does at the
+/// position held there. What is tracked beyond the box so has a true position where the field itself folds back or has
+/// a source.
+class HeldField {
+ public:
+  HeldField(DisturbedField field, const SoftBox& box) : field_(std::move(field)), box_(box) {}
+
+  const DisturbedField& field() const { return field_; }
+  const SoftBox& box() const { return box_; }
+  /// Where the field counts for a true position: held at the box, and not the transmitter itself, where it has no
+  /// value.
+  Eigen::Vector3d heldPosition_m(const Eigen::Vector3d& p_true_m) const;
+  Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m) const;
+  /// As DisturbedField::truePosition_m.
+  Eigen::Vector3d truePosition_m(const Eigen::Vector3d& p_tracked_m) const;
+
+ private:
+  DisturbedField field_;
+  SoftBox box_;
 };
 
 }  // namespace fieldtrue::correctors
