@@ -221,8 +221,7 @@ std::vector<Setting> neuralNetworkSettings() {
           "weight_penalty", "Weight penalty", {0.0, 1.0}, "auto",
           "Factor of the squared weights beside the squared scaled errors in levenberg_marquardt. Not published: it "
           "keeps weights from running away; 0 = none, auto = of 1e-6 to 1e-2 the one that foretells left-out parts "
-          "best, or "
-          "no network where none does."),
+          "best, or no network where none does."),
       declare::number("learning_rate", "Learning rate", {0.001, 1.0}, 0.05,
                       "Of back_propagation; 0.01 to 0.1 are published."),
       declare::number("momentum", "Momentum", {0.0, 0.99}, 0.5,
@@ -249,7 +248,10 @@ PositionMethod neuralNetworkPosition() {
       .fit = fitNeuralNetwork,
       .read = loadNeuralNetwork,
       .cost = FitCost::kCostly,
-      .origin = MethodOrigin::kSurvey};
+      .origin = MethodOrigin::kSurvey,
+      .reading =
+          "What the outputs are is not said: published runs give positions; here they give what a rigid motion leaves, "
+          "since a position given outright runs away from the sensor beyond the places."};
 }
 
 }  // namespace fieldtrue::correctors
