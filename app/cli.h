@@ -89,15 +89,15 @@ class CommandLine {
   std::function<Outcome()> run_;
 };
 
-void addDataCommands(CommandLine& line);     ///< simulate, tables, import, export
-void addApplyCommand(CommandLine& line);     ///< apply
-void addFitCommands(CommandLine& line);      ///< fit, compare, report
+void addDataCommands(CommandLine& line);       ///< simulate, tables, import, export
+void addApplyCommand(CommandLine& line);       ///< apply
+void addFitCommands(CommandLine& line);        ///< fit, compare, report
 void addDifferenceCommand(CommandLine& line);  ///< difference
-void addAcquireCommand(CommandLine& line);   ///< acquire
-void addEmulateCommand(CommandLine& line);   ///< emulate
-void addResampleCommand(CommandLine& line);  ///< resample
-void addGapCommands(CommandLine& line);      ///< diagnose, plan-check, blind
-void addListCommands(CommandLine& line);     ///< methods, effects, devices, formats
-void addGuideCommand(CommandLine& line);     ///< guide
+void addAcquireCommand(CommandLine& line);     ///< acquire
+void addEmulateCommand(CommandLine& line);     ///< emulate
+void addResampleCommand(CommandLine& line);    ///< resample
+void addGapCommands(CommandLine& line);        ///< diagnose, plan-check, blind
+void addListCommands(CommandLine& line);       ///< methods, effects, devices, formats
+void addGuideCommand(CommandLine& line);       ///< guide
 
 }  // namespace fieldtrue::cli

@@ -194,6 +194,7 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
   if (options.with_surroundings) {
     FT_TRY(comparison.split, splitOf(comparison, table, options, partOf(control, surroundings_end, 1.0)));
     if (comparison.split) comparison.notes.push_back(comparison.split->text);
+    control.progress(1.0);
   }
   writeVerdictText(comparison);
   return comparison;

@@ -323,20 +323,23 @@ class CliChainTest : public QObject {
     QCOMPARE(lines.size(), qsizetype(6));
     QCOMPARE(lines[0], QByteArray("# frame: jig"));
     QCOMPARE(lines[1],
-             QByteArray("note,z_m,y_m,x_m,qw,qx,qy,qz,x_corrected_m,y_corrected_m,z_corrected_m,qw_corrected,"
-                        "qx_corrected,qy_corrected,qz_corrected,uncertainty_m,covered,nearest_orientation_deg"));
+             QByteArray(
+                 "note,z_m,y_m,x_m,qw,qx,qy,qz,x_corrected_m,y_corrected_m,z_corrected_m,qw_corrected,"
+                 "qx_corrected,qy_corrected,qz_corrected,uncertainty_m,covered,nearest_orientation_deg,setup_matches"));
     QVERIFY(lines[2].startsWith("\"a, b\",0.1,0.2,0.5,1,0,0,0,"));
     QCOMPARE(lines[3], QByteArray("# between the rows"));
     const Eigen::Matrix4d fit = rigidFit(table_.nodes, -1);
     verifyCorrected(lines[2].mid(7), fit * Eigen::Vector4d(0.5, 0.2, 0.1, 1.0));
     verifyCorrected(lines[4], fit * Eigen::Vector4d(30, 2, 1, 1.0));
     const QList<QByteArray> far = lines[4].split(',');
-    QCOMPARE(far[far.size() - 2], QByteArray("0"));
+    QCOMPARE(far[far.size() - 3], QByteArray("0"));
     // Fitted in one orientation only, and this row is turned by 120 degrees.
     const double turned_deg =
         180.0 / M_PI *
         angleBetween_rad(table_.nodes.front().tracker_from_sensor.orientation, Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5));
-    FT_VERIFY_MATCH(near(far.last().trimmed().toDouble(), turned_deg, 5.0));
+    FT_VERIFY_MATCH(near(far[far.size() - 2].toDouble(), turned_deg, 5.0));
+    // Neither side states a set-up.
+    QCOMPARE(far.last().trimmed(), QByteArray("unknown"));
   }
 
   void applyKeepsReadingsTheTrackerMarked() {
@@ -347,7 +350,8 @@ class CliChainTest : public QObject {
     FT_VERIFY_STATUS(
         runCli({"apply", "--calibration", at("rigid.ftcal.json"), "--in", at("in.csv"), "--out", at("out.csv")}), 0);
     const auto rows = csvRows(readWhole(at("out.csv")));
-    QCOMPARE(rows.at(1), (QByteArrayList{"nan", "nan", "nan", "k", "", "", "", "", "", "", "", "", "0", ""}));
+    QCOMPARE(rows.at(1),
+             (QByteArrayList{"nan", "nan", "nan", "k", "", "", "", "", "", "", "", "", "0", "", "unknown"}));
     QVERIFY(!rows.at(2).at(4).isEmpty());
     QCOMPARE(rows.at(2).at(7), QByteArray());  // no orientation in, none out
   }
@@ -441,7 +445,7 @@ class CliChainTest : public QObject {
   static void verifyCorrected(const QByteArray& line, const Eigen::Vector4d& expected_m) {
     const QByteArrayList cells = line.split(',');
     for (int axis = 0; axis < 3; ++axis) {
-      FT_VERIFY_MATCH(near(cells.at(cells.size() - 10 + axis).toDouble(), expected_m[axis], 1e-9));
+      FT_VERIFY_MATCH(near(cells.at(cells.size() - 11 + axis).toDouble(), expected_m[axis], 1e-9));
     }
   }
 

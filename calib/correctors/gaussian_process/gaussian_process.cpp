@@ -6,9 +6,11 @@
 
 #include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
+#include "calib/core/spacing.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
+#include "calib/correctors/gaussian_process/coil_choice.h"
 #include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
 #include "calib/correctors/gaussian_process/gaussian_process_tuning.h"
 #include "calib/correctors/gaussian_process/pose_process.h"
@@ -85,7 +87,9 @@ struct GaussianProcessSystem {
   std::vector<double> noise_m2;
   std::string note;
   MemoryBooking memory;
-  std::optional<PoseSystem> poses;  ///< Where orientation is an input; it stands instead of all else.
+  std::optional<PoseSystem> poses;               ///< Where orientation is an input; it stands instead of all else.
+  std::optional<SensorCoils> coils;              ///< All else is of the data without them.
+  std::vector<Eigen::Quaterniond> orientations;  ///< Of the rows, where there are coils.
 
   Eigen::VectorXd noise() const {
     return Eigen::Map<const Eigen::VectorXd>(noise_m2.data(), static_cast<Eigen::Index>(noise_m2.size()));
@@ -144,7 +148,23 @@ Result<GaussianProcessScales> chooseScales(const GaussianProcessSystem& system, 
   return *scales;
 }
 
-Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& settings, const RunControl& control) {
+/// The coils of a sensor that was turned, where they explain what changes.
+Result<CoilChoice> coilsOf(const FitData& data, const GaussianProcessSystem& system, std::size_t tuning_places,
+                           const RunControl& control) {
+  if (!hasSeveralOrientations(data) || data.size() > kMaxPlaces) return CoilChoice{};
+  const auto poses = poseSystemOf(data, system.places, system.kernel, system.frame, control);
+  // Without the memory there is no choice, and what there is without orientation is told elsewhere.
+  if (!poses && poses.error().code != ErrorCode::kCancelled) return CoilChoice{};
+  if (!poses) return tl::unexpected(poses.error());
+  const std::vector<std::size_t> used =
+      rowsOfPlaces(system.places, placesOfAbout(system.places, data.size(), tuning_places));
+  return chooseCoils(*poses, system.scales, used, medianSpacing_m(system.places.p_tracked_m), control);
+}
+
+enum class Coils { kAsk, kLeave };
+
+Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& settings, const RunControl& control,
+                                          Coils ask = Coils::kAsk) {
   auto places = smoothFitPlaces(data, kName);
   if (!places) return tl::unexpected(places.error());
   if (places->size() > kMaxPlaces)
@@ -166,9 +186,20 @@ Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& s
   if (!scales) return tl::unexpected(scales.error());
   system.scales = *scales;
   const std::string& inputs = choiceSetting(settings, "inputs");
+  const auto tuning_places = static_cast<std::size_t>(integerSetting(settings, "tuning_places"));
+  if (inputs != "position" && ask == Coils::kAsk && choiceSetting(settings, "sensor_coils") == "auto") {
+    FT_TRY(const CoilChoice choice, coilsOf(data, system, tuning_places, control));
+    if (choice.coils) {
+      FitData rest = withoutCoils(data, *choice.coils);
+      FT_TRY(GaussianProcessSystem without, buildSystem(rest, settings, control, Coils::kLeave));
+      without.coils = choice.coils;
+      without.orientations = data.q_tracked;
+      (without.poses ? without.poses->note : without.note) += " " + choice.note;
+      return without;
+    }
+  }
   PoseChoice poses;
   if (inputs != "position") {
-    const auto tuning_places = static_cast<std::size_t>(integerSetting(settings, "tuning_places"));
     FT_TRY(poses, choosePoses(data, system.places, system.kernel, system.frame, system.scales, tuning_places,
                               inputs == "pose", control));
   }
@@ -209,12 +240,16 @@ std::unique_ptr<PositionModel> modelOf(const GaussianProcessSystem& system, std:
 Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, const Settings& settings,
                                                           const RunControl& control) {
   FT_TRY(const auto system, buildSystem(data, settings, control));
-  if (system.poses) return fitPoses(*system.poses);
+  if (system.poses)
+    return fitPoses(*system.poses).map([&](std::unique_ptr<PositionModel> model) {
+      return system.coils ? withCoils(std::move(model), *system.coils, system.orientations) : std::move(model);
+    });
   const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
   if (!projection) return notSolvable(system);
   const auto solution = solveRadial(*projection, matrixOf(system), displacementMatrix(system.places));
   if (!solution) return notSolvable(system);
-  return modelOf(system, {}, *solution);
+  auto model = modelOf(system, {}, *solution);
+  return system.coils ? withCoils(std::move(model), *system.coils, system.orientations) : std::move(model);
 }
 
 class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
@@ -235,10 +270,27 @@ class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
   RadialHoldOut solutions_;
 };
 
-Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const FitData& data,
-                                                                           const Settings& settings,
-                                                                           const RunControl& control) {
-  FT_TRY(auto system, buildSystem(data, settings, control));
+/// Hold-outs of the data without the coils, whose strain stays as all rows gave it.
+class CoilsHoldOut : public HoldOutFits<PositionModel> {
+ public:
+  CoilsHoldOut(std::unique_ptr<HoldOutFits<PositionModel>> fits, const SensorCoils& coils,
+               std::vector<Eigen::Quaterniond> orientations)
+      : fits_(std::move(fits)), coils_(coils), orientations_(std::move(orientations)) {}
+
+  Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
+                                                 const Pose& fold_from_data) const override {
+    return fits_->without(rows, fold_from_data).map([&](std::unique_ptr<PositionModel> model) {
+      return withCoils(std::move(model), coils_, orientations_);
+    });
+  }
+
+ private:
+  std::unique_ptr<HoldOutFits<PositionModel>> fits_;
+  SensorCoils coils_;
+  std::vector<Eigen::Quaterniond> orientations_;
+};
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutSystem(GaussianProcessSystem system) {
   if (system.poses) return holdOutPoses(*std::move(system.poses));
   const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
   if (!projection) return notSolvable(system);
@@ -248,7 +300,19 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const
   return std::make_unique<GaussianProcessHoldOut>(std::move(system), *std::move(solutions));
 }
 
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const FitData& data,
+                                                                           const Settings& settings,
+                                                                           const RunControl& control) {
+  FT_TRY(auto system, buildSystem(data, settings, control));
+  const std::optional<SensorCoils> coils = system.coils;
+  std::vector<Eigen::Quaterniond> orientations = std::move(system.orientations);
+  auto fits = holdOutSystem(std::move(system));
+  if (!fits || !coils) return fits;
+  return std::make_unique<CoilsHoldOut>(*std::move(fits), *coils, std::move(orientations));
+}
+
 std::unique_ptr<PositionModel> loadGaussianProcess(const JsonReader& parameters) {
+  if (parameters.has("coils")) return readCoils(parameters, loadGaussianProcess);
   if (parameters.has("pose")) return readPoses(parameters);
   RadialField field = RadialField::fromJson(parameters);
   const GaussianProcessScales scales{parameters["length_m"].vector3(), parameters["signal_sd_m"].number(),
@@ -266,6 +330,11 @@ std::vector<Setting> gaussianProcessSettings() {
                       "What the error is a function of: the tracked position, or the whole tracked pose. auto takes "
                       "the pose where rows are turned differently, the evidence gains 3 nats for each further "
                       "parameter and the error at places left out is 3 % less."),
+      declare::choice(
+          "sensor_coils", "Sensor's coils", {"auto", "none"}, "auto",
+          "Where inputs may be the pose: auto first takes out what coils of unequal gain and skew would do, if "
+          "the evidence gains 3 nats for each of their six parameters and the error at places left out is 3 % "
+          "less."),
       declare::choice("nu", "Smoothness", {"1.5", "2.5"}, "2.5",
                       "Of the Matern kernel: fields with nu = 2.5 have two derivatives, with 1.5 one."),
       declare::integer("restarts", "Starts", {1, 20}, 3,

@@ -19,10 +19,6 @@ constexpr double kTurnedAlike_rad = 15.0 * kRadPerDeg;
 constexpr double kTrackedAlike_rad = 45.0 * kRadPerDeg;
 constexpr double kShareTurnedAlike = 0.9;
 constexpr std::size_t kMostPoses = 10000;  // 800 MB for the matrix.
-constexpr double kNatsAParameter = 3.0;
-/// By one per cent the error left out falls where orientation says nothing, too: three parameters more follow the
-/// noise.
-constexpr double kClearlyLess = 0.97;
 constexpr std::size_t kPositionParameters = PoseLikelihood::kPositionParameters;
 constexpr std::size_t kTurnParameters = PoseLikelihood::kParameters - kPositionParameters;
 constexpr std::size_t kRowsOfPoseStarts = 200;
@@ -145,46 +141,11 @@ PoseRows rowsOf(const FitData& data, const Places& places) {
   return rows;
 }
 
-/// So many well-spread places that their rows are no more than about `most`.
-std::vector<std::size_t> placesOfAbout(const Places& places, std::size_t n_rows, std::size_t most) {
-  const double share = std::min(1.0, static_cast<double>(most) / static_cast<double>(n_rows));
-  const auto n_places = static_cast<std::size_t>(share * static_cast<double>(places.size()));
-  return spreadPlaces(places.p_tracked_m, std::max<std::size_t>(n_places, 5));
-}
-
-/// Ascending.
-std::vector<std::size_t> rowsOfPlaces(const Places& places, std::span<const std::size_t> some) {
-  std::vector<std::size_t> rows;
-  for (const std::size_t place : some) rows.insert(rows.end(), places.rows[place].begin(), places.rows[place].end());
-  std::sort(rows.begin(), rows.end());
-  return rows;
-}
-
 Eigen::MatrixXd rowsOfMatrix(const Eigen::MatrixXd& all, std::span<const std::size_t> rows) {
   Eigen::MatrixXd some(static_cast<Eigen::Index>(rows.size()), all.cols());
   for (std::size_t i = 0; i < rows.size(); ++i)
     some.row(static_cast<Eigen::Index>(i)) = all.row(static_cast<Eigen::Index>(rows[i]));
   return some;
-}
-
-/// RMS over places, each left out with all its rows, with these scales kept; infinite where it cannot be told.
-double heldOutRms_m(const PoseSystem& system, const PoseScales& scales, std::span<const std::size_t> used) {
-  const PoseRows rows = system.rows.only(used);
-  const auto projection = TailProjection::of(system.frame.tail(rows.p_m));
-  if (!projection) return HUGE_VAL;
-  const auto solutions =
-      RadialHoldOut::of(*projection, poseCovariance(system.kernel, system.frame, scales, rows),
-                        rowsOfMatrix(system.displacement_m, used), rowsOfMatrix(system.tracked_m, used));
-  if (!solutions) return HUGE_VAL;
-  std::map<std::size_t, std::vector<std::size_t>> of_place;
-  for (std::size_t row = 0; row < rows.size(); ++row) of_place[rows.place[row]].push_back(row);
-  double squares_m2 = 0.0;
-  for (const auto& [place, out] : of_place) {
-    const auto errors_m = solutions->leftOutErrors(out);
-    if (!errors_m) return HUGE_VAL;
-    squares_m2 += errors_m->squaredNorm() / static_cast<double>(out.size());
-  }
-  return std::sqrt(squares_m2 / static_cast<double>(of_place.size()));
 }
 
 /// The same of the process over positions as it would be fitted instead: to the means of the places.
@@ -294,6 +255,67 @@ std::optional<PoseGain> gainOfPoses(const PoseSystem& system, const GaussianProc
 
 }  // namespace
 
+std::vector<std::size_t> placesOfAbout(const Places& places, std::size_t n_rows, std::size_t most) {
+  const double share = std::min(1.0, static_cast<double>(most) / static_cast<double>(n_rows));
+  const auto n_places = static_cast<std::size_t>(share * static_cast<double>(places.size()));
+  return spreadPlaces(places.p_tracked_m, std::max<std::size_t>(n_places, 5));
+}
+
+std::vector<std::size_t> rowsOfPlaces(const Places& places, std::span<const std::size_t> some) {
+  std::vector<std::size_t> rows;
+  for (const std::size_t place : some) rows.insert(rows.end(), places.rows[place].begin(), places.rows[place].end());
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+
+double heldOutRms_m(const PoseSystem& system, const PoseScales& scales, std::span<const std::size_t> used) {
+  const PoseRows rows = system.rows.only(used);
+  const auto projection = TailProjection::of(system.frame.tail(rows.p_m));
+  if (!projection) return HUGE_VAL;
+  const auto solutions =
+      RadialHoldOut::of(*projection, poseCovariance(system.kernel, system.frame, scales, rows),
+                        rowsOfMatrix(system.displacement_m, used), rowsOfMatrix(system.tracked_m, used));
+  if (!solutions) return HUGE_VAL;
+  std::map<std::size_t, std::vector<std::size_t>> of_place;
+  for (std::size_t row = 0; row < rows.size(); ++row) of_place[rows.place[row]].push_back(row);
+  double squares_m2 = 0.0;
+  for (const auto& [place, out] : of_place) {
+    const auto errors_m = solutions->leftOutErrors(out);
+    if (!errors_m) return HUGE_VAL;
+    squares_m2 += errors_m->squaredNorm() / static_cast<double>(out.size());
+  }
+  return std::sqrt(squares_m2 / static_cast<double>(of_place.size()));
+}
+
+std::optional<PoseScales> rowScales(const PoseSystem& system, const GaussianProcessScales& start,
+                                    std::span<const std::size_t> used, double spacing_m, const RunControl& control) {
+  const auto likelihood = PoseLikelihood::of(system.kernel, system.frame, system.rows.only(used),
+                                             rowsOfMatrix(system.displacement_m, used));
+  if (!likelihood) return std::nullopt;
+  const WeakPrior prior(likelihood->residualVariance_m2(), rmsSpread_m(system.rows.p_m), std::max(spacing_m, 1e-6));
+  const auto optimum = Search{*likelihood, prior, TurnPrior(prior), control}.from(logarithmsOf(start), kPoseIterations);
+  return optimum ? std::optional(poseScalesOf(optimum->parameters)) : std::nullopt;
+}
+
+Result<PoseSystem> poseSystemOf(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
+                                const RunControl& control) {
+  PoseSystem system;
+  system.kernel = kernel;
+  system.frame = frame;
+  FT_TRY(system.memory,
+         bookSquareMatrices("A Gaussian process over poses", kGaussianProcessMatrices, data.size(), control));
+  system.rows = rowsOf(data, places);
+  const auto n = static_cast<Eigen::Index>(data.size());
+  system.displacement_m.resize(n, 3);
+  system.tracked_m.resize(n, 3);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto row = static_cast<std::size_t>(i);
+    system.tracked_m.row(i) = data.p_tracked_m[row].transpose();
+    system.displacement_m.row(i) = (data.p_true_m[row] - data.p_tracked_m[row]).transpose();
+  }
+  return system;
+}
+
 bool hasSeveralOrientations(const FitData& data) {
   if (!data.hasOrientation()) return false;
   const bool is_stated = distinctRotations(data.q_true, kSameOrientation_rad).size() > 1;
@@ -327,24 +349,12 @@ Result<PoseChoice> choosePoses(const FitData& data, const Places& places, Radial
     if (must) return fail(ErrorCode::kUnsupported, "inputs=pose: " + most);
     return PoseChoice{std::nullopt, "Position alone: " + most + "."};
   }
-  PoseSystem system;
-  system.kernel = kernel;
-  system.frame = frame;
-  auto memory = bookSquareMatrices("A Gaussian process over poses", kGaussianProcessMatrices, data.size(), control);
-  if (!memory) {
-    if (must || memory.error().code == ErrorCode::kCancelled) return tl::unexpected(memory.error());
-    return PoseChoice{std::nullopt, "Position alone: " + memory.error().message + "."};
+  auto made = poseSystemOf(data, places, kernel, frame, control);
+  if (!made) {
+    if (must || made.error().code == ErrorCode::kCancelled) return tl::unexpected(made.error());
+    return PoseChoice{std::nullopt, "Position alone: " + made.error().message + "."};
   }
-  system.memory = *std::move(memory);
-  system.rows = rowsOf(data, places);
-  const auto n = static_cast<Eigen::Index>(data.size());
-  system.displacement_m.resize(n, 3);
-  system.tracked_m.resize(n, 3);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto row = static_cast<std::size_t>(i);
-    system.tracked_m.row(i) = data.p_tracked_m[row].transpose();
-    system.displacement_m.row(i) = (data.p_true_m[row] - data.p_tracked_m[row]).transpose();
-  }
+  PoseSystem system = *std::move(made);
   const std::vector<std::size_t> used_places = placesOfAbout(places, data.size(), tuning_places);
   const std::vector<std::size_t> used = rowsOfPlaces(places, used_places);
   const std::vector<std::size_t> few = rowsOfPlaces(places, placesOfAbout(places, data.size(), kRowsOfPoseStarts));

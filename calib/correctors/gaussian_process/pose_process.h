@@ -11,6 +11,11 @@
 
 namespace fieldtrue::correctors {
 
+/// What orientation must bring for each further parameter [nats], and the share of the held-out error it must leave at
+/// most: by one per cent that falls where orientation says nothing, too, since parameters more follow the noise.
+inline constexpr double kNatsAParameter = 3.0;
+inline constexpr double kClearlyLess = 0.97;
+
 /// Everything a Gaussian process over poses and its hold-outs share.
 struct PoseSystem {
   RadialKernel kernel = RadialKernel::kMatern52;
@@ -42,6 +47,20 @@ bool hasSeveralOrientations(const FitData& data);
 Result<PoseChoice> choosePoses(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
                                const GaussianProcessScales& start, std::size_t tuning_places, bool must,
                                const RunControl& control);
+
+/// The rows of fit data as a system without scales.
+/// @error as MemoryBooking::book
+Result<PoseSystem> poseSystemOf(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,
+                                const RunControl& control);
+/// So many well-spread places that their rows are no more than about `most`.
+std::vector<std::size_t> placesOfAbout(const Places& places, std::size_t n_rows, std::size_t most);
+/// Their rows, ascending.
+std::vector<std::size_t> rowsOfPlaces(const Places& places, std::span<const std::size_t> some);
+/// The likeliest scales of rows whose error is of position alone, from a start; none on a request to stop.
+std::optional<PoseScales> rowScales(const PoseSystem& system, const GaussianProcessScales& start,
+                                    std::span<const std::size_t> used, double spacing_m, const RunControl& control);
+/// RMS over places, each left out with all its rows, with these scales kept; infinite where it cannot be told.
+double heldOutRms_m(const PoseSystem& system, const PoseScales& scales, std::span<const std::size_t> used);
 
 Result<std::unique_ptr<PositionModel>> fitPoses(const PoseSystem& system);
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPoses(PoseSystem system);

@@ -53,7 +53,7 @@ FitData turnedData(int orientations, const ErrorLaw& law, unsigned seed = 3) {
 }
 
 std::unique_ptr<PositionModel> fittedWith(const FitData& data, const std::string& inputs) {
-  return testing::fitted("gaussian_process", data, {{"inputs", inputs}});
+  return testing::fitted("gaussian_process", data, {{"inputs", inputs}, {"sensor_coils", "none"}});
 }
 
 /// The process written out from its definition, with rotations as matrices: nothing of the code under test but the
@@ -234,7 +234,8 @@ class PoseProcessTest : public QObject {
     FitData data = turnedData(3, {.of_turn_m = 0.002});
     data.jig_sd_m = 3e-4;
     const PositionMethod* method = *findPositionMethod("gaussian_process");
-    const Settings settings = *resolveSettings(method->id, method->settings, {{"inputs", "pose"}});
+    const Settings settings =
+        *resolveSettings(method->id, method->settings, {{"inputs", "pose"}, {"sensor_coils", "none"}});
     const auto all = method->fit(data, settings, {});
     const auto fits = method->hold_out(data, settings, {});
     FT_VERIFY_OK(fits);
@@ -335,7 +336,8 @@ class PoseProcessTest : public QObject {
 
   void whatIsAskedForAndIsNotThereIsRefused() {
     const PositionMethod* method = *findPositionMethod("gaussian_process");
-    const Settings settings = *resolveSettings(method->id, method->settings, {{"inputs", "pose"}});
+    const Settings settings =
+        *resolveSettings(method->id, method->settings, {{"inputs", "pose"}, {"sensor_coils", "none"}});
     const auto refused = method->fit(turnedData(1, {}), settings, {});
     QVERIFY(!refused);
     FT_VERIFY_MATCH(

@@ -1,0 +1,111 @@
+#include "calib/correctors/gaussian_process/sensor_coils.h"
+
+#include <cmath>
+
+namespace fieldtrue::correctors {
+namespace {
+
+Eigen::Matrix3d matrixOf(const CoilStrain& e) {
+  Eigen::Matrix3d strain;
+  strain << e[0], e[3], e[4], e[3], e[1], e[5], e[4], e[5], e[2];
+  return strain;
+}
+
+/// True minus tracked, for a strain in the transmitter's axes.
+Eigen::Vector3d shiftOf_m(const Eigen::Matrix3d& strain, const Eigen::Vector3d& p_m) {
+  const double range_m = p_m.norm();
+  if (!(range_m > 0.0)) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d n = p_m / range_m;
+  const Eigen::Vector3d across = strain * n - n.dot(strain * n) * n;
+  return range_m * ((3.0 * n.dot(strain * n) + strain.trace()) / 18.0 * n + 4.0 / 3.0 * across);
+}
+
+Eigen::Matrix3d turned(const Eigen::Matrix3d& strain, const Eigen::Quaterniond& q) {
+  const Eigen::Matrix3d r = q.normalized().toRotationMatrix();
+  return r * strain * r.transpose();
+}
+
+class CoilsPosition : public PositionModel {
+ public:
+  /// @param mean_strain over the orientations that were fitted, transmitter's axes
+  CoilsPosition(std::unique_ptr<PositionModel> model, const SensorCoils& coils, const Eigen::Matrix3d& mean_strain)
+      : model_(std::move(model)), coils_(coils), mean_strain_(mean_strain) {}
+
+  bool takesOrientation() const override { return true; }
+  Eigen::Vector3d displacementAt_m(const Pose& tracked) const override {
+    return model_->displacementAt_m(tracked) + coils_.shift_m(tracked);
+  }
+  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
+    return model_->displacement_m(p_tracked_m) + shiftOf_m(mean_strain_, p_tracked_m);
+  }
+  std::optional<double> uncertaintyAt_m(const Pose& tracked) const override {
+    const auto sd_m = model_->uncertaintyAt_m(tracked);
+    if (!sd_m) return sd_m;
+    return std::sqrt(*sd_m * *sd_m + coils_.variance_m2(tracked));
+  }
+  /// Of the mean over the orientations that were fitted.
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
+    return model_->uncertainty_m(p_tracked_m);
+  }
+  bool covers(const Eigen::Vector3d& p_tracked_m) const override { return model_->covers(p_tracked_m); }
+  std::string note() const override { return model_->note(); }
+  nlohmann::json parameters() const override {
+    return {{"coils",
+             {{"strain", std::vector<double>(coils_.strain.begin(), coils_.strain.end())},
+              {"covariance", jsonOf(Eigen::MatrixXd(coils_.covariance))},
+              {"mean_strain", jsonOf(Eigen::MatrixXd(mean_strain_))}}},
+            {"without_coils", model_->parameters()}};
+  }
+
+ private:
+  std::unique_ptr<PositionModel> model_;
+  SensorCoils coils_;
+  Eigen::Matrix3d mean_strain_;
+};
+
+}  // namespace
+
+Eigen::Matrix<double, 3, 6> coilDerivative(const Pose& tracked) {
+  Eigen::Matrix<double, 3, 6> derivative;
+  for (int k = 0; k < 6; ++k)
+    derivative.col(k) = shiftOf_m(turned(matrixOf(CoilStrain::Unit(k)), tracked.orientation), tracked.position_m);
+  return derivative;
+}
+
+Eigen::Vector3d SensorCoils::shift_m(const Pose& tracked) const {
+  return shiftOf_m(turned(matrixOf(strain), tracked.orientation), tracked.position_m);
+}
+
+double SensorCoils::variance_m2(const Pose& tracked) const {
+  const Eigen::Matrix<double, 3, 6> d = coilDerivative(tracked);
+  return (d * covariance * d.transpose()).trace();
+}
+
+FitData withoutCoils(FitData data, const SensorCoils& coils) {
+  for (std::size_t row = 0; row < data.size(); ++row)
+    data.p_true_m[row] -= coils.shift_m({data.p_tracked_m[row], data.q_tracked[row]});
+  return data;
+}
+
+std::unique_ptr<PositionModel> withCoils(std::unique_ptr<PositionModel> model, const SensorCoils& coils,
+                                         std::span<const Eigen::Quaterniond> q) {
+  Eigen::Matrix3d mean_strain = Eigen::Matrix3d::Zero();
+  for (const Eigen::Quaterniond& one : q)
+    mean_strain += turned(matrixOf(coils.strain), one) / static_cast<double>(q.size());
+  return std::make_unique<CoilsPosition>(std::move(model), coils, mean_strain);
+}
+
+std::unique_ptr<PositionModel> readCoils(const JsonReader& parameters,
+                                         std::unique_ptr<PositionModel> (*base)(const JsonReader&)) {
+  const JsonReader from = parameters["coils"];
+  const std::vector<double> strain = from["strain"].numbers();
+  const Eigen::MatrixXd covariance = from["covariance"].matrix(6);
+  if (strain.size() != 6) from["strain"].refuse("six numbers");
+  if (covariance.rows() != 6) from["covariance"].refuse("six rows");
+  SensorCoils coils;
+  coils.strain = Eigen::Map<const CoilStrain>(strain.data());
+  coils.covariance = covariance;
+  return std::make_unique<CoilsPosition>(base(parameters["without_coils"]), coils, from["mean_strain"].matrix3());
+}
+
+}  // namespace fieldtrue::correctors

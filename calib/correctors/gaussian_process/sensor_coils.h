@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "calib/core/json_reader.h"
+#include "calib/correctors/base/fit_data.h"
+#include "calib/correctors/base/method.h"
+
+namespace fieldtrue::correctors {
+
+/// A sensor whose coils differ in gain, or are not square to each other, reads the field B as (1 + E) B in its own
+/// axes, E a symmetric strain (its skew part is a turn, and moves nothing). Turned by R against the transmitter it errs
+/// with S = R E R^T. To first order a tracker that takes the range r and the direction n from the strength of the
+/// signals and their proportions is wrong by
+///
+///   tracked - true = r [ -(3 n.Sn + tr S) n / 18 - 4/3 (Sn - (n.Sn) n) ]
+///
+/// Of a gain g of all coils alike that leaves -g r / 3: the signal falls with the cube of the range.
+/// @source first-order perturbation of the dipole's singular values, whose range and direction Kuipers 1999 takes
+using CoilStrain = Eigen::Matrix<double, 6, 1>;  ///< xx, yy, zz, xy, xz, yz.
+
+struct SensorCoils {
+  CoilStrain strain = CoilStrain::Zero();
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+
+  /// True minus tracked [m].
+  Eigen::Vector3d shift_m(const Pose& tracked) const;
+  /// Variance of that, of all three axes together [m^2].
+  double variance_m2(const Pose& tracked) const;
+};
+
+/// d shift / d strain: the shift is linear in it.
+Eigen::Matrix<double, 3, 6> coilDerivative(const Pose& tracked);
+
+/// The data without what the coils do: its truth moved to where a sensor with perfect coils would have been read.
+FitData withoutCoils(FitData data, const SensorCoils& coils);
+
+/// A model of that data with the coils' shift added. @param q orientations it was fitted on; their mean counts where
+/// none is told
+std::unique_ptr<PositionModel> withCoils(std::unique_ptr<PositionModel> model, const SensorCoils& coils,
+                                         std::span<const Eigen::Quaterniond> q);
+/// @param base reads the model without coils
+std::unique_ptr<PositionModel> readCoils(const JsonReader& parameters,
+                                         std::unique_ptr<PositionModel> (*base)(const JsonReader&));
+
+}  // namespace fieldtrue::correctors
