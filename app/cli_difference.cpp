@@ -20,7 +20,7 @@ constexpr std::size_t kLabelWidth = 30;
 std::string describe(const evaluation::CalibrationDifference& difference) {
   std::string text;
   for (const auto& [label, told] : widgets::differenceFacts(difference))
-    text += label + std::string(kLabelWidth - std::min(kLabelWidth, label.size()), ' ') + told + "\n";
+    text.append(label).append(kLabelWidth - std::min(kLabelWidth, label.size()), ' ').append(told).append("\n");
   return text + difference.text + "\n";
 }
 

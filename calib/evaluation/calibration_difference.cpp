@@ -12,6 +12,7 @@
 #include "calib/core/units.h"
 #include "calib/correctors/base/method_text.h"
 #include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/region/region_lattice.h"
 
@@ -170,7 +171,7 @@ std::map<int, PlaceError> errorsAt(const Corrector& corrector, const Corrector& 
 }
 
 /// Holds the first calibration against the second's rows.
-void measureAtPlaces(const Corrector& first, const Corrector& second, const MethodScore* second_score,
+void measureAtPlaces(const Corrector& first, const Corrector& second, const MethodScore& second_score,
                      const Comparison& of_second, CalibrationDifference& to) {
   const std::map<int, PlaceError> at_second = errorsAt(first, second);
   std::vector<double> first_mm, second_mm;
@@ -182,7 +183,7 @@ void measureAtPlaces(const Corrector& first, const Corrector& second, const Meth
       to.worst_place_m = found->second.true_m;
     }
     first_mm.push_back(found->second.mm);
-    if (second_score) second_mm.push_back(second_score->place_errors[k]);
+    second_mm.push_back(second_score.place_errors[k]);
   }
   to.first_at_second = placeErrors(std::move(first_mm), false);
   const std::vector<double>& at_mm = to.first_at_second.mm;
@@ -193,7 +194,7 @@ void measureAtPlaces(const Corrector& first, const Corrector& second, const Meth
   };
   to.n_beyond = n_above(most_own_mm);
   to.n_far = n_above(kFar * most_own_mm);
-  if (!at_mm.empty() && at_mm.size() == second_mm.size()) to.first_less_second_mm = pairedDifference(at_mm, second_mm);
+  if (!at_mm.empty()) to.first_less_second_mm = pairedDifference(at_mm, second_mm);
 }
 
 /// The chance that so many of the largest errors all fall to the second's places where nothing changed and each place
@@ -251,9 +252,12 @@ std::string sentences(const CalibrationDifference& difference) {
       difference.setup_matches == SetupMatch::kNo
           ? " They are of different set-ups: " + differenceText(difference.first_setup, difference.second_setup) + "."
           : std::string();
+  const std::string unknown = "Nobody can tell whether the field changed: ";
+  if (difference.first_own.mm.empty() || difference.second_own.mm.empty())
+    return unknown + "with so few places a calibration cannot be judged at places its fits did not see." + field +
+           other;
   if (difference.first_at_second.mm.empty())
-    return "Nobody can tell whether the field changed: too few places of the second lie where the first holds." +
-           field + other;
+    return unknown + "too few places of the second lie where the first holds." + field + other;
   const std::string errs = "the first errs by " + withInterval(difference.first_at_second) +
                            " at the second's places, and by " + withInterval(difference.first_own) +
                            " at places of its own that its fits did not see" + beyond(difference) + ".";
@@ -269,7 +273,7 @@ std::string sentences(const CalibrationDifference& difference) {
   const std::string ask = difference.n_far > 0 ? " Take the places again that are farthest off: the sensor slipped "
                                                  "there, or something stands near them."
                                                : "";
-  return "Nobody can tell whether the field changed: " + errs + field + ask + other;
+  return unknown + errs + field + ask + other;
 }
 
 std::string_view nameOf(DifferenceVerdict verdict) {
@@ -324,13 +328,14 @@ Result<CalibrationDifference> compareCalibrations(const Corrector& first, const 
   measureOrientation(first, second, points_m, difference);
   RunControl half = control;
   half.progress = [&](double fraction) { control.progress(0.5 * fraction); };
-  FT_TRY(const Comparison of_first, heldOut(first, half));
+  const Result<Comparison> of_first = heldOut(first, half);
   half.progress = [&](double fraction) { control.progress(0.5 + 0.5 * fraction); };
-  FT_TRY(const Comparison of_second, heldOut(second, half));
-  const MethodScore* second_score = scoreOf(of_second, second);
-  difference.first_own = ownErrors(scoreOf(of_first, first));
+  const Result<Comparison> of_second = heldOut(second, half);
+  if (control.stop.stop_requested()) return comparisonStopped();
+  const MethodScore* second_score = of_second ? scoreOf(*of_second, second) : nullptr;
+  difference.first_own = ownErrors(of_first ? scoreOf(*of_first, first) : nullptr);
   difference.second_own = ownErrors(second_score);
-  measureAtPlaces(first, second, second_score, of_second, difference);
+  if (second_score) measureAtPlaces(first, second, *second_score, *of_second, difference);
   difference.verdict = verdictOn(difference);
   if (difference.verdict == DifferenceVerdict::kNotShown) difference.unseen_mm = unseen_mm(difference);
   difference.text = sentences(difference);
@@ -363,7 +368,7 @@ nlohmann::json toJson(const CalibrationDifference& difference) {
       {"second_held_out", toJson(difference.second_own)},
       {"first_at_second", toJson(difference.first_at_second)},
       {"worst_place", nullUnlessTold(difference.worst_place)},
-      {"worst_place_m", jsonOf(difference.worst_place_m)},
+      {"worst_place_m", difference.worst_place.empty() ? nlohmann::json(nullptr) : jsonOf(difference.worst_place_m)},
       {"places_beyond", difference.n_beyond},
       {"places_far_beyond", difference.n_far},
       {"first_less_second_mm",

@@ -127,6 +127,20 @@ class CalibrationDifferenceTest : public QObject {
     QVERIFY(toJson(*difference).at("first_at_second").is_null());
   }
 
+  void tooFewToBeJudgedAreToldSo() {
+    CalibrationTable few = exactTable();
+    // Three corners: without one of them nothing can be aligned.
+    std::erase_if(few.nodes, [](const Node& node) {
+      const auto& index = *node.index;
+      return index != std::array{0, 0, 0} && index != std::array{5, 0, 0} && index != std::array{0, 5, 0};
+    });
+    few.metadata.alignment_known = false;
+    const auto difference = compareCalibrations(fitted(few, "none"), fitted(exactTable(), "none"));
+    FT_VERIFY_OK(difference);
+    QVERIFY(difference->verdict == DifferenceVerdict::kCannotTell);
+    QVERIFY(toJson(*difference).at("field").at("rms_mm").get<double>() < 1e-6);
+  }
+
   void nothingInCommonIsRefused() {
     CalibrationTable elsewhere = exactTable();
     for (Node& node : elsewhere.nodes) {
