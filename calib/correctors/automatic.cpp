@@ -4,6 +4,7 @@
 
 #include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
+#include "calib/correctors/automatic_blend.h"
 #include "calib/correctors/automatic_choice.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
@@ -14,6 +15,7 @@ namespace fieldtrue::correctors {
 namespace {
 
 const std::string kName = "Automatic choice";
+const std::string kBlend = "blend";  ///< In place of a method's id.
 
 class AutomaticModel : public PositionModel {
  public:
@@ -73,19 +75,54 @@ nlohmann::json tableOf(const std::vector<AutomaticCandidate>& candidates, const 
   return rows;
 }
 
+std::string labelOf(const AutomaticCandidate& candidate) {
+  return positionLabel(candidate.method->id, candidate.settings);
+}
+
+/// "Gaussian process 0.62 and RBF 0.38"
+std::string partsOf(const std::vector<AutomaticCandidate>& candidates, const Blend& blend) {
+  std::string text;
+  for (std::size_t i = 0; i < blend.members.size(); ++i) {
+    if (i > 0) text += i + 1 < blend.members.size() ? ", " : " and ";
+    std::array<char, 16> weight{};
+    std::snprintf(weight.data(), weight.size(), " %.2f", blend.weights[i]);
+    text += labelOf(candidates[blend.members[i]]);
+    text += weight.data();
+  }
+  return text;
+}
+
+/// @param blend that was taken in place of the chosen candidate, or null
 std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& candidates,
-                   const std::vector<InnerScore>& scores, std::size_t chosen, std::size_t n_folds) {
+                   const std::vector<InnerScore>& scores, std::size_t chosen, const Blend* blend, std::size_t n_folds) {
   const auto n_scored =
       std::count_if(scores.begin(), scores.end(), [](const InnerScore& score) { return !score.skipped; });
   // Every other model says so itself.
   const std::string plane = chosen == 0 ? planeNote(data, "nothing is claimed off it") : "";
-  std::string note = plane + (plane.empty() ? "" : " ") +
-                     "Chosen: " + positionLabel(candidates[chosen].method->id, candidates[chosen].settings) +
-                     ", held-out RMS " + inMm(scores[chosen].rms_m());
-  note += chosen == 0 ? ", since nothing else lowers it clearly"
-                      : " against " + inMm(scores.front().rms_m()) + " without correction";
+  std::string note = plane + (plane.empty() ? "" : " ") + "Chosen: ";
+  note += blend != nullptr
+              ? "a blend of " + partsOf(candidates, *blend) + ", held-out RMS " + inMm(blend->score.rms_m()) +
+                    " against " + inMm(scores[chosen].rms_m()) + " of " + labelOf(candidates[chosen]) + " alone"
+              : labelOf(candidates[chosen]) + ", held-out RMS " + inMm(scores[chosen].rms_m());
+  if (blend != nullptr)
+    note += " and " + inMm(scores.front().rms_m()) + " without correction";
+  else if (chosen == 0)
+    note += ", since nothing else lowers it clearly";
+  else
+    note += " against " + inMm(scores.front().rms_m()) + " without correction";
   return note + "; " + std::to_string(n_scored) + " candidates scored over the same " + std::to_string(n_folds) +
          " folds.";
+}
+
+Result<std::unique_ptr<PositionModel>> fitBlend(const std::vector<AutomaticCandidate>& candidates, const Blend& blend,
+                                                const FitData& data, const RunControl& control) {
+  std::vector<BlendMember> members;
+  for (std::size_t i = 0; i < blend.members.size(); ++i) {
+    const AutomaticCandidate& candidate = candidates[blend.members[i]];
+    FT_TRY(auto model, candidate.method->fit(data, candidate.settings, control));
+    members.push_back({candidate.method, candidate.settings, blend.weights[i], std::move(model)});
+  }
+  return makeBlend(std::move(members));
 }
 
 CandidateSet candidateSetOf(const Settings& settings) {
@@ -110,28 +147,34 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
   const std::vector<InnerScore>& scores = scored;
   const std::size_t chosen = chooseCandidate(candidates, scores);
   const AutomaticCandidate& winner = candidates[chosen];
+  std::optional<Blend> blend;
+  if (chosen != 0) blend = blendCandidates(candidates, scores, data, folds);
+  if (blend && !isWorthBlending(blend->score, scores[chosen])) blend.reset();
   RunControl inner = control;
   inner.progress = [](double) {};
-  FT_TRY(auto model, winner.method->fit(data, winner.settings, inner));
+  FT_TRY(auto model,
+         blend ? fitBlend(candidates, *blend, data, inner) : winner.method->fit(data, winner.settings, inner));
   control.progress(1.0);
-  nlohmann::json table = {{"method", winner.method->id},
-                          {"settings", toJson(winner.settings)},
+  nlohmann::json table = {{"method", blend ? kBlend : winner.method->id},
+                          {"settings", blend ? nlohmann::json::object() : toJson(winner.settings)},
                           {"candidates", tableOf(candidates, scores)},
-                          {"note", noteOf(data, candidates, scores, chosen, folds.size())}};
+                          {"note", noteOf(data, candidates, scores, chosen, blend ? &*blend : nullptr, folds.size())}};
   return std::make_unique<AutomaticModel>(std::move(model), std::move(table));
 }
 
 std::unique_ptr<PositionModel> loadAutomatic(const JsonReader& parameters) {
+  const JsonReader candidates = parameters["candidates"];
+  candidates.entries();
+  nlohmann::json table = {{"method", parameters["method"].text()},
+                          {"settings", nlohmann::json::object()},
+                          {"candidates", candidates.raw()},
+                          {"note", parameters["note"].text()}};
+  if (parameters["method"].text() == kBlend)
+    return std::make_unique<AutomaticModel>(readBlend(parameters["model"]), std::move(table));
   const PositionMethod& method = *parameters["method"].valueOf(findPositionMethod(parameters["method"].text()));
   if (method.id == "auto") parameters["method"].refuse("another one: an automatic choice cannot have chosen itself");
   const JsonReader stored = parameters["settings"];
-  const Settings settings = stored.valueOf(settingsFromJson(method.id, method.settings, stored.raw()));
-  const JsonReader candidates = parameters["candidates"];
-  candidates.entries();
-  nlohmann::json table = {{"method", method.id},
-                          {"settings", toJson(settings)},
-                          {"candidates", candidates.raw()},
-                          {"note", parameters["note"].text()}};
+  table["settings"] = toJson(stored.valueOf(settingsFromJson(method.id, method.settings, stored.raw())));
   return std::make_unique<AutomaticModel>(method.read(parameters["model"]), std::move(table));
 }
 

@@ -41,14 +41,6 @@ struct PairedDifference {
   }
 };
 
-/// Places as slots 0, 1, ... in order of first appearance, by row.
-std::vector<std::size_t> slotsOf(const FitData& data) {
-  std::map<int, std::size_t> slot_of_node;
-  std::vector<std::size_t> slots;
-  for (const int node : data.node) slots.push_back(slot_of_node.emplace(node, slot_of_node.size()).first->second);
-  return slots;
-}
-
 /// True minus corrected position of a row.
 Eigen::Vector3d residual_m(const PositionModel& model, const FitData& data, std::size_t row) {
   const Eigen::Vector3d& p_m = data.p_tracked_m[row];
@@ -133,12 +125,25 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set) {
   return candidates;
 }
 
+std::vector<std::size_t> placeSlots(const FitData& data) {
+  std::map<int, std::size_t> slot_of_node;
+  std::vector<std::size_t> slots;
+  for (const int node : data.node) slots.push_back(slot_of_node.emplace(node, slot_of_node.size()).first->second);
+  return slots;
+}
+
+void InnerScore::add(std::size_t place, std::size_t row, const Eigen::Vector3d& left_m, double weight) {
+  squares_m2[place] += weight * left_m.squaredNorm();
+  residual_m[place] += weight * left_m;
+  row_residual_m[row] = left_m;
+}
+
 double InnerScore::rms_m() const {
   return std::sqrt(std::accumulate(squares_m2.begin(), squares_m2.end(), 0.0) / static_cast<double>(squares_m2.size()));
 }
 
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data) {
-  const std::vector<std::size_t> slots = slotsOf(data);
+  const std::vector<std::size_t> slots = placeSlots(data);
   const std::size_t n_places = 1 + *std::max_element(slots.begin(), slots.end());
   std::vector<std::size_t> order(n_places);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -162,12 +167,13 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
     if (model_without.error().code == ErrorCode::kCancelled) return tl::unexpected(model_without.error());
     return skippedScore(model_without.error().message);
   }
-  const std::vector<std::size_t> slots = slotsOf(data);
+  const std::vector<std::size_t> slots = placeSlots(data);
   std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
   for (const std::size_t slot : slots) n_rows[slot] += 1.0;
   InnerScore score;
   score.squares_m2.assign(n_rows.size(), std::nan(""));
   score.residual_m.assign(n_rows.size(), Eigen::Vector3d::Zero());
+  score.row_residual_m.assign(data.size(), Eigen::Vector3d::Zero());
   score.dimension = data.dimension;
   for (std::size_t k = 0; k < folds.size(); ++k) {
     if (control.stop.stop_requested()) return cancelled();
@@ -178,8 +184,7 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
     for (const std::size_t row : folds[k]) {
       const Eigen::Vector3d left_m = residual_m(**model, data, row);
       if (!left_m.allFinite()) return skippedScore("its errors at held-out places are not finite");
-      score.squares_m2[slots[row]] += left_m.squaredNorm() / n_rows[slots[row]];
-      score.residual_m[slots[row]] += left_m / n_rows[slots[row]];
+      score.add(slots[row], row, left_m, 1.0 / n_rows[slots[row]]);
     }
     const bool may_drop = best != nullptr && candidate.method->isCostly() && k + 1 < folds.size();
     if (may_drop && isClearlyWorse(score, *best))

@@ -30,12 +30,19 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set);
 
 /// What inner cross-validation found about one candidate.
 struct InnerScore {
-  std::vector<double> squares_m2;           ///< Held-out squared error of each place.
-  std::vector<Eigen::Vector3d> residual_m;  ///< True minus corrected there, mean over its rows.
-  int dimension = 3;                        ///< Of the places.
-  std::optional<std::string> skipped;       ///< Why it cannot be used here; then nothing else is set.
+  std::vector<double> squares_m2;               ///< Held-out squared error of each place, mean over its rows.
+  std::vector<Eigen::Vector3d> residual_m;      ///< True minus corrected there, mean over its rows.
+  std::vector<Eigen::Vector3d> row_residual_m;  ///< The same of each row.
+  int dimension = 3;                            ///< Of the places.
+  std::optional<std::string> skipped;           ///< Why it cannot be used here; then nothing else is set.
+
+  /// Takes one row of a place in. @param weight one over the place's rows
+  void add(std::size_t place, std::size_t row, const Eigen::Vector3d& left_m, double weight);
   double rms_m() const;
 };
+
+/// Places as 0, 1, ... in order of first appearance, by row.
+std::vector<std::size_t> placeSlots(const FitData& data);
 
 /// Rows in folds by place, the same for every candidate: five, or one a place below twenty places.
 std::vector<std::vector<std::size_t>> innerFolds(const FitData& data);

@@ -205,7 +205,8 @@ std::unique_ptr<PositionModel> readPoses(const JsonReader& parameters) {
   const FieldFrame frame = FieldFrame::fromJson(pose["frame"]);
   PoseScales scales;
   scales.field.length_m = pose["length_m"].vector3();
-  constexpr Bounds kSd_m{0.0, 10.0}, kPositive{1e-6, 1e6};
+  // A field that hardly bends has lengths of kilometres and an SD to match: their ratio alone is determined.
+  constexpr Bounds kSd_m{0.0, 1e12}, kPositive{1e-12, 1e12};
   for (int axis = 0; axis < 3; ++axis)
     if (!(scales.field.length_m[axis] > 0.0)) pose["length_m"].refuse("three lengths above 0");
   scales.field.signal_sd_m = pose["signal_sd_m"].number(kSd_m, "m");

@@ -20,7 +20,7 @@ void addSurface(const Box& box, double distance_m, double pitch_m, std::vector<S
   const Eigen::Vector3d size_m = (box.high_m - box.low_m).array() + 2.0 * distance_m;
   std::array<int, 3> steps{};
   for (std::size_t axis = 0; axis < 3; ++axis)
-    steps[axis] = std::max(1, static_cast<int>(std::ceil(size_m[axis] / pitch_m)));
+    steps[axis] = std::max(1, static_cast<int>(std::ceil(size_m[static_cast<Eigen::Index>(axis)] / pitch_m)));
   for (int i = 0; i <= steps[0]; ++i) {
     for (int j = 0; j <= steps[1]; ++j) {
       for (int k = 0; k <= steps[2]; ++k) {
