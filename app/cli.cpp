@@ -204,6 +204,7 @@ int main(int argc, char** argv) {
   std::setlocale(LC_NUMERIC, "C");  // QCoreApplication takes over the user's, and numbers in files have a point.
   fieldtrue::cli::CommandLine line;
   fieldtrue::cli::addDataCommands(line);
+  fieldtrue::cli::addExportCommand(line);
   fieldtrue::cli::addApplyCommand(line);
   fieldtrue::cli::addAcquireCommand(line);
   fieldtrue::cli::addEmulateCommand(line);

@@ -89,7 +89,8 @@ class CommandLine {
   std::function<Outcome()> run_;
 };
 
-void addDataCommands(CommandLine& line);       ///< simulate, tables, import, export
+void addDataCommands(CommandLine& line);       ///< simulate, tables, import
+void addExportCommand(CommandLine& line);      ///< export
 void addApplyCommand(CommandLine& line);       ///< apply
 void addFitCommands(CommandLine& line);        ///< fit, compare, report
 void addDifferenceCommand(CommandLine& line);  ///< difference

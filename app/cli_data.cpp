@@ -6,8 +6,6 @@
 #include "acquisition/session/session_store.h"
 #include "app/cli.h"
 #include "app/cli_values.h"
-#include "calib/calibration/corrector.h"
-#include "calib/exporters/registry.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "calib/recording/unit_slip.h"
@@ -15,7 +13,7 @@
 #include "calib/tables/table_io.h"
 #include "calib/tables/table_writer.h"
 
-/// simulate, tables, import, export: commands that make files from other files.
+/// simulate, tables, import: commands that make files from other files.
 namespace fieldtrue::cli {
 namespace {
 
@@ -198,48 +196,12 @@ void addImport(CommandLine& line) {
   command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
 }
 
-struct ExportOptions {
-  std::string calibration;
-  std::string format;
-  std::optional<double> bake_um;
-  std::string out;
-};
-
-Outcome runExport(const ExportOptions& options, const CommonOptions& common) {
-  const auto exporter = exporters::findExporter(options.format);
-  if (!exporter) return wrongUsage(exporter.error());
-  auto corrector = calibration::Corrector::load(options.calibration);
-  if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
-  if (!corrector) return notPossible(corrector.error());
-  const auto written = (*exporter)->write(*corrector, options.out);
-  if (!written) return notPossible(written.error());
-  Answer answer;
-  answer.json = {{"file", options.out}, {"format", (*exporter)->id}};
-  answer.text = (*exporter)->label + " written to " + options.out + "\n";
-  return answer;
-}
-
-void addExport(CommandLine& line) {
-  auto [command, options] = line.add("export", "Write a calibration for another program", runExport);
-  command->add_option("--calibration", options->calibration, "Calibration (*.ftcal.json)")
-      ->type_name("FILE")
-      ->required();
-  command->add_option("--format", options->format, "Format; see fieldtrue-cli formats")->type_name("ID")->required();
-  command
-      ->add_option("--bake-um", options->bake_um,
-                   "Bake the position part to a lattice first, which deviates by at most so much inside the region")
-      ->type_name("UM")
-      ->check(CLI::Range(0.01, 1e6));
-  command->add_option("--out", options->out, "File to write")->type_name("PATH")->required();
-}
-
 }  // namespace
 
 void addDataCommands(CommandLine& line) {
   addSimulate(line);
   addTables(line);
   addImport(line);
-  addExport(line);
 }
 
 }  // namespace fieldtrue::cli

@@ -110,9 +110,12 @@ Outcome listFormats(const ListOptions&, const CommonOptions&) {
     exports.push_back({{"id", exporter.id},
                        {"label", exporter.label},
                        {"extension", exporter.extension},
-                       {"reads_it", exporter.reads_it}});
+                       {"reads_it", exporter.reads_it},
+                       {"content", exporter.in_words},
+                       {"may_be_inverse", exporter.may_be_inverse},
+                       {"has_free_pitch", exporter.has_free_pitch}});
     answer.text += "  " + exporter.id + "  " + exporter.label + " (" + exporter.extension + ")  read by " +
-                   exporter.reads_it + "\n";
+                   exporter.reads_it + "\n      " + exporter.in_words + "\n";
   }
   return answer;
 }

@@ -71,6 +71,8 @@ class Corrector {
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const;
   /// Inside the calibrated region, and covered by the method; otherwise the result is an extrapolation.
   bool covers(const Eigen::Vector3d& p_tracked_m) const;
+  /// Whether the position part can be evaluated there at all, inside the region or not.
+  bool reaches(const Eigen::Vector3d& p_tracked_m) const { return position_->covers(p_tracked_m); }
   Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
 
   /// The same calibration with its position part baked to a dense lattice: 64 coefficients a sample whatever the method

@@ -207,6 +207,19 @@ Result<void> writeFileAtomically(const std::filesystem::path& path, const std::f
   return writeAndRename(path, target.empty() ? path : target, write);
 }
 
+Result<void> replaceFileAtomically(const std::filesystem::path& path,
+                                   const std::function<Result<void>(const std::filesystem::path&)>& write) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return cannotWrite(path, "it is a folder");
+  const TemporaryFile temporary(path);
+  // Some libraries tell a folder that is not there, or a full disk, by nothing but a number.
+  if (const Descriptor descriptor(temporary.path(), O_WRONLY | O_CREAT | O_EXCL); !descriptor.valid())
+    return cannotWrite(path, reasonText(errno));
+  FT_TRY_VOID(write(temporary.path()));
+  FT_TRY(const auto content, readFile(temporary.path()));
+  return writeFileAtomically(path, [&content](std::ostream& out) { out << content; });
+}
+
 std::string formatNumber(double value) {
   if (std::isnan(value)) return "nan";
   std::array<char, 32> text;

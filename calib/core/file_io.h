@@ -21,6 +21,12 @@ Result<std::ifstream> openForReading(const std::filesystem::path& path);
 /// @error kIo with the system's reason (no such folder, no permission, no space left); the old file is untouched
 Result<void> writeFileAtomically(const std::filesystem::path& path, const std::function<void(std::ostream&)>& write);
 
+/// The same for libraries that write files by name: fills a file beside, which then takes the path's place.
+/// @param write fills the file of the name it is given, or says why it cannot
+/// @error of write; kIo as above
+Result<void> replaceFileAtomically(const std::filesystem::path& path,
+                                   const std::function<Result<void>(const std::filesystem::path&)>& write);
+
 /// Shortest text that reads back to the same double; "nan" for NaN.
 std::string formatNumber(double value);
 

@@ -14,6 +14,7 @@
 #include "calib/evaluation/base/figures.h"
 #include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/judged_calibration.h"
 #include "calib/evaluation/region/region_lattice.h"
 
 namespace fieldtrue::evaluation {
@@ -105,25 +106,6 @@ void measureOrientation(const Corrector& first, const Corrector& second, const s
   for (const Eigen::Quaterniond& turn : turns) angles_deg.push_back(kDegPerRad * angleBetween_rad(turn, shared));
   to.angle_rms_deg = rootMeanSquare(angles_deg);
   to.angle_max_deg = largest(angles_deg);
-}
-
-/// A calibration's method, judged on its own rows at places its fits did not see.
-Result<Comparison> heldOut(const Corrector& corrector, const RunControl& control) {
-  const calibration::CorrectorChoice& choice = corrector.choice();
-  FT_TRY(const MethodText method,
-         parseMethodText(correctors::methodText(choice.position_id, choice.position_settings)));
-  ComparisonOptions options;
-  options.position_methods = {method};
-  options.orientation_methods = {{"none", {}}};
-  options.align = corrector.align();
-  options.with_surroundings = false;
-  return compareMethods(corrector.table(), options, control);
-}
-
-const MethodScore* scoreOf(const Comparison& comparison, const Corrector& corrector) {
-  for (const MethodScore& score : comparison.position)
-    if (score.method == corrector.choice().position_id && !score.skipped) return &score;
-  return nullptr;
 }
 
 PlaceErrors placeErrors(std::vector<double> errors_mm, bool is_tuned) {
@@ -328,9 +310,9 @@ Result<CalibrationDifference> compareCalibrations(const Corrector& first, const 
   measureOrientation(first, second, points_m, difference);
   RunControl half = control;
   half.progress = [&](double fraction) { control.progress(0.5 * fraction); };
-  const Result<Comparison> of_first = heldOut(first, half);
+  const Result<Comparison> of_first = judgeCalibration(first, half);
   half.progress = [&](double fraction) { control.progress(0.5 + 0.5 * fraction); };
-  const Result<Comparison> of_second = heldOut(second, half);
+  const Result<Comparison> of_second = judgeCalibration(second, half);
   if (control.stop.stop_requested()) return comparisonStopped();
   const MethodScore* second_score = of_second ? scoreOf(*of_second, second) : nullptr;
   difference.first_own = ownErrors(of_first ? scoreOf(*of_first, first) : nullptr);

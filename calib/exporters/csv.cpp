@@ -78,9 +78,11 @@ std::string csvText(const calibration::Corrector& corrector) {
   return text;
 }
 
-Result<void> write(const calibration::Corrector& corrector, const std::filesystem::path& path) {
-  const std::string text = csvText(corrector);
-  return writeFileAtomically(path, [&](std::ostream& out) { out << text; });
+Result<Written> write(const ExportSubject& subject, const ExportOptions&, const std::filesystem::path& path,
+                      const RunControl&) {
+  const std::string text = csvText(subject.corrector());
+  FT_TRY_VOID(writeFileAtomically(path, [&](std::ostream& out) { out << text; }));
+  return Written{};
 }
 
 }  // namespace
@@ -90,6 +92,9 @@ Exporter csvExporter() {
           .label = "Node table (CSV)",
           .extension = ".csv",
           .reads_it = "spreadsheets, MATLAB, Python, R, and Fieldtrue itself",
+          .in_words = "metres; the places, measured, true and corrected, with their errors",
+          .purpose = Purpose::kNumbers,
+          .knows_pose = true,
           .write = write};
 }
 

@@ -3,8 +3,10 @@
 namespace fieldtrue::exporters {
 namespace {
 
-Result<void> write(const calibration::Corrector& corrector, const std::filesystem::path& path) {
-  return corrector.save(path);
+Result<Written> write(const ExportSubject& subject, const ExportOptions&, const std::filesystem::path& path,
+                      const RunControl&) {
+  FT_TRY_VOID(subject.corrector().save(path));
+  return Written{};
 }
 
 }  // namespace
@@ -13,7 +15,9 @@ Exporter ftcalExporter() {
   return {.id = "ftcal",
           .label = "Fieldtrue calibration",
           .extension = ".ftcal.json",
-          .reads_it = "Fieldtrue",
+          .reads_it = "Fieldtrue: apply, difference, the page Changes",
+          .in_words = "metres; everything that the calibration knows",
+          .knows_pose = true,
           .write = write};
 }
 

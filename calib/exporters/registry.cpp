@@ -1,7 +1,9 @@
 // To add an exporter:
 // 1. Write `calib/exporters/<id>.cpp` with one function that returns its row, declared in rows.h.
-// 2. State unit, frame, handedness, direction (measured to true), fit method, n, date and software in the file.
-// 3. Write with writeFileAtomically, numbers with formatNumber (no locale).
+// 2. State the subject's facts in the file: unit, frames, handedness, direction, methods, places, date, errors,
+// software.
+// 3. Write with writeFileAtomically, or replaceFileAtomically where a library wants a name; numbers with formatNumber
+//    (no locale), no time of writing. A lattice gives write and read to writeLattice or writeFixedLattice.
 // 4. Add the row below, in the order menus shall show it.
 // 5. Add to tests/calib/exporters/<id>_test.cpp a reading back by something other than the exporter. The contract test
 //    (written, not empty, same bytes twice, error on a folder that is not there) runs over every row by itself.
@@ -15,7 +17,12 @@
 namespace fieldtrue::exporters {
 
 std::span<const Exporter> exporters() {
-  static const std::vector<Exporter> rows = {ftcalExporter(), csvExporter()};
+  // Those for one purpose stand together.
+  static const std::vector<Exporter> rows = {
+      ftcalExporter(),       itkNrrdExporter(),      itkMhaExporter(),  itkTfmExporter(),    itkH5Exporter(),
+      vtkVtiExporter(),      vtkLandmarksExporter(), vtkVtpExporter(),  vruiGridExporter(),  vruiForwardGridExporter(),
+      csvExporter(),         latticeCsvExporter(),   numpyExporter(),   matlabExporter(),    polynomialJsonExporter(),
+      polynomialCExporter(), plusXmlExporter(),      vrpnCfgExporter(), caveTableExporter(), syzygyTableExporter()};
   return rows;
 }
 

@@ -16,7 +16,7 @@
 
 #include "calib/core/setup.h"
 #include "calib/core/thread_pool.h"
-#include "calib/exporters/exporter.h"
+#include "calib/exporters/export_calibration.h"
 #include "calib/exporters/registry.h"
 #include "calib/tables/table_io.h"
 #include "calib/tables/table_writer.h"
@@ -34,9 +34,34 @@ namespace {
 
 constexpr int kExportColumnWidth = 720;
 constexpr int kRowHeight = 36;
+constexpr int kMostRows = 12;
+constexpr int kGap = 24;
 constexpr double kLeastDeviation_mm = 0.001;
 constexpr double kUsualDeviation_mm = 0.05;
 constexpr double kMostDeviation_mm = 10.0;
+
+/// Heading of the formats for one purpose.
+QString sectionOf(exporters::Purpose purpose) {
+  switch (purpose) {
+    case exporters::Purpose::kFieldtrue:
+      return ExportPage::tr("For Fieldtrue");
+    case exporters::Purpose::kSlicer:
+      return ExportPage::tr("For 3D Slicer and ITK");
+    case exporters::Purpose::kParaView:
+      return ExportPage::tr("For ParaView and VTK");
+    case exporters::Purpose::kVrui:
+      return ExportPage::tr("For Vrui");
+    case exporters::Purpose::kNumbers:
+      return ExportPage::tr("For Python, MATLAB and spreadsheets");
+    case exporters::Purpose::kProgram:
+      return ExportPage::tr("For a program of your own");
+    case exporters::Purpose::kPeriod:
+      return ExportPage::tr("For CAVE software of its time");
+    case exporters::Purpose::kRigid:
+      return ExportPage::tr("For PLUS and VRPN: the rigid part");
+  }
+  return {};
+}
 
 Result<std::string> said(const Result<void>& written, const std::string& note = {}) {
   if (!written) return tl::unexpected(written.error());
@@ -78,8 +103,8 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   layout->addStretch(1);
   layout->addWidget(title);
   layout->addWidget(calibration_);
-  list_->setSizePolicy(QSizePolicy::Preferred, QSizePolicy::Fixed);
-  layout->addWidget(list_);
+  list_->setMaximumHeight(kMostRows * kRowHeight);
+  layout->addWidget(list_, kMostRows);
   layout->addWidget(about_);
   layout->addWidget(makeBake());
   layout->addLayout(row);
@@ -97,11 +122,7 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   page->setContentsMargins(0, 0, 0, 0);
   page->addWidget(stack_);
 
-  for (const Target& target : targets_) {
-    auto* item = new QListWidgetItem(QStringLiteral("%1   (%2)").arg(target.label, target.extension), list_);
-    item->setSizeHint(QSize(0, kRowHeight));
-  }
-  list_->setFixedHeight(static_cast<int>(targets_.size()) * kRowHeight + 4);
+  fillList();
   connect(list_, &QListWidget::currentRowChanged, this, &ExportPage::onTarget);
   connect(browse_button, &QPushButton::clicked, this, &ExportPage::browse);
   connect(write_, &QPushButton::clicked, this, &ExportPage::write);
@@ -111,12 +132,36 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   connect(&workbench_, &Workbench::comparisonChanged, this, [this] {
     if (stack_->currentIndex() == 1) showCalibration();
   });
-  list_->setCurrentRow(0);
+  list_->setCurrentItem(items_.front());
   onData();
+}
+
+void ExportPage::fillList() {
+  QString section;
+  for (std::size_t at = 0; at < targets_.size(); ++at) {
+    const Target& target = targets_[at];
+    if (target.section != section) {
+      section = target.section;
+      auto* heading = new QListWidgetItem(section, list_);
+      heading->setFlags(Qt::NoItemFlags);
+      heading->setSizeHint(QSize(0, kRowHeight));
+      QFont bold = list_->font();
+      bold.setBold(true);
+      heading->setFont(bold);
+    }
+    auto* item = new QListWidgetItem(QStringLiteral("    %1   (%2)").arg(target.label, target.extension), list_);
+    item->setSizeHint(QSize(0, kRowHeight));
+    item->setData(Qt::UserRole, static_cast<int>(at));
+    items_.push_back(item);
+  }
 }
 
 QWidget* ExportPage::makeBake() {
   bake_row_ = new QWidget(this);
+  pitch_ = new QLabel(tr("The lattice is off the method by at most"), bake_row_);
+  inverse_ = new QCheckBox(tr("True to measured, for programs that resample"), bake_row_);
+  inverse_->setObjectName(QStringLiteral("exportInverse"));
+  connect(inverse_, &QCheckBox::toggled, this, &ExportPage::onDirection);
   bake_ = new QCheckBox(tr("Bake to a lattice that is fast to evaluate, off the method by at most"), bake_row_);
   bake_->setObjectName(QStringLiteral("exportBake"));
   deviation_ = new NumberBox(bake_row_);
@@ -127,51 +172,76 @@ QWidget* ExportPage::makeBake() {
   deviation_->setValue(kUsualDeviation_mm);
   deviation_->setStepType(QAbstractSpinBox::AdaptiveDecimalStepType);
   deviation_->setSuffix(tr(" mm"));
-  deviation_->setEnabled(false);
-  connect(bake_, &QCheckBox::toggled, deviation_, &QWidget::setEnabled);
+  connect(bake_, &QCheckBox::toggled, this, [this](bool on) { deviation_->setEnabled(on || pitch_->isVisible()); });
   auto* row = new QHBoxLayout(bake_row_);
   row->setContentsMargins(0, 0, 0, 0);
   row->addWidget(bake_);
+  row->addWidget(pitch_);
   row->addWidget(deviation_);
+  row->addSpacing(kGap);
+  row->addWidget(inverse_);
   row->addStretch(1);
   return bake_row_;
 }
 
-ExportPage::Writing ExportPage::calibrationWriter(Result<void> (*exporter)(const calibration::Corrector&,
-                                                                           const std::filesystem::path&)) const {
-  const bool bake = bake_->isChecked() && !workbench_.corrector()->isBaked();
+ExportPage::Writing ExportPage::calibrationWriter(const exporters::Exporter& exporter) const {
+  const bool bake = exporter.knows_pose && bake_->isChecked() && !workbench_.corrector()->isBaked();
   const double deviation_m = deviation_->value() / 1000.0;
-  return [corrector = *workbench_.corrector(), exporter, bake, deviation_m](const std::string& path) {
+  exporters::ExportOptions options;
+  options.name = QFileInfo(workbench_.sessionPath()).completeBaseName().toStdString();
+  options.mean_orientation = true;
+  options.held_out = heldOutError();
+  if (exporter.has_free_pitch) options.max_deviation_m = deviation_m;
+  if (exporter.may_be_inverse && inverse_->isChecked()) options.direction = exporters::Direction::kTrueToMeasured;
+  return [corrector = *workbench_.corrector(), exporter = &exporter, bake, deviation_m,
+          options](const std::string& path) -> Result<std::string> {
     RunControl control;
     control.parallel_for = threadedFor(0);
     const Result<calibration::Corrector> written =
         bake ? corrector.baked(deviation_m, control) : Result<calibration::Corrector>(corrector);
-    if (!written) return Result<std::string>(tl::unexpected(written.error()));
-    return said(exporter(*written, path), bake ? written->report().notes.back() : std::string());
+    if (!written) return tl::unexpected(written.error());
+    FT_TRY(const auto done, exporters::exportCalibration(*exporter, *written, options, path, control));
+    std::string note = bake ? written->report().notes.back() : std::string();
+    for (const std::string& one : done.notes) note += (note.empty() ? "" : " ") + one;
+    return note;
   };
+}
+
+/// Of the method that is written, if the comparison on screen judged it.
+std::optional<exporters::HeldOutError> ExportPage::heldOutError() const {
+  if (!workbench_.comparison() || !workbench_.correctorIsCurrent()) return std::nullopt;
+  const calibration::CorrectorChoice& choice = workbench_.corrector()->choice();
+  for (const evaluation::MethodScore& score : workbench_.comparison()->position)
+    if (score.method == choice.position_id && score.settings == choice.position_settings && !score.skipped)
+      return exporters::HeldOutError{score.stats.rms / 1000.0, toText(workbench_.comparison()->validation)};
+  return std::nullopt;
 }
 
 void ExportPage::fillTargets() {
   for (const exporters::Exporter& exporter : exporters::exporters())
     targets_.push_back({QString::fromStdString(exporter.id), QString::fromStdString(exporter.label),
-                        QString::fromStdString(exporter.extension), QString::fromStdString(exporter.reads_it), true,
-                        [this, write = exporter.write] { return calibrationWriter(write); }});
+                        QString::fromStdString(exporter.extension),
+                        tr("For %1. In the file: %2.")
+                            .arg(QString::fromStdString(exporter.reads_it), QString::fromStdString(exporter.in_words)),
+                        sectionOf(exporter.purpose), &exporter,
+                        [this, &exporter] { return calibrationWriter(exporter); }});
   targets_.push_back({QStringLiteral("nodes"), tr("Node table"), QStringLiteral(".nodes.csv"),
-                      tr("One row per place: what the rig says and what the tracker said."), false, [this] {
+                      tr("One row per place: what the rig says and what the tracker said."), tr("Recording and report"),
+                      nullptr, [this] {
                         return [table = workbench_.recordedTable()](const std::string& path) {
                           return said(writeNodeTable(std::filesystem::path(path), table));
                         };
                       }});
   targets_.push_back({QStringLiteral("samples"), tr("Raw samples"), QStringLiteral(".samples.csv"),
-                      tr("Every reading that was taken at the places."), false, [this] {
+                      tr("Every reading that was taken at the places."), tr("Recording and report"), nullptr, [this] {
                         return [samples = workbench_.samples()](const std::string& path) {
                           return said(writeSampleTable(std::filesystem::path(path), samples));
                         };
                       }});
   targets_.push_back(
       {QStringLiteral("report"), tr("Report"), QStringLiteral(".html"),
-       tr("One page with pictures, the method table, the verdict and where it all came from; any browser."), false,
-       [this] {
+       tr("One page with pictures, the method table, the verdict and where it all came from; any browser."),
+       tr("Recording and report"), nullptr, [this] {
          return [input = reportInput()](const std::string& path) { return said(writeHtmlReport(input, path)); };
        }});
 }
@@ -244,31 +314,47 @@ void ExportPage::showCalibration() {
            "it cannot be written. Fit a method on the compare page."));
   }
   for (std::size_t row = 0; row < targets_.size(); ++row) {
-    QListWidgetItem* item = list_->item(static_cast<int>(row));
-    const bool offered = corrects || !targets_[row].is_calibration;
+    QListWidgetItem* item = items_[row];
+    const bool offered = corrects || !targets_[row].exporter;
     item->setFlags(offered ? item->flags() | Qt::ItemIsEnabled : item->flags() & ~Qt::ItemIsEnabled);
-    if (offered && (!chosen() || !(list_->currentItem()->flags() & Qt::ItemIsEnabled)))
-      list_->setCurrentRow(static_cast<int>(row));
+    if (offered && (!chosen() || !(list_->currentItem()->flags() & Qt::ItemIsEnabled))) list_->setCurrentItem(item);
   }
 }
 
 const ExportPage::Target* ExportPage::chosen() const {
-  const int row = list_->currentRow();
-  return row < 0 ? nullptr : &targets_[static_cast<std::size_t>(row)];
+  const QListWidgetItem* item = list_->currentItem();
+  if (item == nullptr || !item->data(Qt::UserRole).isValid()) return nullptr;
+  return &targets_[static_cast<std::size_t>(item->data(Qt::UserRole).toInt())];
 }
 
 QString ExportPage::suggestedPath(const Target& target) const {
   const QFileInfo session(workbench_.sessionPath());
-  return session.absolutePath() + QLatin1Char('/') + session.completeBaseName() + target.extension;
+  QString name = session.completeBaseName();
+  if (target.exporter && target.exporter->purpose != exporters::Purpose::kFieldtrue && !target.exporter->knows_pose)
+    name += inverse_->isVisibleTo(bake_row_) && inverse_->isChecked() ? QStringLiteral("_true-to-measured")
+                                                                      : QStringLiteral("_measured-to-true");
+  return session.absolutePath() + QLatin1Char('/') + name + target.extension;
 }
 
 void ExportPage::onTarget() {
   const Target* target = chosen();
   if (!target) return;
   about_->setText(target->reads_it);
-  bake_row_->setVisible(target->is_calibration);
-  bake_row_->setEnabled(workbench_.corrector() && !workbench_.corrector()->isBaked());
+  const exporters::Exporter* exporter = target->exporter;
+  const bool is_lattice = exporter && exporter->has_free_pitch;
+  const bool can_be_baked = exporter && exporter->knows_pose;
+  bake_row_->setVisible(is_lattice || can_be_baked || (exporter && exporter->may_be_inverse));
+  bake_->setVisible(can_be_baked);
+  bake_->setEnabled(workbench_.corrector() && !workbench_.corrector()->isBaked());
+  pitch_->setVisible(is_lattice);
+  deviation_->setVisible(is_lattice || can_be_baked);
+  deviation_->setEnabled(is_lattice || (can_be_baked && bake_->isEnabled() && bake_->isChecked()));
+  inverse_->setVisible(exporter && exporter->may_be_inverse);
   path_->setText(suggestedPath(*target));
+}
+
+void ExportPage::onDirection() {
+  if (const Target* target = chosen()) path_->setText(suggestedPath(*target));
 }
 
 void ExportPage::browse() {
@@ -285,7 +371,7 @@ void ExportPage::write() {
   const Target* target = chosen();
   const QString path = path_->text();
   if (!target || path.isEmpty()) return;
-  if (target->is_calibration && !workbench_.correctorCorrects()) return;
+  if (target->exporter && !workbench_.correctorCorrects()) return;
   if (target->id == QLatin1String("report") && !workbench_.comparisonIsCurrent()) {
     workbench_.showMessage({tr("The report shows the comparison; compare the methods first."), Severity::kAttention,
                             tr("Compare"), [this] { workbench_.goToPage(QStringLiteral("compare")); }});

@@ -2,6 +2,7 @@
 
 #include <QWidget>
 
+#include "calib/exporters/exporter.h"
 #include "widgets/report/report.h"
 #include "widgets/workbench/workbench.h"
 
@@ -9,6 +10,7 @@ class QCheckBox;
 class QDoubleSpinBox;
 class QLabel;
 class QListWidget;
+class QListWidgetItem;
 class QLineEdit;
 class QPushButton;
 class QStackedWidget;
@@ -29,16 +31,19 @@ class ExportPage : public QWidget {
     QString label;
     QString extension;
     QString reads_it;
-    bool is_calibration = false;  ///< Can be baked.
+    QString section;                                ///< The heading it stands under.
+    const exporters::Exporter* exporter = nullptr;  ///< Of a calibration's format.
     /// Copies what is needed in the window's thread and returns the writing itself, which runs beside it and answers
     /// with what is to be said of it.
     std::function<Writing()> prepare;
   };
   void fillTargets();
+  void fillList();
   QWidget* makeBake();
-  Writing calibrationWriter(Result<void> (*exporter)(const calibration::Corrector&,
-                                                     const std::filesystem::path&)) const;
+  Writing calibrationWriter(const exporters::Exporter& exporter) const;
+  std::optional<exporters::HeldOutError> heldOutError() const;
   void onTarget();
+  void onDirection();
   void onData();
   void showCalibration();
   /// What the comparison says of the calibration; empty where there is none of the present places.
@@ -53,12 +58,15 @@ class ExportPage : public QWidget {
 
   Workbench& workbench_;
   std::vector<Target> targets_;
+  std::vector<QListWidgetItem*> items_;  ///< Of each target.
   QStackedWidget* stack_;
   QListWidget* list_;
   QLabel* about_;
   QLabel* calibration_;
   QWidget* bake_row_;
   QCheckBox* bake_;
+  QCheckBox* inverse_;
+  QLabel* pitch_;
   QDoubleSpinBox* deviation_;
   QLineEdit* path_;
   QString replaceable_;  ///< A file that may be written over: the person was asked, or it was written from here.

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "calib/calibration/alignment.h"
+#include "calib/exporters/export_calibration.h"
 #include "calib/exporters/registry.h"
 #include "calib/tables/table_io.h"
 #include "tests/support/matchers.h"
@@ -84,7 +85,7 @@ class CsvTest : public QObject {
             .value();
     QTemporaryDir folder;
     const std::filesystem::path path = std::filesystem::path(folder.path().toStdString()) / "out.csv";
-    FT_VERIFY_OK(findExporter("csv").value()->write(corrector, path));
+    FT_VERIFY_OK(exportCalibration(*findExporter("csv").value(), corrector, {}, path, {}));
     const PlainCsv csv = readPlain(path);
     QCOMPARE(csv.rows.size(), table.nodes.size());
     double before_squares_m2 = 0.0;
@@ -123,7 +124,7 @@ class CsvTest : public QObject {
             .value();
     QTemporaryDir folder;
     const std::filesystem::path path = std::filesystem::path(folder.path().toStdString()) / "out.csv";
-    FT_VERIFY_OK(findExporter("csv").value()->write(corrector, path));
+    FT_VERIFY_OK(exportCalibration(*findExporter("csv").value(), corrector, {}, path, {}));
     std::string head;
     for (const std::string& comment : readPlain(path).comments) head += comment + "\n";
     FT_VERIFY_MATCH(holdsAll(head, {"# unit: metres", "# direction: measured", "true", "# frame: jig",
@@ -140,7 +141,7 @@ class CsvTest : public QObject {
             .value();
     QTemporaryDir folder;
     const std::filesystem::path path = std::filesystem::path(folder.path().toStdString()) / "out.csv";
-    FT_VERIFY_OK(findExporter("csv").value()->write(corrector, path));
+    FT_VERIFY_OK(exportCalibration(*findExporter("csv").value(), corrector, {}, path, {}));
     const auto reading = readNodeTable(path);
     FT_VERIFY_OK(reading);
     QCOMPARE(reading->table.nodes.size(), table.nodes.size());

@@ -426,6 +426,8 @@ void GuidedSessionTest::fitsAndExports() {
   auto* list = find<QListWidget>("exportList");
   auto* path = find<QLineEdit>("exportPath");
   for (int row = 0; row < list->count(); ++row) {
+    if (!(list->item(row)->flags() & Qt::ItemIsEnabled)) continue;                // A heading.
+    if (list->item(row)->text().contains(QStringLiteral("olynomial"))) continue;  // Of another method's calibration.
     list->setCurrentRow(row);
     const QString target = folder_.filePath(QStringLiteral("out%1").arg(row));
     QTest::keyClick(path, Qt::Key_A, Qt::ControlModifier);
