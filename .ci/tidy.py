@@ -23,6 +23,7 @@ import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 BUILD = os.path.join(ROOT, "build", "tidy")
+GNU_ONLY = {os.path.join("tests", "exporters", "itk_points.cpp")}  # Debian's headers of ITK refuse every other compiler.
 
 
 def prepared():
@@ -31,7 +32,8 @@ def prepared():
         subprocess.run(["cmake", "--preset", "tidy"], cwd=ROOT, stdout=subprocess.DEVNULL, check=True)
     with open(os.path.join(BUILD, "compile_commands.json"), encoding="utf-8") as commands:
         files = {os.path.relpath(one["file"], ROOT): one["command"] for one in json.load(commands)}
-    return {file: files[file] for file in files if file.endswith(".cpp") and not file.startswith(("build", ".."))}
+    return {file: files[file] for file in files if file.endswith(".cpp") and not file.startswith(("build", ".."))
+            and file not in GNU_ONLY}
 
 
 def stand_in_for_moc(file, command):

@@ -22,7 +22,8 @@ Result<void> writeMha(const LatticeField& field, const Facts& facts, const std::
           std::to_string(itk.size[2]) + "\n";
   // Fields of our own, which ITK keeps among the image's metadata; its comment holds 255 letters only.
   for (const auto& [key, value] : itkFacts(facts)) {
-    std::string line = "Fieldtrue_" + key + " = " + value;
+    std::string line = "Fieldtrue_";
+    line.append(key).append(" = ").append(value);
     std::replace(line.begin(), line.end(), '\n', ' ');
     head += line;
     head += '\n';

@@ -142,7 +142,8 @@ std::string cText(const ExportSubject& subject, const WrittenOut& out) {
     for (int power = 2; power <= out.degree; ++power) {
       const std::string u = "u" + std::to_string(axis);
       const std::string below = power == 2 ? u : u + "_" + std::to_string(power - 1);
-      text += "  const double " + u + "_" + std::to_string(power) + " = " + below + " * " + u + ";\n";
+      text.append("  const double ").append(u).append("_").append(std::to_string(power));
+      text.append(" = ").append(below).append(" * ").append(u).append(";\n");
     }
   const auto factor = [](std::size_t axis, int power) {
     std::string name = "u" + std::to_string(axis);
