@@ -37,7 +37,14 @@ Result<Written> exportCalibration(const Exporter& exporter, const calibration::C
                     " mm with how the sensor is turned, and format " + exporter.id +
                     " knows positions only: choose --orientation mean, or the orientation that counts as --orientation "
                     "qw,qx,qy,qz");
-  return exporter.write(subject, options, path, control);
+  FT_TRY(auto written, exporter.write(subject, options, path, control));
+  if (!exporter.knows_pose && corrector.takesOrientation())
+    written.notes.push_back((options.orientation && !options.mean_orientation
+                                 ? std::string("Written at one orientation")
+                                 : std::string("Written as the mean over the orientations fitted")) +
+                            ": over those seen the correction moves by up to " +
+                            shortNumber(1000.0 * subject.changeWithOrientation_m()) + " mm.");
+  return written;
 }
 
 }  // namespace fieldtrue::exporters
