@@ -72,6 +72,11 @@ std::string plainName(const std::string& path) {
   return name;
 }
 
+std::string contentOf(const exporters::Exporter& exporter, const exporters::ExportOptions& options) {
+  if (options.direction == exporters::Direction::kMeasuredToTrue) return exporter.in_words;
+  return "true to measured, the inverse of: " + exporter.in_words;
+}
+
 Outcome runExport(const ExportArguments& arguments, const CommonOptions& common) {
   const auto exporter = exporters::findExporter(arguments.format);
   if (!exporter) return wrongUsage(exporter.error());
@@ -105,7 +110,7 @@ Outcome runExport(const ExportArguments& arguments, const CommonOptions& common)
   answer.json = {{"file", path.string()},
                  {"format", (*exporter)->id},
                  {"direction", exporters::directionText(options.direction)},
-                 {"content", (*exporter)->in_words},
+                 {"content", contentOf(**exporter, options)},
                  {"notes", written->notes},
                  {"deviation", nullptr},
                  {"held_out_rms_mm", nullptr}};
@@ -115,7 +120,7 @@ Outcome runExport(const ExportArguments& arguments, const CommonOptions& common)
                                 {"points", written->deviation->n_points}};
   if (options.held_out) answer.json["held_out_rms_mm"] = 1000.0 * options.held_out->rms_m;
   answer.text = (*exporter)->label + " written to " + path.string() + "\n";
-  answer.text += "  " + (*exporter)->in_words + "\n";
+  answer.text += "  " + contentOf(**exporter, options) + "\n";
   for (const std::string& note : written->notes) answer.text.append("  ").append(note).append("\n");
   return answer;
 }
