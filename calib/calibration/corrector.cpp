@@ -79,27 +79,29 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   FT_TRY(const auto position_method, correctors::findPositionMethod(choice.position_id));
   FT_TRY(const auto orientation_method, correctors::findOrientationMethod(choice.orientation_id));
 
-  Corrector corrector;
-  corrector.choice_ = choice;
-  corrector.align_ = align;
-  corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
-  corrector.setup_ = setupOf(corrector.table_);
+  Parts parts;
   if (align == AlignMode::kRigid) {
     FT_TRY(auto alignment, fitAlignment(nodes));
-    corrector.alignment_ = alignment;
+    parts.alignment = alignment;
   }
-  const correctors::FitData data = makeFitData(nodes, metadata, corrector.alignment_);
+  const correctors::FitData data = makeFitData(nodes, metadata, parts.alignment);
   FT_TRY_VOID(correctors::checkPositions(data, "A calibration"));
 
   FT_TRY(auto position, position_method->fit(data, choice.position_settings, control));
   FT_TRY(auto orientation, orientation_method->fit(data, choice.orientation_settings, control));
-  corrector.position_ = std::move(position);
-  corrector.orientation_ = std::move(orientation);
-  corrector.region_ = Region::around(data.p_tracked_m, data.dimension,
-                                     kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
+  parts.position = std::move(position);
+  parts.orientation = std::move(orientation);
+  parts.region = Region::around(data.p_tracked_m, data.dimension,
+                                kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
+
+  Corrector corrector(std::move(parts));
+  corrector.choice_ = choice;
+  corrector.align_ = align;
+  corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
+  corrector.setup_ = setupOf(corrector.table_);
   corrector.report_ = reportOf(nodes, corrector);
   for (const std::string& note : {orientationNote(nodes), correctors::planeNote(data, "nothing is claimed off it"),
-                                  corrector.position_->note(), corrector.orientation_->note()}) {
+                                  corrector.parts().position->note(), corrector.parts().orientation->note()}) {
     std::vector<std::string>& notes = corrector.report_.notes;
     if (!note.empty() && std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
   }
@@ -109,76 +111,27 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
 Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& control) const {
   if (!(max_deviation_m > 0.0) || !std::isfinite(max_deviation_m))
     return fail(ErrorCode::kBadInput, "A lattice needs a largest deviation above 0 to be baked to");
-  if (is_baked_)
+  if (isBaked())
     return fail(ErrorCode::kUnsupported,
                 "This calibration is baked already; bake anew from the one that was fitted, or fit it again");
   std::vector<Eigen::Vector3d> places_m;
   for (const Node& node : table_.nodes) places_m.push_back(node.tracker_from_sensor.position_m);
-  FT_TRY(auto lattice, correctors::bakeLattice(*position_, region_, places_m, max_deviation_m, control));
-  Corrector corrector = *this;
-  corrector.is_baked_ = true;
-  corrector.position_ = std::move(lattice);
+  FT_TRY(auto lattice, correctors::bakeLattice(*parts().position, region(), places_m, max_deviation_m, control));
+  Parts baked_parts = parts();
+  baked_parts.is_baked = true;
+  baked_parts.position = std::move(lattice);
+  Corrector corrector(std::move(baked_parts));
+  corrector.choice_ = choice_;
+  corrector.align_ = align_;
+  corrector.table_ = table_;
+  corrector.setup_ = setup_;
   corrector.report_ = reportOf(table_.nodes, corrector);
   corrector.report_.notes = report_.notes;
-  corrector.report_.notes.push_back(corrector.position_->note());
-  if (position_->takesOrientation())
+  corrector.report_.notes.push_back(corrector.parts().position->note());
+  if (takesOrientation())
     corrector.report_.notes.push_back("Baked as the mean over the " + std::to_string(orientationsSeen().size()) +
                                       " orientations it was fitted on: a lattice takes no orientation.");
   return corrector;
-}
-
-Pose Corrector::correct(const Pose& tracker_from_sensor, std::optional<int> sensor) const {
-  const Eigen::Vector3d& p_tracked_m = tracker_from_sensor.position_m;
-  Pose corrected;
-  corrected.position_m = p_tracked_m;
-  if (position_->covers(p_tracked_m)) corrected.position_m += position_->displacementAt_m(tracker_from_sensor);
-  corrected.position_m = alignment_.reference_from_tracker * corrected.position_m;
-  const Eigen::Quaterniond q_true = orientation_->covers(p_tracked_m)
-                                        ? orientation_->correct(p_tracked_m, tracker_from_sensor.orientation)
-                                        : tracker_from_sensor.orientation;
-  corrected.orientation = alignment_.reference_from_tracker.orientation * q_true * alignment_.mountOf(sensor);
-  return corrected;
-}
-
-void Corrector::correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
-                        std::span<const std::optional<int>> sensors) const {
-  FT_CHECK(tracker_from_sensor.size() == reference_from_sensor.size());
-  FT_CHECK(sensors.empty() || sensors.size() == tracker_from_sensor.size());
-  std::vector<Eigen::Vector3d> p_m;
-  std::vector<std::size_t> covered;
-  for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
-    if (!position_->covers(tracker_from_sensor[i].position_m)) continue;
-    covered.push_back(i);
-    p_m.push_back(tracker_from_sensor[i].position_m);
-  }
-  if (position_->takesOrientation()) {
-    for (std::size_t i = 0; i < covered.size(); ++i)
-      p_m[i] += position_->displacementAt_m(tracker_from_sensor[covered[i]]);
-  } else {
-    position_->correct(p_m, p_m);
-  }
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
-    const Pose& tracked = tracker_from_sensor[i];
-    const bool is_covered = next < covered.size() && covered[next] == i;
-    const Eigen::Vector3d p_true_m = is_covered ? p_m[next++] : tracked.position_m;
-    const Eigen::Quaterniond q_true = orientation_->covers(tracked.position_m)
-                                          ? orientation_->correct(tracked.position_m, tracked.orientation)
-                                          : tracked.orientation;
-    reference_from_sensor[i].position_m = alignment_.reference_from_tracker * p_true_m;
-    reference_from_sensor[i].orientation = alignment_.reference_from_tracker.orientation * q_true *
-                                           alignment_.mountOf(sensors.empty() ? std::nullopt : sensors[i]);
-  }
-}
-
-Eigen::Vector3d Corrector::correctPosition_m(const Eigen::Vector3d& p_tracked_m) const {
-  if (!position_->covers(p_tracked_m)) return alignment_.reference_from_tracker * p_tracked_m;
-  const Eigen::Vector3d p_true_m = p_tracked_m + position_->displacement_m(p_tracked_m);
-  return alignment_.reference_from_tracker * p_true_m;
-}
-
-std::optional<double> Corrector::uncertainty_m(const Eigen::Vector3d& p_tracked_m) const {
-  return position_->covers(p_tracked_m) ? position_->uncertainty_m(p_tracked_m) : std::nullopt;
 }
 
 std::vector<Eigen::Quaterniond> Corrector::orientationsSeen() const {
@@ -186,20 +139,6 @@ std::vector<Eigen::Quaterniond> Corrector::orientationsSeen() const {
   for (const Node& node : table_.nodes)
     if (node.has_orientation) orientations.push_back(node.tracker_from_sensor.orientation);
   return distinctRotations(orientations, correctors::kSameOrientation_rad);
-}
-
-std::optional<double> Corrector::uncertaintyAt_m(const Pose& tracker_from_sensor) const {
-  return position_->covers(tracker_from_sensor.position_m) ? position_->uncertaintyAt_m(tracker_from_sensor)
-                                                           : std::nullopt;
-}
-
-bool Corrector::covers(const Eigen::Vector3d& p_tracked_m) const {
-  return region_.contains(p_tracked_m) && position_->covers(p_tracked_m);
-}
-
-Eigen::Matrix3d Corrector::jacobian(const Eigen::Vector3d& p_tracked_m) const {
-  const Eigen::Matrix3d rotation = alignment_.reference_from_tracker.orientation.toRotationMatrix();
-  return position_->covers(p_tracked_m) ? Eigen::Matrix3d(rotation * position_->jacobian(p_tracked_m)) : rotation;
 }
 
 }  // namespace fieldtrue::calibration

@@ -1,22 +1,19 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/evaluator.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
-#include "calib/core/geometry.h"
 #include "calib/core/run_control.h"
 #include "calib/core/settings.h"
 #include "calib/core/setup.h"
 #include "calib/correctors/base/fit_data.h"
-#include "calib/correctors/base/orientation_model.h"
-#include "calib/correctors/base/position_model.h"
 
 namespace fieldtrue::calibration {
 
@@ -42,38 +39,18 @@ struct FitReport {
   std::vector<std::string> notes;
 };
 
-/// A fitted calibration: alignment, position part and orientation part, the region it holds in, and where it came from.
-/// Immutable; copies share the models.
-class Corrector {
+/// A fitted calibration: what applies it, and where it came from. Immutable; copies share the models.
+class Corrector : public Evaluator {
  public:
   /// Fits on the rows given (the caller leaves out skipped and held-out rows).
   /// @error as the methods' fits
   static Result<Corrector> fit(std::span<const Node> nodes, const TableMetadata& metadata,
                                const CorrectorChoice& choice, AlignMode align, const RunControl& control = {});
 
-  /// reference_from_sensor of a tracked pose. Where a part does not cover the position, only the alignment is applied.
-  /// @param sensor whose mounting counts, where several were fitted
-  Pose correct(const Pose& tracker_from_sensor, std::optional<int> sensor = {}) const;
-  /// @param sensors of each pose; empty where they are not told
-  void correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
-               std::span<const std::optional<int>> sensors = {}) const;
-  /// Where the position part takes orientation: the mean over the orientations that were fitted.
-  Eigen::Vector3d correctPosition_m(const Eigen::Vector3d& p_tracked_m) const;
-  /// Whether the position part is a function of the tracked pose, not of position alone.
-  bool takesOrientation() const { return position_->takesOrientation(); }
   /// The distinct orientations it was fitted on, tracker_from_sensor: none within 5 degrees of another.
   std::vector<Eigen::Quaterniond> orientationsSeen() const;
   /// What it is good for, as far as its table stated it.
   const Setup& setup() const { return setup_; }
-
-  /// SD of the corrected position [m]; at a pose, or for any of the orientations that were fitted.
-  std::optional<double> uncertaintyAt_m(const Pose& tracker_from_sensor) const;
-  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const;
-  /// Inside the calibrated region, and covered by the method; otherwise the result is an extrapolation.
-  bool covers(const Eigen::Vector3d& p_tracked_m) const;
-  /// Whether the position part can be evaluated there at all, inside the region or not.
-  bool reaches(const Eigen::Vector3d& p_tracked_m) const { return position_->covers(p_tracked_m); }
-  Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
 
   /// The same calibration with its position part baked to a dense lattice: 64 coefficients a sample whatever the method
   /// was, and it needs nothing else. Covers what it covered, up to a cell more at holes and edges of a local method.
@@ -82,12 +59,9 @@ class Corrector {
   /// @error kBadInput for a bound that is not positive; kUnsupported when baked already, or when no lattice within the
   ///        memory allowed stays within the bound; kDegenerate without a region; kCancelled
   Result<Corrector> baked(double max_deviation_m, const RunControl& control = {}) const;
-  bool isBaked() const { return is_baked_; }
 
   const CorrectorChoice& choice() const { return choice_; }
   AlignMode align() const { return align_; }
-  const Alignment& alignment() const { return alignment_; }
-  const Region& region() const { return region_; }
   const FitReport& report() const { return report_; }
   const CalibrationTable& table() const { return table_; }  ///< The rows it was fitted on, with their metadata.
 
@@ -99,16 +73,11 @@ class Corrector {
   static Result<Corrector> fromText(const std::string& text, const std::string& name);
 
  private:
-  Corrector() = default;
+  using Evaluator::Evaluator;
   static Corrector fromJson(const JsonReader& content);
 
   CorrectorChoice choice_;
   AlignMode align_ = AlignMode::kNone;
-  Alignment alignment_;
-  std::shared_ptr<const correctors::PositionModel> position_;
-  bool is_baked_ = false;  ///< position_ is a lattice, not the method's own model.
-  std::shared_ptr<const correctors::OrientationModel> orientation_;
-  Region region_;
   FitReport report_;
   CalibrationTable table_;
   Setup setup_;

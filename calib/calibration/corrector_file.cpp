@@ -1,14 +1,12 @@
-#include <charconv>
 #include <limits>
-#include <type_traits>
+#include <utility>
 
 #include "calib/calibration/alignment.h"
-#include "calib/calibration/checksum.h"
+#include "calib/calibration/calibration_envelope.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/file_io.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/json_text.h"
-#include "calib/correctors/baked/baked_lattice.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "calib/tables/table_json.h"
@@ -18,21 +16,6 @@ namespace fieldtrue::calibration {
 namespace {
 
 using nlohmann::json;
-
-constexpr std::string_view kSchemaName = "fieldtrue.ftcal/";
-/// Version 2 has `baked` in place of the position part's `parameters`, or a position part that takes the whole pose.
-/// What version 1 could hold is still written as version 1.
-constexpr int kSchemaVersion = 2;
-constexpr std::string_view kChecksumKind = "fnv1a64:";
-
-/// Metadata may hold bytes that are not UTF-8; they become replacement characters rather than an exception.
-std::string compactText(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
-
-/// Of the content without the checksum itself: keys sorted, no white space, so that re-indenting a file does no harm.
-std::string checksumOf(json content) {
-  content.erase("checksum");
-  return std::string(kChecksumKind) + fnv1a64(compactText(content));
-}
 
 json reportToJson(const FitReport& report) {
   json to = {{"n_nodes", report.n_nodes},
@@ -55,33 +38,18 @@ FitReport reportFrom(const JsonReader& from) {
   return report;
 }
 
-/// A method's id and settings, and the model rebuilt from its parameters.
+/// A method's id and settings.
 template <class Model>
-struct LoadedPart {
-  std::string id;
-  Settings settings;
-  bool is_baked = false;
-  std::shared_ptr<const Model> model;
-};
-
-template <class Model>
-LoadedPart<Model> partFrom(const JsonReader& part,
-                           Result<const correctors::CorrectionMethod<Model>*> (*find)(std::string_view)) {
-  LoadedPart<Model> loaded;
-  loaded.id = part["method"].text();
-  const correctors::CorrectionMethod<Model>& method = *part["method"].valueOf(find(loaded.id));
+std::pair<std::string, Settings> methodFrom(
+    const JsonReader& part, Result<const correctors::CorrectionMethod<Model>*> (*find)(std::string_view)) {
+  const std::string id = part["method"].text();
+  const correctors::CorrectionMethod<Model>& method = *part["method"].valueOf(find(id));
   // A setting that came to the method after the file was written stands at its default, as it did without it.
   const JsonReader settings = part["settings"];
   json stored_settings = settings.object();
-  const json defaults = toJson(resolveSettings(loaded.id, method.settings, {}).value());
+  const json defaults = toJson(resolveSettings(id, method.settings, {}).value());
   for (const auto& [key, value] : defaults.items()) stored_settings.emplace(key, value);
-  loaded.settings = settings.valueOf(settingsFromJson(loaded.id, method.settings, stored_settings));
-  if constexpr (std::is_same_v<Model, correctors::PositionModel>) {
-    loaded.is_baked = part.has("baked");
-    if (loaded.is_baked) loaded.model = correctors::BakedLattice::fromJson(part["baked"]);
-  }
-  if (!loaded.is_baked) loaded.model = method.read(part["parameters"]);
-  return loaded;
+  return {id, settings.valueOf(settingsFromJson(id, method.settings, stored_settings))};
 }
 
 /// Every fact, null where it is not stated.
@@ -94,54 +62,36 @@ json setupToJson(const Setup& setup) {
   return to;
 }
 
-/// A key of the mountings: the sensor's number.
-int sensorFrom(const JsonReader& mounts, const std::string& key) {
-  int sensor = 0;
-  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), sensor);
-  if (error != std::errc() || end != key.data() + key.size())
-    mounts.fail("has the key '" + key + "', which is not a sensor's number");
-  return sensor;
-}
-
-/// Schema and checksum: whether this is a whole calibration file that this version can read.
-void checkEnvelope(const JsonReader& content) {
-  if (!content.schema(kSchemaName, kSchemaVersion, "a Fieldtrue calibration"))
-    content.fail("is not a Fieldtrue calibration; it needs the key schema with \"" + std::string(kSchemaName) +
-                 std::to_string(kSchemaVersion) + "\".");
-  if (const auto checksum = content.find("checksum"); !checksum || checksum->raw() != checksumOf(content.raw()))
-    content.fail("is damaged: its content does not match its checksum; export the calibration again.");
-}
-
 }  // namespace
 
 std::string Corrector::toText() const {
   json orientations = json::array();
   for (const Eigen::Quaterniond& q : orientationsSeen()) orientations.push_back(jsonOf(q));
   json content = {
-      {"schema", std::string(kSchemaName) + std::to_string(is_baked_ || takesOrientation() ? kSchemaVersion : 1)},
+      {"schema", calibrationSchema(isBaked() || takesOrientation())},
       {"software", "Fieldtrue " FIELDTRUE_VERSION},
       {"direction", "tracker_from_sensor as tracked -> reference_from_sensor as corrected"},
       {"units", "m, rad; quaternions w x y z"},
       {"align", align_ == AlignMode::kRigid ? "rigid" : "none"},
       {"alignment",
-       {{"reference_from_tracker", jsonOf(alignment_.reference_from_tracker)},
-        {"sensor_from_mount_wxyz", jsonOf(alignment_.sensor_from_mount)}}},
+       {{"reference_from_tracker", jsonOf(alignment().reference_from_tracker)},
+        {"sensor_from_mount_wxyz", jsonOf(alignment().sensor_from_mount)}}},
       {"position",
        {{"method", choice_.position_id},
         {"settings", toJson(choice_.position_settings)},
-        {is_baked_ ? "baked" : "parameters", position_->parameters()}}},
+        {isBaked() ? "baked" : "parameters", parts().position->parameters()}}},
       {"orientation",
        {{"method", choice_.orientation_id},
         {"settings", toJson(choice_.orientation_settings)},
-        {"parameters", orientation_->parameters()}}},
+        {"parameters", parts().orientation->parameters()}}},
       {"inputs", takesOrientation() ? "pose" : "position"},
       {"orientations_seen", std::move(orientations)},
-      {"region", region_.toJson()},
+      {"region", region().toJson()},
       {"setup", setupToJson(setup_)},
       {"report", reportToJson(report_)},
       {"table", fieldtrue::toJson(table_)},
   };
-  for (const auto& [sensor, sensor_from_mount] : alignment_.mounts)
+  for (const auto& [sensor, sensor_from_mount] : alignment().mounts)
     content["alignment"]["mounts_wxyz"][std::to_string(sensor)] = jsonOf(sensor_from_mount);
   content["checksum"] = checksumOf(content);
   // One line a top-level key: readable at the head, and compact where thousands of numbers stand.
@@ -162,21 +112,12 @@ Result<Corrector> Corrector::load(const std::filesystem::path& path) {
 
 Corrector Corrector::fromJson(const JsonReader& content) {
   checkEnvelope(content);
-  auto position = partFrom<correctors::PositionModel>(content["position"], correctors::findPositionMethod);
-  auto orientation = partFrom<correctors::OrientationModel>(content["orientation"], correctors::findOrientationMethod);
-  const JsonReader alignment = content["alignment"];
-  Corrector corrector;
-  corrector.choice_ = {position.id, position.settings, orientation.id, orientation.settings};
+  const auto position = methodFrom<correctors::PositionModel>(content["position"], correctors::findPositionMethod);
+  const auto orientation =
+      methodFrom<correctors::OrientationModel>(content["orientation"], correctors::findOrientationMethod);
+  Corrector corrector(evaluatorPartsFrom(content));
+  corrector.choice_ = {position.first, position.second, orientation.first, orientation.second};
   corrector.align_ = content["align"].oneOf({"rigid", "none"}) == "rigid" ? AlignMode::kRigid : AlignMode::kNone;
-  corrector.alignment_.reference_from_tracker = alignment["reference_from_tracker"].pose();
-  corrector.alignment_.sensor_from_mount = alignment["sensor_from_mount_wxyz"].quaternion();
-  corrector.position_ = position.model;
-  corrector.is_baked_ = position.is_baked;
-  if (const auto mounts = alignment.find("mounts_wxyz"))
-    for (const auto& [sensor, raw] : mounts->object().items())
-      corrector.alignment_.mounts[sensorFrom(*mounts, sensor)] = (*mounts)[sensor].quaternion();
-  corrector.orientation_ = orientation.model;
-  corrector.region_ = Region::fromJson(content["region"]);
   corrector.report_ = reportFrom(content["report"]);
   corrector.table_ = tableFrom(content["table"]);
   const auto setup = content.find("setup");

@@ -7,9 +7,11 @@
 #include "calib/correctors/automatic_blend.h"
 #include "calib/correctors/automatic_choice.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/method_label.h"
 #include "calib/correctors/radial/rbf_system.h"
+#include "calib/correctors/readers.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -120,7 +122,7 @@ Result<std::unique_ptr<PositionModel>> fitBlend(const std::vector<AutomaticCandi
   for (std::size_t i = 0; i < blend.members.size(); ++i) {
     const AutomaticCandidate& candidate = candidates[blend.members[i]];
     FT_TRY(auto model, candidate.method->fit(data, candidate.settings, control));
-    members.push_back({candidate.method, candidate.settings, blend.weights[i], std::move(model)});
+    members.push_back({candidate.method->id, toJson(candidate.settings), blend.weights[i], std::move(model)});
   }
   return makeBlend(std::move(members));
 }
@@ -162,7 +164,9 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
   return std::make_unique<AutomaticModel>(std::move(model), std::move(table));
 }
 
-std::unique_ptr<PositionModel> loadAutomatic(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<PositionModel> readAutomaticPosition(const JsonReader& parameters) {
   const JsonReader candidates = parameters["candidates"];
   candidates.entries();
   nlohmann::json table = {{"method", parameters["method"].text()},
@@ -171,14 +175,12 @@ std::unique_ptr<PositionModel> loadAutomatic(const JsonReader& parameters) {
                           {"note", parameters["note"].text()}};
   if (parameters["method"].text() == kBlend)
     return std::make_unique<AutomaticModel>(readBlend(parameters["model"]), std::move(table));
-  const PositionMethod& method = *parameters["method"].valueOf(findPositionMethod(parameters["method"].text()));
-  if (method.id == "auto") parameters["method"].refuse("another one: an automatic choice cannot have chosen itself");
-  const JsonReader stored = parameters["settings"];
-  table["settings"] = toJson(stored.valueOf(settingsFromJson(method.id, method.settings, stored.raw())));
-  return std::make_unique<AutomaticModel>(method.read(parameters["model"]), std::move(table));
+  const auto read = parameters["method"].valueOf(findPositionReader(parameters["method"].text()));
+  if (read == &readAutomaticPosition)
+    parameters["method"].refuse("another one: an automatic choice cannot have chosen itself");
+  table["settings"] = parameters["settings"].object();
+  return std::make_unique<AutomaticModel>(read(parameters["model"]), std::move(table));
 }
-
-}  // namespace
 
 /// Chooses method and settings by cross-validation on the data it is fitted to.
 PositionMethod automaticPosition() {
@@ -190,7 +192,7 @@ PositionMethod automaticPosition() {
                                      "Methods to choose from: the survey's, those that came after it, or all; no "
                                      "correction, a rigid motion and an affine map are always among them.")};
   method.fit = fitAutomatic;
-  method.read = loadAutomatic;
+  method.read = readAutomaticPosition;
   method.cost = FitCost::kVeryCostly;
   method.tuning = Tuning::kAlways;
   method.origin = MethodOrigin::kLater;

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "calib/core/json_reader.h"
-#include "calib/correctors/registry.h"
+#include "calib/correctors/readers.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -146,7 +146,7 @@ class BlendModel : public PositionModel {
       const std::string own = member.model->note();
       if (own.empty()) continue;
       notes += notes.empty() ? "" : " ";
-      notes += member.method->label;
+      notes += member.method;
       notes += ": ";
       notes += own;
     }
@@ -155,8 +155,8 @@ class BlendModel : public PositionModel {
   nlohmann::json parameters() const override {
     nlohmann::json members = nlohmann::json::array();
     for (const BlendMember& member : members_)
-      members.push_back({{"method", member.method->id},
-                         {"settings", toJson(member.settings)},
+      members.push_back({{"method", member.method},
+                         {"settings", member.settings},
                          {"weight", member.weight},
                          {"model", member.model->parameters()}});
     return {{"members", std::move(members)}};
@@ -230,14 +230,14 @@ std::unique_ptr<PositionModel> readBlend(const JsonReader& parameters) {
   const JsonReader stored_members = parameters["members"];
   for (const JsonReader& stored : stored_members.entries()) {
     BlendMember member;
-    member.method = stored["method"].valueOf(findPositionMethod(stored["method"].text()));
-    if (member.method->id == "auto") stored["method"].refuse("another one: a blend cannot hold an automatic choice");
-    const JsonReader settings = stored["settings"];
-    member.settings = settings.valueOf(settingsFromJson(member.method->id, member.method->settings, settings.raw()));
+    member.method = stored["method"].text();
+    const auto read = stored["method"].valueOf(findPositionReader(member.method));
+    if (read == &readAutomaticPosition) stored["method"].refuse("another one: a blend cannot hold an automatic choice");
+    member.settings = stored["settings"].object();
     member.weight = stored["weight"].number();
     if (!(member.weight > 0.0 && member.weight <= 1.0)) stored["weight"].refuse("a number above 0 and at most 1");
     sum += member.weight;
-    member.model = member.method->read(stored["model"]);
+    member.model = read(stored["model"]);
     members.push_back(std::move(member));
   }
   if (std::abs(sum - 1.0) > 1e-9) stored_members.refuse("weights that sum to 1");

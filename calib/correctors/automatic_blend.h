@@ -1,5 +1,6 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,8 +29,8 @@ bool isWorthBlending(const InnerScore& blend, const InnerScore& chosen);
 
 /// One member of a fitted blend.
 struct BlendMember {
-  const PositionMethod* method = nullptr;
-  Settings settings;
+  std::string method;       ///< Its id.
+  nlohmann::json settings;  ///< Its settings as stored.
   double weight = 0.0;
   std::unique_ptr<PositionModel> model;
 };

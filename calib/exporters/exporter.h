@@ -38,6 +38,7 @@ struct Exporter {
   bool may_be_inverse = false;  ///< Can be written true to measured.
   bool knows_pose = false;      ///< Keeps a correction that depends on how the sensor is turned.
   bool has_free_pitch = false;  ///< A lattice whose pitch is chosen for the deviation that is allowed.
+  bool is_folder = false;       ///< Writes a folder of files.
   Result<Written> (*write)(const ExportSubject&, const ExportOptions&, const std::filesystem::path&,
                            const RunControl&) = nullptr;
   /// What stands in such a file, in metres and the frames of the calibration; null where the file is no lattice.

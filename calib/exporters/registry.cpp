@@ -22,7 +22,8 @@ std::span<const Exporter> exporters() {
       ftcalExporter(),       itkNrrdExporter(),      itkMhaExporter(),  itkTfmExporter(),    itkH5Exporter(),
       vtkVtiExporter(),      vtkLandmarksExporter(), vtkVtpExporter(),  vruiGridExporter(),  vruiForwardGridExporter(),
       csvExporter(),         latticeCsvExporter(),   numpyExporter(),   matlabExporter(),    polynomialJsonExporter(),
-      polynomialCExporter(), plusXmlExporter(),      vrpnCfgExporter(), caveTableExporter(), syzygyTableExporter()};
+      polynomialCExporter(), plusXmlExporter(),      vrpnCfgExporter(), caveTableExporter(), syzygyTableExporter(),
+      trackdPluginExporter()};
   return rows;
 }
 

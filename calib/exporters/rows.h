@@ -19,6 +19,7 @@ Exporter plusXmlExporter();
 Exporter polynomialCExporter();
 Exporter polynomialJsonExporter();
 Exporter syzygyTableExporter();
+Exporter trackdPluginExporter();
 Exporter vrpnCfgExporter();
 Exporter vruiForwardGridExporter();
 Exporter vruiGridExporter();

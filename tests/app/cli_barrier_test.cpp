@@ -99,8 +99,10 @@ class CliBarrierTest : public QObject {
   void memoryThatIsNotThereIsOneSentence_data() {
     QTest::addColumn<qint64>("room_mib");
     // A matrix of 6,000 x 6,000 numbers takes 144 MB even in single precision.
+#ifdef __SANITIZE_ADDRESS__
+    QSKIP("Under the address sanitizer it is the sanitizer that runs out of memory.");
+#else
     QTest::newRow("room for everything but the matrix") << qint64{100};
-#ifndef __SANITIZE_ADDRESS__  // It reserves what it needs for itself when the program begins.
     // Idle, the program reserves more than it needs; a worker of the algebra library then finds no room for its buffer.
     QTest::newRow("no room for the algebra library's buffers either") << qint64{-50};
 #endif
@@ -121,9 +123,7 @@ class CliBarrierTest : public QObject {
                                 "--out", at("none.ftcal.json")},
                                static_cast<rlim_t>(1024 * (program_kb + 1024 * room_mib)));
     FT_VERIFY_STATUS(run, 1);
-#ifndef __SANITIZE_ADDRESS__  // It tells of a refusal itself, too.
     QCOMPARE(run.err.count('\n'), qsizetype{1});
-#endif
     FT_VERIFY_MATCH(holdsAll(run.err.toStdString(), {"not enough memory", "no file was left half written"}));
     QVERIFY(!QFileInfo::exists(at("none.ftcal.json")));
   }

@@ -21,6 +21,9 @@ struct CliRun {
 inline QString cliPath() { return QCoreApplication::applicationDirPath() + "/../app/fieldtrue-cli"; }
 
 inline CliRun finished(QProcess& process, int timeout_ms) {
+#ifdef __SANITIZE_ADDRESS__
+  timeout_ms *= 5;
+#endif
   CliRun run;
   if (process.waitForFinished(timeout_ms) && process.exitStatus() == QProcess::NormalExit) {
     run.status = process.exitCode();

@@ -128,7 +128,8 @@ void BlindAnswerTest::aDiagnosisThatTakesTooLongIsWrong() {
   replaceFile(folder.cli, "#!/bin/sh\necho '{\"verdict\": \"no_gap\"}' > report.gap.json\nexec sleep 20\n");
   fs::permissions(folder.cli, fs::perms::owner_all);
   QCOMPARE(folder.answer({"--limit", "0.3"}), 0);
-  for (const json& record : documentOf(folder.path / "answers.json")["sessions"]) {
+  const json answers = documentOf(folder.path / "answers.json");
+  for (const json& record : answers["sessions"]) {
     QVERIFY(record["exit_status"] == 124);
     QVERIFY(record["seconds"].get<double>() < 10.0);
   }

@@ -114,7 +114,8 @@ void BlindSmallSetTest::everySessionIsAnswered() {
     QCOMPARE(round->answered.exit_status, 0);
     for (const Session& session : round->sessions())
       QVERIFY2(session.answer.is_answered, (session.file + ": " + session.answer.trouble).c_str());
-    for (const json& record : documentOf(round->path / "answers.json")["sessions"])
+    const json answers = documentOf(round->path / "answers.json");
+    for (const json& record : answers["sessions"])
       QVERIFY2(record["exit_status"] == 0, record.dump().c_str());
   }
 }

@@ -63,10 +63,11 @@ Workbench::~Workbench() {
 
 template <class... Arguments, class... Given>
 void Workbench::post(void (acquisition::AcquisitionController::*slot)(Arguments...), Given&&... given) {
+  // g++ 12 builds a lambda that holds a pack by value and is captured by a second one wrongly; hence std::bind_front.
   QMetaObject::invokeMethod(
       controller_,
-      [this, slot, ... values = std::decay_t<Given>(given)] {
-        acquisition::guarded(*controller_, [&] { (controller_->*slot)(values...); });
+      [controller = controller_, call = std::bind_front(slot, controller_, std::decay_t<Given>(given)...)] {
+        acquisition::guarded(*controller, call);
       },
       Qt::QueuedConnection);
 }

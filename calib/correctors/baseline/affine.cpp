@@ -1,4 +1,5 @@
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/polynomial/polynomial_position.h"
 
@@ -25,7 +26,7 @@ PositionMethod affinePosition() {
           .source = "Survey by Kindratenko, section 3.4, eq. 14 with r = 1",
           .settings = {},
           .fit = fitAffine,
-          .read = loadPolynomialPosition,
+          .read = readPolynomialPosition,
           .hold_out = holdOutAffine,
           .origin = MethodOrigin::kBaseline,
           .tries = {{"", 2}}};

@@ -2,6 +2,7 @@
 
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 
 namespace fieldtrue::correctors {
@@ -39,9 +40,9 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutNone(const FitData& d
   return std::make_unique<NothingHeldOut>(data.size());
 }
 
-std::unique_ptr<PositionModel> loadNone(const JsonReader&) { return std::make_unique<NoPositionCorrection>(); }
-
 }  // namespace
+
+std::unique_ptr<PositionModel> readNonePosition(const JsonReader&) { return std::make_unique<NoPositionCorrection>(); }
 
 PositionMethod nonePosition() {
   return {.id = "none",
@@ -49,7 +50,7 @@ PositionMethod nonePosition() {
           .source = "The tracker as it is, after the alignment if one is fitted",
           .settings = {},
           .fit = fitNone,
-          .read = loadNone,
+          .read = readNonePosition,
           .hold_out = holdOutNone,
           .origin = MethodOrigin::kBaseline,
           .tries = {{"", 0}}};

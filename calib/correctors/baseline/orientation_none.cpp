@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 
 namespace fieldtrue::correctors {
@@ -19,9 +20,11 @@ Result<std::unique_ptr<OrientationModel>> fitNone(const FitData&, const Settings
   return std::make_unique<NoOrientationCorrection>();
 }
 
-std::unique_ptr<OrientationModel> loadNone(const JsonReader&) { return std::make_unique<NoOrientationCorrection>(); }
-
 }  // namespace
+
+std::unique_ptr<OrientationModel> readNoneOrientation(const JsonReader&) {
+  return std::make_unique<NoOrientationCorrection>();
+}
 
 OrientationMethod noneOrientation() {
   return {.id = "none",
@@ -29,7 +32,7 @@ OrientationMethod noneOrientation() {
           .source = "The tracker as it is, after the alignment if one is fitted",
           .settings = {},
           .fit = fitNone,
-          .read = loadNone};
+          .read = readNoneOrientation};
 }
 
 }  // namespace fieldtrue::correctors

@@ -3,6 +3,7 @@
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 
 namespace fieldtrue::correctors {
@@ -28,11 +29,11 @@ Result<std::unique_ptr<OrientationModel>> fitConstant(const FitData& data, const
   return std::make_unique<ConstantErrorRotation>(frame, canonical(meanRotation(errorRotations(data, frame))));
 }
 
-std::unique_ptr<OrientationModel> loadConstant(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<OrientationModel> readRigidOrientation(const JsonReader& parameters) {
   return std::make_unique<ConstantErrorRotation>(errorFrameFrom(parameters), parameters["q_error_wxyz"].quaternion());
 }
-
-}  // namespace
 
 OrientationMethod rigidOrientation() {
   return {.id = "rigid",
@@ -40,7 +41,7 @@ OrientationMethod rigidOrientation() {
           .source = "Markley, Cheng, Crassidis, Oshman 2007, eq. 12-13, over the error rotations",
           .settings = {errorFrameSetting()},
           .fit = fitConstant,
-          .read = loadConstant};
+          .read = readRigidOrientation};
 }
 
 }  // namespace fieldtrue::correctors

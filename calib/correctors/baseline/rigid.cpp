@@ -5,6 +5,7 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/hold_out_rows.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 
 namespace fieldtrue::correctors {
@@ -125,11 +126,11 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutRigid(const FitData& 
   return std::make_unique<RigidHoldOut>(data);
 }
 
-std::unique_ptr<PositionModel> loadRigidPosition(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<PositionModel> readRigidPosition(const JsonReader& parameters) {
   return std::make_unique<RigidPosition>(parameters["true_from_tracked"].pose(), parameters["planar"].flag());
 }
-
-}  // namespace
 
 PositionMethod rigidPosition() {
   return {.id = "rigid",
@@ -137,7 +138,7 @@ PositionMethod rigidPosition() {
           .source = "Horn 1987; Umeyama 1991 without scale",
           .settings = {},
           .fit = fitRigidPosition,
-          .read = loadRigidPosition,
+          .read = readRigidPosition,
           .hold_out = holdOutRigid,
           .origin = MethodOrigin::kBaseline,
           .tries = {{"", 1}}};

@@ -5,6 +5,7 @@
 #include "calib/core/declare.h"
 #include "calib/correctors/base/fit_names.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/cell_json.h"
 #include "calib/correctors/cells/local_interpolation.h"
@@ -133,7 +134,9 @@ Result<std::unique_ptr<PositionModel>> fitHexahedralShape(const FitData& data, c
   return model;
 }
 
-std::unique_ptr<PositionModel> loadHexahedralShape(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<PositionModel> readHexahedralShapePosition(const JsonReader& parameters) {
   HexahedralCells cells = HexahedralCells::fromJson(parameters);
   std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], cells.corners_m().size());
   const std::string map = parameters["map"].oneOf({"shape", "isoparametric"});
@@ -141,8 +144,6 @@ std::unique_ptr<PositionModel> loadHexahedralShape(const JsonReader& parameters)
   const ShapeChoice choice{map == "isoparametric", axes == "cell" ? ShapeAxes::kCell : ShapeAxes::kTracker};
   return std::make_unique<HexahedralShapePosition>(std::move(cells), std::move(v_m), choice, parameters["note"].text());
 }
-
-}  // namespace
 
 PositionMethod hexahedralShapePosition() {
   return {
@@ -158,7 +159,7 @@ PositionMethod hexahedralShapePosition() {
                            "Axes of the shape functions; tracker is as published and singular for a cube turned by 45 "
                            "degrees.")},
       .fit = fitHexahedralShape,
-      .read = loadHexahedralShape,
+      .read = readHexahedralShapePosition,
       .origin = MethodOrigin::kSurvey,
       .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -1,5 +1,6 @@
 #include "calib/core/declare.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
 #include "calib/correctors/cells/tracked_grid.h"
@@ -33,7 +34,7 @@ PositionMethod localBriggsPosition() {
           .source = "Briggs 1999; survey by Kindratenko, section 3.3, eq. 12-13",
           .settings = briggsSettings(),
           .fit = fitLocalBriggs,
-          .read = loadLocalPosition,
+          .read = readLocalPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}},
           .reading = trackedGridReading()};

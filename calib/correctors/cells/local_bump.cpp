@@ -1,4 +1,5 @@
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
 #include "calib/correctors/cells/tracked_grid.h"
@@ -18,7 +19,7 @@ PositionMethod localBumpPosition() {
           .source = "Bryson 1992; survey by Kindratenko, section 3.3, eq. 8-10",
           .settings = {lengthUnitSetting(), bumpEndSetting()},
           .fit = fitLocalBump,
-          .read = loadLocalPosition,
+          .read = readLocalPosition,
           .tuning = Tuning::kNever,  // The end of the bump is the cell's own length.
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}},

@@ -1,5 +1,6 @@
 #include "calib/correctors/cells/local_interpolation.h"
 
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/cells/cell_json.h"
 
 namespace fieldtrue::correctors {
@@ -81,7 +82,7 @@ Result<std::unique_ptr<PositionModel>> fitLocalPosition(const FitData& data, con
   return makeLocalPosition(std::move(cells), errorVectors_m(grid.places), rule, std::move(note));
 }
 
-std::unique_ptr<PositionModel> loadLocalPosition(const JsonReader& parameters) {
+std::unique_ptr<PositionModel> readLocalPosition(const JsonReader& parameters) {
   HexahedralCells cells = HexahedralCells::fromJson(parameters);
   std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], cells.corners_m().size());
   return makeLocalPosition(std::move(cells), std::move(v_m), weightRuleFrom(parameters), parameters["note"].text());

@@ -26,7 +26,6 @@ Result<std::unique_ptr<PositionModel>> fitLocalPosition(const FitData& data, con
                                                         const std::string& name);
 
 /// Of any of the local methods.
-std::unique_ptr<PositionModel> loadLocalPosition(const JsonReader& parameters);
 
 /// Error vectors q - p of places, tracker frame [m].
 std::vector<Eigen::Vector3d> errorVectors_m(const Places& places);

@@ -1,5 +1,6 @@
 #include "calib/core/declare.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
 #include "calib/correctors/cells/tracked_grid.h"
@@ -26,7 +27,7 @@ PositionMethod localKindratenkoPosition() {
           .source = "Kindratenko, Bennett 2000; survey by Kindratenko, section 3.3, eq. 8, 9 and 11",
           .settings = {weightSetting()},
           .fit = fitLocalKindratenko,
-          .read = loadLocalPosition,
+          .read = readLocalPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}},
           .reading = trackedGridReading()};

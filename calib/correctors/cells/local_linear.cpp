@@ -1,4 +1,5 @@
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/local_interpolation.h"
 #include "calib/correctors/cells/tracked_grid.h"
@@ -19,7 +20,7 @@ PositionMethod localLinearPosition() {
           .source = "Bryson 1992; survey by Kindratenko, section 3.3, eq. 8-10",
           .settings = {},
           .fit = fitLocalLinear,
-          .read = loadLocalPosition,
+          .read = readLocalPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}},
           .reading = trackedGridReading()};

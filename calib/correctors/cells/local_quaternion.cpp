@@ -2,6 +2,7 @@
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/place_rotations.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/cell_json.h"
 #include "calib/correctors/cells/local_interpolation.h"
@@ -63,13 +64,6 @@ Result<std::unique_ptr<OrientationModel>> fitLocalQuaternion(const FitData& data
                                               rule, std::move(note));
 }
 
-std::unique_ptr<OrientationModel> loadLocalQuaternion(const JsonReader& parameters) {
-  HexahedralCells cells = HexahedralCells::fromJson(parameters);
-  std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters["q_error_wxyz"], cells.corners_m().size());
-  return std::make_unique<LocalErrorRotation>(errorFrameFrom(parameters), std::move(cells), std::move(q_error),
-                                              weightRuleFrom(parameters), parameters["note"].text());
-}
-
 Setting rotationWeightSetting() {
   return declare::choice("weight", "Weights", {"linear", "quadratic", "log", "bryson_linear", "bryson_bump", "briggs"},
                          "linear", "How the corners of the cell share: linear, quadratic and log are Kindratenko's.");
@@ -77,13 +71,20 @@ Setting rotationWeightSetting() {
 
 }  // namespace
 
+std::unique_ptr<OrientationModel> readLocalQuaternionOrientation(const JsonReader& parameters) {
+  HexahedralCells cells = HexahedralCells::fromJson(parameters);
+  std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters["q_error_wxyz"], cells.corners_m().size());
+  return std::make_unique<LocalErrorRotation>(errorFrameFrom(parameters), std::move(cells), std::move(q_error),
+                                              weightRuleFrom(parameters), parameters["note"].text());
+}
+
 OrientationMethod localQuaternionOrientation() {
   return {.id = "local_quaternion",
           .label = "Local rotations (Kindratenko)",
           .source = "Kindratenko, Bennett 2000; survey by Kindratenko, section 4.1, weights of eq. 9-11 and 13",
           .settings = {rotationWeightSetting(), lengthUnitSetting(), bumpEndSetting(), errorFrameSetting()},
           .fit = fitLocalQuaternion,
-          .read = loadLocalQuaternion,
+          .read = readLocalQuaternionOrientation,
           .tuning = Tuning::kNever};  // The end of the bump is the cell's own length.
 }
 

@@ -1,6 +1,7 @@
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/place_rotations.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/cell_json.h"
 #include "calib/correctors/cells/hexahedral_cells.h"
@@ -55,14 +56,14 @@ Result<std::unique_ptr<OrientationModel>> fitSlerpTrilinear(const FitData& data,
                                               std::move(note));
 }
 
-std::unique_ptr<OrientationModel> loadSlerpTrilinear(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<OrientationModel> readSlerpTrilinearOrientation(const JsonReader& parameters) {
   HexahedralCells cells = HexahedralCells::fromJson(parameters);
   std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters["q_error_wxyz"], cells.corners_m().size());
   return std::make_unique<SlerpErrorRotation>(errorFrameFrom(parameters), std::move(cells), std::move(q_error),
                                               parameters["note"].text());
 }
-
-}  // namespace
 
 OrientationMethod slerpTrilinearOrientation() {
   return {.id = "slerp_trilinear",
@@ -70,7 +71,7 @@ OrientationMethod slerpTrilinearOrientation() {
           .source = "Livingston, State 1997; survey by Kindratenko, section 4.1",
           .settings = {errorFrameSetting()},
           .fit = fitSlerpTrilinear,
-          .read = loadSlerpTrilinear};
+          .read = readSlerpTrilinearOrientation};
 }
 
 }  // namespace fieldtrue::correctors

@@ -1,4 +1,5 @@
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/cell_json.h"
 #include "calib/correctors/cells/local_interpolation.h"
@@ -62,13 +63,13 @@ Result<std::unique_ptr<PositionModel>> fitTetrahedral(const FitData& data, const
       });
 }
 
-std::unique_ptr<PositionModel> loadTetrahedral(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<PositionModel> readTetrahedralPosition(const JsonReader& parameters) {
   TetrahedralMesh mesh = TetrahedralMesh::fromJson(parameters);
   std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], mesh.corners_m().size());
   return std::make_unique<TetrahedralPosition>(std::move(mesh), std::move(v_m), parameters["note"].text());
 }
-
-}  // namespace
 
 PositionMethod tetrahedralPosition() {
   return {.id = "tetrahedral",
@@ -76,7 +77,7 @@ PositionMethod tetrahedralPosition() {
           .source = "Ellis et al. 1999; Kenwright, Lane 1996; survey by Kindratenko, section 3.2, eq. 5-7",
           .settings = {splitSetting()},
           .fit = fitTetrahedral,
-          .read = loadTetrahedral,
+          .read = readTetrahedralPosition,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

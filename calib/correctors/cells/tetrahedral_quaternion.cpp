@@ -1,6 +1,7 @@
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/place_rotations.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/cell_json.h"
 #include "calib/correctors/cells/tetrahedra.h"
@@ -51,14 +52,14 @@ Result<std::unique_ptr<OrientationModel>> fitTetrahedralQuaternion(const FitData
                                                     std::move(tetrahedra.note));
 }
 
-std::unique_ptr<OrientationModel> loadTetrahedralQuaternion(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<OrientationModel> readTetrahedralQuaternionOrientation(const JsonReader& parameters) {
   TetrahedralMesh mesh = TetrahedralMesh::fromJson(parameters);
   std::vector<Eigen::Quaterniond> q_error = rotationsFrom(parameters["q_error_wxyz"], mesh.corners_m().size());
   return std::make_unique<TetrahedralErrorRotation>(errorFrameFrom(parameters), std::move(mesh), std::move(q_error),
                                                     parameters["note"].text());
 }
-
-}  // namespace
 
 OrientationMethod tetrahedralQuaternionOrientation() {
   return {.id = "tetrahedral_quaternion",
@@ -66,7 +67,7 @@ OrientationMethod tetrahedralQuaternionOrientation() {
           .source = "Ellis et al. 1999; survey by Kindratenko, section 4.1, weights of eq. 7",
           .settings = {splitSetting(), errorFrameSetting()},
           .fit = fitTetrahedralQuaternion,
-          .read = loadTetrahedralQuaternion};
+          .read = readTetrahedralQuaternionOrientation};
 }
 
 }  // namespace fieldtrue::correctors

@@ -1,4 +1,5 @@
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/cell_json.h"
 #include "calib/correctors/cells/tracked_grid.h"
@@ -46,13 +47,13 @@ Result<std::unique_ptr<PositionModel>> fitTrilinear(const FitData& data, const S
       });
 }
 
-std::unique_ptr<PositionModel> loadTrilinear(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<PositionModel> readTrilinearPosition(const JsonReader& parameters) {
   HexahedralCells cells = HexahedralCells::fromJson(parameters);
   std::vector<Eigen::Vector3d> v_m = pointsFrom(parameters["v_m"], cells.corners_m().size());
   return std::make_unique<TrilinearPosition>(TrackedGrid{std::move(cells), std::move(v_m), parameters["note"].text()});
 }
-
-}  // namespace
 
 PositionMethod trilinearPosition() {
   return {
@@ -63,7 +64,7 @@ PositionMethod trilinearPosition() {
           "3.1, eq. 1-2",
       .settings = resampleSettings(),
       .fit = fitTrilinear,
-      .read = loadTrilinear,
+      .read = readTrilinearPosition,
       .origin = MethodOrigin::kSurvey,
       .tries = {{"", simplicity::kInterpolating}},
       .reading = trackedGridReading()};

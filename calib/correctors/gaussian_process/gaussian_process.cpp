@@ -9,6 +9,7 @@
 #include "calib/core/spacing.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/gaussian_process/coil_choice.h"
 #include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
@@ -311,19 +312,6 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const
   return std::make_unique<CoilsHoldOut>(*std::move(fits), *coils, std::move(orientations));
 }
 
-std::unique_ptr<PositionModel> loadGaussianProcess(const JsonReader& parameters) {
-  if (parameters.has("coils")) return readCoils(parameters, loadGaussianProcess);
-  if (parameters.has("pose")) return readPoses(parameters);
-  RadialField field = RadialField::fromJson(parameters);
-  const GaussianProcessScales scales{parameters["length_m"].vector3(), parameters["signal_sd_m"].number(),
-                                     parameters["nugget_sd_m"].number()};
-  const auto stored_m2 = parameters["noise_m2"].numbers();
-  if (stored_m2.size() != field.centers_m().size()) parameters["noise_m2"].refuse("one number for each centre");
-  const Eigen::VectorXd noise_m2 =
-      Eigen::Map<const Eigen::VectorXd>(stored_m2.data(), static_cast<Eigen::Index>(stored_m2.size()));
-  return std::make_unique<GaussianProcessPosition>(std::move(field), scales, noise_m2, parameters["note"].text());
-}
-
 std::vector<Setting> gaussianProcessSettings() {
   return {
       declare::choice("inputs", "Inputs", {"auto", "position", "pose"}, "auto",
@@ -346,6 +334,19 @@ std::vector<Setting> gaussianProcessSettings() {
 
 }  // namespace
 
+std::unique_ptr<PositionModel> readGaussianProcessPosition(const JsonReader& parameters) {
+  if (parameters.has("coils")) return readCoils(parameters, readGaussianProcessPosition);
+  if (parameters.has("pose")) return readPoses(parameters);
+  RadialField field = RadialField::fromJson(parameters);
+  const GaussianProcessScales scales{parameters["length_m"].vector3(), parameters["signal_sd_m"].number(),
+                                     parameters["nugget_sd_m"].number()};
+  const auto stored_m2 = parameters["noise_m2"].numbers();
+  if (stored_m2.size() != field.centers_m().size()) parameters["noise_m2"].refuse("one number for each centre");
+  const Eigen::VectorXd noise_m2 =
+      Eigen::Map<const Eigen::VectorXd>(stored_m2.data(), static_cast<Eigen::Index>(stored_m2.size()));
+  return std::make_unique<GaussianProcessPosition>(std::move(field), scales, noise_m2, parameters["note"].text());
+}
+
 /// A Gaussian process with an anisotropic Matern kernel about a linear trend, each place with its own noise, scales by
 /// restricted likelihood.
 PositionMethod gaussianProcessPosition() {
@@ -357,7 +358,7 @@ PositionMethod gaussianProcessPosition() {
           "restricted likelihood: Patterson and Thompson 1971",
       .settings = gaussianProcessSettings(),
       .fit = fitGaussianProcess,
-      .read = loadGaussianProcess,
+      .read = readGaussianProcessPosition,
       .hold_out = holdOutGaussianProcess,
       .tuning = Tuning::kAlways,
       .origin = MethodOrigin::kLater,

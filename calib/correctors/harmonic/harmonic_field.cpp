@@ -6,6 +6,7 @@
 #include "calib/core/memory_limit.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/base/soft_box.h"
 #include "calib/correctors/harmonic/harmonic_field_fit.h"
@@ -128,7 +129,9 @@ FieldPosterior posteriorFrom(const JsonReader& parameters, const std::vector<Fie
   return posterior;
 }
 
-std::unique_ptr<PositionModel> loadHarmonic(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<PositionModel> readHarmonicFieldPosition(const JsonReader& parameters) {
   const Eigen::MatrixXd rows = parameters["sources"].matrix(12);
   std::vector<FieldSource> sources(static_cast<std::size_t>(rows.rows()));
   for (Eigen::Index k = 0; k < rows.rows(); ++k) {
@@ -143,8 +146,6 @@ std::unique_ptr<PositionModel> loadHarmonic(const JsonReader& parameters) {
                                          parameters["field_from_truth"].pose(), std::move(posterior),
                                          parameters["note"].text());
 }
-
-}  // namespace
 
 /// A correction that knows what the error is made of. Metal near a tracker adds to each transmitter coil's field one
 /// that has neither divergence nor curl where the sensor goes, so its potential obeys Laplace's equation there and can
@@ -174,7 +175,7 @@ PositionMethod harmonicFieldPosition() {
       "2003";
   method.settings = {least_gain, most_sources};
   method.fit = fitHarmonic;
-  method.read = loadHarmonic;
+  method.read = readHarmonicFieldPosition;
   method.cost = FitCost::kCostly;
   method.tuning = Tuning::kAlways;
   method.origin = MethodOrigin::kLater;

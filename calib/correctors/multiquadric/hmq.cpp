@@ -7,6 +7,7 @@
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/multiquadric/hmq_hold_out.h"
 #include "calib/correctors/multiquadric/hmq_r2.h"
@@ -55,9 +56,11 @@ Result<std::unique_ptr<PositionModel>> fitHmq(const FitData& data, const Setting
   return std::make_unique<HmqPosition>(std::move(field), problem.precision, note);
 }
 
-std::unique_ptr<PositionModel> loadHmq(const JsonReader& parameters) { return HmqPosition::fromJson(parameters); }
-
 }  // namespace
+
+std::unique_ptr<PositionModel> readHmqPosition(const JsonReader& parameters) {
+  return HmqPosition::fromJson(parameters);
+}
 
 Result<void> checkHmqSpread(const std::string& name, std::size_t n_places, int dimension) {
   if (dimension >= 2) return {};
@@ -96,7 +99,7 @@ PositionMethod hmqPosition() {
           .source = "Zachmann 1997; survey by Kindratenko, section 3.5, eq. 16-18; automatic R squared by Rippa 1999",
           .settings = {r2Setting(), precisionSetting()},
           .fit = fitHmq,
-          .read = loadHmq,
+          .read = readHmqPosition,
           .hold_out = holdOutHmq,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"r2_cm2=10", simplicity::kInterpolating},

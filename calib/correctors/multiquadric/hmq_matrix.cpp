@@ -9,6 +9,7 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/multiquadric/hmq_field.h"
 #include "calib/correctors/multiquadric/hmq_r2.h"
@@ -95,12 +96,12 @@ Result<std::unique_ptr<OrientationModel>> fitHmqMatrix(const FitData& data, cons
   return std::make_unique<HmqErrorRotation>(frame, std::move(field), note);
 }
 
-std::unique_ptr<OrientationModel> loadHmqMatrix(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<OrientationModel> readHmqMatrixOrientation(const JsonReader& parameters) {
   return std::make_unique<HmqErrorRotation>(errorFrameFrom(parameters), MultiquadricField::fromJson(parameters, 9),
                                             parameters["note"].text());
 }
-
-}  // namespace
 
 OrientationMethod hmqMatrixOrientation() {
   return {.id = "hmq_matrix",
@@ -108,7 +109,7 @@ OrientationMethod hmqMatrixOrientation() {
           .source = "Zachmann 2000; survey by Kindratenko, section 4.3",
           .settings = {r2Setting(), errorFrameSetting()},
           .fit = fitHmqMatrix,
-          .read = loadHmqMatrix};
+          .read = readHmqMatrixOrientation};
 }
 
 }  // namespace fieldtrue::correctors

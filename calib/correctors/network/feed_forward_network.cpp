@@ -8,12 +8,12 @@
 namespace fieldtrue::correctors {
 namespace {
 
-constexpr int kMostHidden = 64;
+using Nodes = FeedForwardNetwork::Nodes;
 
-Eigen::VectorXd logistic(const Eigen::VectorXd& s) { return (1.0 + (-s.array()).exp()).inverse().matrix(); }
+Nodes logistic(const Nodes& s) { return (1.0 + (-s.array()).exp()).inverse().matrix(); }
 
 /// df/ds of the logistic function, from its value.
-Eigen::ArrayXd slopeOf(const Eigen::VectorXd& f) { return f.array() * (1.0 - f.array()); }
+Eigen::ArrayXd slopeOf(const Nodes& f) { return f.array() * (1.0 - f.array()); }
 
 /// The same numbers on every platform, which std::uniform_real_distribution does not promise.
 class Uniform {
@@ -56,9 +56,12 @@ void FeedForwardNetwork::setWeights(const Weights& weights) {
 
 FeedForwardNetwork::Activity FeedForwardNetwork::activity(const Eigen::Vector3d& x) const {
   Activity a;
-  a.first = logistic(layer(0, n_first_, 3) * x + biases(3 * n_first_, n_first_));
-  a.second = logistic(layer(secondStart(), n_second_, n_first_) * a.first +
-                      biases(secondStart() + n_first_ * n_second_, n_second_));
+  a.first = biases(3 * n_first_, n_first_);
+  a.first.noalias() += layer(0, n_first_, 3) * x;
+  a.first = logistic(a.first);
+  a.second = biases(secondStart() + n_first_ * n_second_, n_second_);
+  a.second.noalias() += layer(secondStart(), n_second_, n_first_) * a.first;
+  a.second = logistic(a.second);
   return a;
 }
 

@@ -15,6 +15,9 @@ namespace fieldtrue::correctors {
 class FeedForwardNetwork {
  public:
   using Weights = Eigen::VectorXd;
+  static constexpr int kMostHidden = 64;  ///< Of each layer.
+  /// One number a node of a layer; takes no memory from the heap.
+  using Nodes = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostHidden, 1>;
   using WeightJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
 
   FeedForwardNetwork() = default;
@@ -49,8 +52,8 @@ class FeedForwardNetwork {
   using Biases = Eigen::Map<const Eigen::VectorXd>;
   /// What the hidden nodes put out.
   struct Activity {
-    Eigen::VectorXd first;
-    Eigen::VectorXd second;
+    Nodes first;
+    Nodes second;
   };
 
   Layer layer(Eigen::Index start, Eigen::Index rows, Eigen::Index columns) const {

@@ -7,6 +7,7 @@
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/base/soft_box.h"
 #include "calib/correctors/network/feed_forward_network.h"
@@ -194,18 +195,6 @@ Result<std::unique_ptr<PositionModel>> fitNeuralNetwork(const FitData& data, con
   return std::make_unique<NeuralNetworkPosition>(std::move(parts));
 }
 
-std::unique_ptr<PositionModel> loadNeuralNetwork(const JsonReader& parameters) {
-  NetworkParts parts;
-  parts.network = FeedForwardNetwork::fromJson(parameters["network"]);
-  parts.true_from_tracked = parameters["true_from_tracked"].pose();
-  parts.box = {parameters["low_m"].vector3(), parameters["high_m"].vector3(), parameters["reach_m"].number()};
-  if (!(parts.box.longest_m() > 0.0)) parameters["high_m"].refuse("above low_m");
-  if (!(parts.box.reach_m >= 0.0)) parameters["reach_m"].refuse("0 or above");
-  parts.largest_m = parameters["largest_m"].number();
-  parts.note = parameters["note"].text();
-  return std::make_unique<NeuralNetworkPosition>(std::move(parts));
-}
-
 std::vector<Setting> neuralNetworkSettings() {
   return {
       declare::integer("hidden", "First hidden layer", {2, 16}, 8,
@@ -237,6 +226,18 @@ std::vector<Setting> neuralNetworkSettings() {
 
 }  // namespace
 
+std::unique_ptr<PositionModel> readNeuralNetworkPosition(const JsonReader& parameters) {
+  NetworkParts parts;
+  parts.network = FeedForwardNetwork::fromJson(parameters["network"]);
+  parts.true_from_tracked = parameters["true_from_tracked"].pose();
+  parts.box = {parameters["low_m"].vector3(), parameters["high_m"].vector3(), parameters["reach_m"].number()};
+  if (!(parts.box.longest_m() > 0.0)) parameters["high_m"].refuse("above low_m");
+  if (!(parts.box.reach_m >= 0.0)) parameters["reach_m"].refuse("0 or above");
+  parts.largest_m = parameters["largest_m"].number();
+  parts.note = parameters["note"].text();
+  return std::make_unique<NeuralNetworkPosition>(std::move(parts));
+}
+
 PositionMethod neuralNetworkPosition() {
   return {
       .id = "neural_network",
@@ -246,7 +247,7 @@ PositionMethod neuralNetworkPosition() {
           "by Kindratenko, section 3.6",
       .settings = neuralNetworkSettings(),
       .fit = fitNeuralNetwork,
-      .read = loadNeuralNetwork,
+      .read = readNeuralNetworkPosition,
       .cost = FitCost::kCostly,
       .origin = MethodOrigin::kSurvey,
       .reading =

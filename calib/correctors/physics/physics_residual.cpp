@@ -8,6 +8,7 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_rows.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/radial/rbf_field.h"
 #include "calib/correctors/radial/rbf_system.h"
@@ -263,14 +264,14 @@ identify::ScenePositions sceneFrom(const JsonReader& json) {
   return json.valueOf(identify::ScenePositions::make(std::move(scene)));
 }
 
-std::unique_ptr<PositionModel> loadPhysicsResidual(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<PositionModel> readPhysicsResidualPosition(const JsonReader& parameters) {
   std::optional<identify::ScenePositions> physics;
   if (const JsonReader scene = parameters["scene"]; !scene.isNull()) physics = sceneFrom(scene);
-  return std::make_unique<PhysicsResidual>(std::move(physics), gaussianProcessPosition().read(parameters["remainder"]),
+  return std::make_unique<PhysicsResidual>(std::move(physics), readGaussianProcessPosition(parameters["remainder"]),
                                            parameters["note"].text());
 }
-
-}  // namespace
 
 /// The scene that a diagnosis finds behind the data, undone by inverting what a tracker reports in it, and a Gaussian
 /// process on what remains; where no effect is found, the Gaussian process alone.
@@ -290,7 +291,7 @@ PositionMethod physicsResidualPosition() {
                        "With more places than these, the scene is sought on a well-spread part of them; "
                        "the Gaussian process takes all."));
   method.fit = fitPhysicsResidual;
-  method.read = loadPhysicsResidual;
+  method.read = readPhysicsResidualPosition;
   method.cost = FitCost::kVeryCostly;
   method.tuning = Tuning::kAlways;
   method.origin = MethodOrigin::kLater;

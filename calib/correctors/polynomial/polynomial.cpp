@@ -1,5 +1,6 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/polynomial/polynomial_choice.h"
 #include "calib/correctors/polynomial/polynomial_position.h"
@@ -36,7 +37,7 @@ PositionMethod polynomialPosition() {
           "Kindratenko 1999; Ikits, Brederson, Hansen, Hollerbach 2001; survey by Kindratenko, section 3.4, eq. 14-15",
       .settings = {degreeSetting()},
       .fit = fitPolynomial,
-      .read = loadPolynomialPosition,
+      .read = readPolynomialPosition,
       .hold_out = holdOutPolynomial,
       .origin = MethodOrigin::kSurvey,
       .tries = {{"degree=2", 3}, {"degree=3", 4}, {"degree=4", 5}, {"degree=5", 6}, {"degree=6", 7}}};

@@ -8,6 +8,7 @@
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/fit_names.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/polynomial/polynomial_choice.h"
 
@@ -82,12 +83,12 @@ Result<std::unique_ptr<OrientationModel>> fitPolynomialEuler(const FitData& data
       });
 }
 
-std::unique_ptr<OrientationModel> loadPolynomialEuler(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<OrientationModel> readPolynomialEulerOrientation(const JsonReader& parameters) {
   return std::make_unique<EulerErrorRotation>(errorFrameFrom(parameters), parameters["q_reference_wxyz"].quaternion(),
                                               ChosenPolynomial::fromJson(parameters["azimuth_elevation_roll"]));
 }
-
-}  // namespace
 
 OrientationMethod polynomialEulerOrientation() {
   return {.id = "polynomial_euler",
@@ -95,7 +96,7 @@ OrientationMethod polynomialEulerOrientation() {
           .source = "Kindratenko 1999; survey by Kindratenko, section 4.2",
           .settings = {degreeSetting(), errorFrameSetting()},
           .fit = fitPolynomialEuler,
-          .read = loadPolynomialEuler};
+          .read = readPolynomialEulerOrientation};
 }
 
 }  // namespace fieldtrue::correctors

@@ -3,6 +3,7 @@
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/polynomial/polynomial_hold_out.h"
 
 namespace fieldtrue::correctors {
@@ -90,7 +91,7 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomialPosition(co
       });
 }
 
-std::unique_ptr<PositionModel> loadPolynomialPosition(const JsonReader& parameters) {
+std::unique_ptr<PositionModel> readPolynomialPosition(const JsonReader& parameters) {
   return std::make_unique<PolynomialPosition>(ChosenPolynomial::fromJson(parameters));
 }
 

@@ -26,7 +26,6 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomialPosition(co
                                                                               const std::string& name);
 
 /// Of any degree, the affine map included.
-std::unique_ptr<PositionModel> loadPolynomialPosition(const JsonReader& parameters);
 
 /// p_true - p_tracked of every row [m].
 std::vector<Eigen::Vector3d> displacements_m(const FitData& data);

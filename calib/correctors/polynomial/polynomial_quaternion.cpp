@@ -6,6 +6,7 @@
 #include "calib/correctors/base/error_rotation.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/polynomial/polynomial_choice.h"
 
@@ -57,13 +58,13 @@ Result<std::unique_ptr<OrientationModel>> fitPolynomialQuaternion(const FitData&
       });
 }
 
-std::unique_ptr<OrientationModel> loadPolynomialQuaternion(const JsonReader& parameters) {
+}  // namespace
+
+std::unique_ptr<OrientationModel> readPolynomialQuaternionOrientation(const JsonReader& parameters) {
   return std::make_unique<PolynomialErrorRotation>(errorFrameFrom(parameters),
                                                    parameters["q_reference_wxyz"].quaternion(),
                                                    ChosenPolynomial::fromJson(parameters["vector_part"]));
 }
-
-}  // namespace
 
 OrientationMethod polynomialQuaternionOrientation() {
   return {.id = "polynomial_quaternion",
@@ -71,7 +72,7 @@ OrientationMethod polynomialQuaternionOrientation() {
           .source = "Ikits, Brederson, Hansen, Hollerbach 2001; survey by Kindratenko, section 4.2",
           .settings = {degreeSetting(), errorFrameSetting()},
           .fit = fitPolynomialQuaternion,
-          .read = loadPolynomialQuaternion};
+          .read = readPolynomialQuaternionOrientation};
 }
 
 }  // namespace fieldtrue::correctors

@@ -6,6 +6,7 @@
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/radial/field_position.h"
 #include "calib/correctors/radial/rbf_system.h"
@@ -166,10 +167,6 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutRbf(const FitData& da
   return std::make_unique<RbfHoldOut>(std::move(system), *std::move(solutions));
 }
 
-std::unique_ptr<PositionModel> loadRbf(const JsonReader& parameters) {
-  return std::make_unique<RbfPosition>(RadialField::fromJson(parameters), parameters["note"].text());
-}
-
 std::vector<Setting> rbfSettings() {
   return {
       declare::choice("kernel", "Kernel", {"multiquadric", "inverse_multiquadric", "cubic", "thin_plate"},
@@ -185,6 +182,10 @@ std::vector<Setting> rbfSettings() {
 
 }  // namespace
 
+std::unique_ptr<PositionModel> readRbfPosition(const JsonReader& parameters) {
+  return std::make_unique<RbfPosition>(RadialField::fromJson(parameters), parameters["note"].text());
+}
+
 /// Radial basis functions with a linear tail and noise-weighted smoothing, shape and smoothing by leave-one-out.
 PositionMethod rbfPosition() {
   return {.id = "rbf",
@@ -192,7 +193,7 @@ PositionMethod rbfPosition() {
           .source = "Hardy 1971; Duchon 1977; shape and smoothing by leave-one-out: Rippa 1999, eq. 17",
           .settings = rbfSettings(),
           .fit = fitRbf,
-          .read = loadRbf,
+          .read = readRbfPosition,
           .hold_out = holdOutRbf,
           .keeps_scales = true,
           .origin = MethodOrigin::kLater,

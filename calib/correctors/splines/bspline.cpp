@@ -6,6 +6,7 @@
 #include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/radial/field_position.h"
 #include "calib/correctors/radial/rbf_system.h"
@@ -140,10 +141,6 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutBspline(const FitData
   return std::make_unique<BsplineHoldOut>(std::move(system));
 }
 
-std::unique_ptr<PositionModel> loadBspline(const JsonReader& parameters) {
-  return std::make_unique<BsplinePosition>(SplineField::fromJson(parameters), parameters["note"].text());
-}
-
 std::vector<Setting> bsplineSettings() {
   return {declare::autoNumber("spans", "Spans along the longest axis", {1.0, 40.0}, "auto",
                               "Knots of the lattice less one; the other axes get spans of the same length. Auto makes "
@@ -155,6 +152,10 @@ std::vector<Setting> bsplineSettings() {
 
 }  // namespace
 
+std::unique_ptr<PositionModel> readBsplinePosition(const JsonReader& parameters) {
+  return std::make_unique<BsplinePosition>(SplineField::fromJson(parameters), parameters["note"].text());
+}
+
 /// Tensor-product cubic B-splines fitted to scattered places with a bending penalty, smoothness by generalised
 /// cross-validation.
 PositionMethod bsplinePosition() {
@@ -164,7 +165,7 @@ PositionMethod bsplinePosition() {
       .source = "Eilers and Marx 1996, penalised B-splines; generalised cross-validation: Golub, Heath and Wahba 1979",
       .settings = bsplineSettings(),
       .fit = fitBspline,
-      .read = loadBspline,
+      .read = readBsplinePosition,
       .hold_out = holdOutBspline,
       .keeps_scales = true,
       .origin = MethodOrigin::kLater,

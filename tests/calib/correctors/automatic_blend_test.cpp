@@ -160,7 +160,7 @@ class AutomaticBlendTest : public QObject {
       FT_VERIFY_OK(model);
       expected_m += weight * (*model)->displacement_m(p_m);
       uncertainty_m += weight * (*model)->uncertainty_m(p_m).value_or(HUGE_VAL);
-      members.push_back({candidate.method, candidate.settings, weight, *std::move(model)});
+      members.push_back({candidate.method->id, toJson(candidate.settings), weight, *std::move(model)});
     }
     const auto blend = makeBlend(std::move(members));
     FT_VERIFY_MATCH(near(blend->displacement_m(p_m), expected_m, 1e-15));

@@ -1,0 +1,135 @@
+#include "calib/calibration/evaluator.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <string>
+#include <utility>
+
+#include "calib/correctors/baked/baked_lattice.h"
+#include "calib/correctors/readers.h"
+
+namespace fieldtrue::calibration {
+namespace {
+
+/// A key of the mountings: the sensor's number.
+int sensorFrom(const JsonReader& mounts, const std::string& key) {
+  int sensor = 0;
+  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), sensor);
+  if (error != std::errc() || end != key.data() + key.size())
+    mounts.fail("has the key '" + key + "', which is not a sensor's number");
+  return sensor;
+}
+
+Alignment alignmentFrom(const JsonReader& from) {
+  Alignment alignment;
+  alignment.reference_from_tracker = from["reference_from_tracker"].pose();
+  alignment.sensor_from_mount = from["sensor_from_mount_wxyz"].quaternion();
+  if (const auto mounts = from.find("mounts_wxyz"))
+    for (const auto& [sensor, raw] : mounts->object().items())
+      alignment.mounts[sensorFrom(*mounts, sensor)] = (*mounts)[sensor].quaternion();
+  return alignment;
+}
+
+/// Poses that are corrected together, in memory of their own on the stack.
+constexpr std::size_t kBlock = 256;
+
+}  // namespace
+
+Evaluator::Evaluator(Parts parts) : parts_(std::move(parts)) { FT_CHECK(parts_.position && parts_.orientation); }
+
+Evaluator::Parts evaluatorPartsFrom(const JsonReader& content) {
+  const JsonReader position = content["position"], orientation = content["orientation"];
+  const auto read_position = position["method"].valueOf(correctors::findPositionReader(position["method"].text()));
+  const auto read_orientation =
+      orientation["method"].valueOf(correctors::findOrientationReader(orientation["method"].text()));
+  Evaluator::Parts parts;
+  parts.alignment = alignmentFrom(content["alignment"]);
+  parts.is_baked = position.has("baked");
+  parts.position =
+      parts.is_baked ? correctors::BakedLattice::fromJson(position["baked"]) : read_position(position["parameters"]);
+  parts.orientation = read_orientation(orientation["parameters"]);
+  parts.region = Region::fromJson(content["region"]);
+  return parts;
+}
+
+Pose Evaluator::correct(const Pose& tracker_from_sensor, std::optional<int> sensor) const {
+  const Eigen::Vector3d& p_tracked_m = tracker_from_sensor.position_m;
+  Pose corrected;
+  corrected.position_m = p_tracked_m;
+  if (parts_.position->covers(p_tracked_m))
+    corrected.position_m += parts_.position->displacementAt_m(tracker_from_sensor);
+  corrected.position_m = parts_.alignment.reference_from_tracker * corrected.position_m;
+  const Eigen::Quaterniond q_true = parts_.orientation->covers(p_tracked_m)
+                                        ? parts_.orientation->correct(p_tracked_m, tracker_from_sensor.orientation)
+                                        : tracker_from_sensor.orientation;
+  corrected.orientation =
+      parts_.alignment.reference_from_tracker.orientation * q_true * parts_.alignment.mountOf(sensor);
+  return corrected;
+}
+
+void Evaluator::correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
+                        std::span<const std::optional<int>> sensors) const {
+  FT_CHECK(tracker_from_sensor.size() == reference_from_sensor.size());
+  FT_CHECK(sensors.empty() || sensors.size() == tracker_from_sensor.size());
+  for (std::size_t start = 0; start < tracker_from_sensor.size(); start += kBlock) {
+    const std::size_t count = std::min(kBlock, tracker_from_sensor.size() - start);
+    correctBlock(tracker_from_sensor.subspan(start, count), reference_from_sensor.subspan(start, count),
+                 sensors.empty() ? sensors : sensors.subspan(start, count));
+  }
+}
+
+void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
+                             std::span<const std::optional<int>> sensors) const {
+  const correctors::PositionModel& position = *parts_.position;
+  std::array<Eigen::Vector3d, kBlock> covered_m;
+  std::array<bool, kBlock> is_covered;
+  std::size_t n_covered = 0;
+  for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
+    is_covered[i] = position.covers(tracker_from_sensor[i].position_m);
+    if (!is_covered[i]) continue;
+    covered_m[n_covered] = tracker_from_sensor[i].position_m;
+    if (position.takesOrientation()) covered_m[n_covered] += position.displacementAt_m(tracker_from_sensor[i]);
+    ++n_covered;
+  }
+  const std::span p_m = std::span(covered_m).first(n_covered);
+  if (!position.takesOrientation()) position.correct(p_m, p_m);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
+    const Pose tracked = tracker_from_sensor[i];
+    const Eigen::Vector3d p_true_m = is_covered[i] ? covered_m[next++] : tracked.position_m;
+    const Eigen::Quaterniond q_true = parts_.orientation->covers(tracked.position_m)
+                                          ? parts_.orientation->correct(tracked.position_m, tracked.orientation)
+                                          : tracked.orientation;
+    reference_from_sensor[i].position_m = parts_.alignment.reference_from_tracker * p_true_m;
+    reference_from_sensor[i].orientation = parts_.alignment.reference_from_tracker.orientation * q_true *
+                                           parts_.alignment.mountOf(sensors.empty() ? std::nullopt : sensors[i]);
+  }
+}
+
+Eigen::Vector3d Evaluator::correctPosition_m(const Eigen::Vector3d& p_tracked_m) const {
+  if (!parts_.position->covers(p_tracked_m)) return parts_.alignment.reference_from_tracker * p_tracked_m;
+  const Eigen::Vector3d p_true_m = p_tracked_m + parts_.position->displacement_m(p_tracked_m);
+  return parts_.alignment.reference_from_tracker * p_true_m;
+}
+
+std::optional<double> Evaluator::uncertainty_m(const Eigen::Vector3d& p_tracked_m) const {
+  return parts_.position->covers(p_tracked_m) ? parts_.position->uncertainty_m(p_tracked_m) : std::nullopt;
+}
+
+std::optional<double> Evaluator::uncertaintyAt_m(const Pose& tracker_from_sensor) const {
+  return parts_.position->covers(tracker_from_sensor.position_m) ? parts_.position->uncertaintyAt_m(tracker_from_sensor)
+                                                                 : std::nullopt;
+}
+
+bool Evaluator::covers(const Eigen::Vector3d& p_tracked_m) const {
+  return parts_.region.contains(p_tracked_m) && parts_.position->covers(p_tracked_m);
+}
+
+Eigen::Matrix3d Evaluator::jacobian(const Eigen::Vector3d& p_tracked_m) const {
+  const Eigen::Matrix3d rotation = parts_.alignment.reference_from_tracker.orientation.toRotationMatrix();
+  return parts_.position->covers(p_tracked_m) ? Eigen::Matrix3d(rotation * parts_.position->jacobian(p_tracked_m))
+                                              : rotation;
+}
+
+}  // namespace fieldtrue::calibration

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calib/calibration/alignment.h"
+#include "calib/core/geometry.h"
+#include "calib/core/json_reader.h"
+#include "calib/correctors/base/orientation_model.h"
+#include "calib/correctors/base/position_model.h"
+
+namespace fieldtrue::calibration {
+
+/// What applies a calibration: alignment, position part, orientation part and the region they hold in. Immutable;
+/// copies share the models.
+class Evaluator {
+ public:
+  struct Parts {
+    Alignment alignment;
+    std::shared_ptr<const correctors::PositionModel> position;
+    bool is_baked = false;  ///< position is a lattice, not the method's own model.
+    std::shared_ptr<const correctors::OrientationModel> orientation;
+    Region region;
+  };
+  /// @param parts with both models
+  explicit Evaluator(Parts parts);
+
+  /// reference_from_sensor of a tracked pose. Where a part does not cover the position, only the alignment is applied.
+  /// @param sensor whose mounting counts, where several were fitted
+  Pose correct(const Pose& tracker_from_sensor, std::optional<int> sensor = {}) const;
+  /// Allocates nothing itself.
+  /// @param reference_from_sensor same length; may be the same memory
+  /// @param sensors of each pose; empty where they are not told
+  void correct(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
+               std::span<const std::optional<int>> sensors = {}) const;
+  /// Where the position part takes orientation: the mean over the orientations that were fitted.
+  Eigen::Vector3d correctPosition_m(const Eigen::Vector3d& p_tracked_m) const;
+  /// Whether the position part is a function of the tracked pose, not of position alone.
+  bool takesOrientation() const { return parts_.position->takesOrientation(); }
+
+  /// SD of the corrected position [m]; at a pose, or for any of the orientations that were fitted.
+  std::optional<double> uncertaintyAt_m(const Pose& tracker_from_sensor) const;
+  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const;
+  /// Inside the calibrated region, and covered by the method; otherwise the result is an extrapolation.
+  bool covers(const Eigen::Vector3d& p_tracked_m) const;
+  /// Whether the position part can be evaluated there at all, inside the region or not.
+  bool reaches(const Eigen::Vector3d& p_tracked_m) const { return parts_.position->covers(p_tracked_m); }
+  Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;
+
+  const Alignment& alignment() const { return parts_.alignment; }
+  const Region& region() const { return parts_.region; }
+  bool isBaked() const { return parts_.is_baked; }
+  const Parts& parts() const { return parts_; }
+
+ private:
+  void correctBlock(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
+                    std::span<const std::optional<int>> sensors) const;
+
+  Parts parts_;
+};
+
+/// What applies the calibration of a file's content; throws as a JsonReader does.
+Evaluator::Parts evaluatorPartsFrom(const JsonReader& content);
+
+}  // namespace fieldtrue::calibration
