@@ -102,7 +102,7 @@ struct Outputs {
 const std::vector<Outputs>& outputs() {
   static const std::vector<Outputs> all = {{"simulate", {"--nodes", "--samples"}},
                                            {"tables", {"--nodes", "--samples"}},
-                                           {"import", {"--nodes", "--samples"}},
+                                           {"import", {"--nodes", "--samples", "--calibration"}},
                                            {"acquire", {"--session"}},
                                            {"fit", {"--out"}},
                                            {"compare", {"--html"}},

@@ -6,6 +6,7 @@
 #include "acquisition/session/session_store.h"
 #include "app/cli.h"
 #include "app/cli_values.h"
+#include "calib/exporters/imported_calibration.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "calib/recording/unit_slip.h"
@@ -140,26 +141,57 @@ struct ImportOptions {
   std::string in;
   std::string truth;
   TablePaths out;
+  std::string calibration;
 };
+
+Outcome runImportCalibration(const exporters::CalibrationFormat& format, const ImportOptions& options) {
+  if (options.calibration.empty())
+    return wrongUsage("format " + format.id + " holds a calibration; name the file to write with --calibration");
+  if (!options.out.nodes.empty() || !options.out.samples.empty() || !options.truth.empty())
+    return wrongUsage("format " + format.id +
+                      " holds a calibration and no table; leave --nodes, --samples and --truth out");
+  const auto imported = exporters::importCalibration(format, options.in);
+  if (!imported) return notPossible(imported.error());
+  const auto saved = imported->save(options.calibration);
+  if (!saved) return notPossible(saved.error());
+  Answer answer;
+  answer.json["notes"] = imported->report().notes;
+  for (const std::string& note : imported->report().notes) answer.text += note + "\n";
+  answer.json["calibration"] = {{"file", options.calibration}};
+  answer.text += "calibration written to " + options.calibration + "\n";
+  return answer;
+}
 
 /// The chosen importer and its settings, or what is wrong with `--format`.
 Read<std::pair<const importers::Importer*, Settings>> readFormat(const std::string& text) {
   const auto format = parseMethodText(text);
   if (!format) return wrongUsage(format.error());
   const auto importer = importers::findImporter(format->id);
-  if (!importer) return wrongUsage(importer.error());
+  if (!importer) {
+    std::string calibrations;
+    for (const exporters::CalibrationFormat& known : exporters::calibrationFormats()) {
+      if (!calibrations.empty()) calibrations += ", ";
+      calibrations += known.id;
+    }
+    return wrongUsage(importer.error().message + "; and of calibrations: " + calibrations);
+  }
   auto settings = resolveSettings(format->id, (*importer)->settings, format->given);
   if (!settings) return wrongUsage(settings.error());
   return std::pair{*importer, std::move(*settings)};
 }
 
 Outcome runImport(const ImportOptions& options, const CommonOptions&) {
+  if (const exporters::CalibrationFormat* format = exporters::findCalibrationFormat(options.format))
+    return runImportCalibration(*format, options);
   const auto format = readFormat(options.format);
   if (!format) return tl::unexpected(format.error());
   const auto& [importer, settings] = *format;
   if (importer->needs_truth && options.truth.empty()) {
     return wrongUsage("format " + importer->id + " holds no true positions; name the file that does with --truth");
   }
+  if (!options.calibration.empty())
+    return wrongUsage("format " + importer->id +
+                      " holds measurements; fit a calibration to them with fieldtrue-cli fit");
   if (options.out.nodes.empty() && options.out.samples.empty()) {
     return wrongUsage("nothing to write; name a file with --nodes or --samples");
   }
@@ -194,6 +226,8 @@ void addImport(CommandLine& line) {
       ->type_name("FILE");
   command->add_option("--nodes", options->out.nodes, "Node table to write")->type_name("FILE");
   command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
+  command->add_option("--calibration", options->calibration, "Calibration to write, where the format holds one")
+      ->type_name("FILE");
 }
 
 }  // namespace

@@ -93,7 +93,8 @@ Outcome runExport(const ExportArguments& arguments, const CommonOptions& common)
   std::error_code ignored;
   if (std::filesystem::equivalent(path, arguments.calibration, ignored))
     return notPossible(path.string() + " is the calibration that is read; choose another name");
-  if (!arguments.force && std::filesystem::is_regular_file(path, ignored))
+  if (!arguments.force &&
+      (std::filesystem::is_regular_file(path, ignored) || std::filesystem::is_directory(path, ignored)))
     return notPossible(path.string() + " exists already and was left as it is; choose another name, or add --force");
 
   auto corrector = calibration::Corrector::load(arguments.calibration);

@@ -7,6 +7,7 @@
 #include "calib/correctors/registry.h"
 #include "calib/effects/effect_listing.h"
 #include "calib/exporters/exporter.h"
+#include "calib/exporters/imported_calibration.h"
 #include "calib/exporters/registry.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
@@ -103,6 +104,12 @@ Outcome listFormats(const ListOptions&, const CommonOptions&) {
     imports.push_back(std::move(row));
     answer.text += "  " + importer.id + "  " + importer.label + (importer.needs_truth ? " (needs --truth)" : "") +
                    "\n" + settingsLines(importer.settings);
+  }
+  auto& calibrations = answer.json["import_calibration"] = nlohmann::json::array();
+  answer.text += "\nimport, as a calibration (--calibration)\n";
+  for (const exporters::CalibrationFormat& format : exporters::calibrationFormats()) {
+    calibrations.push_back({{"id", format.id}, {"label", format.label}, {"unit", format.unit}});
+    answer.text += "  " + format.id + "  " + format.label + ", in " + format.unit + "\n";
   }
   auto& exports = answer.json["export"] = nlohmann::json::array();
   answer.text += "\nexport\n";

@@ -9,6 +9,7 @@
 #include "calib/correctors/baked/baked_lattice_maker.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/base/readers.h"
 #include "calib/correctors/registry.h"
 #include "calib/tables/table_setup.h"
 
@@ -105,6 +106,20 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
     std::vector<std::string>& notes = corrector.report_.notes;
     if (!note.empty() && std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
   }
+  return corrector;
+}
+
+Corrector Corrector::imported(Parts parts, CorrectorChoice choice, CalibrationTable table,
+                              std::vector<std::string> notes) {
+  if (!parts.orientation) {
+    const nlohmann::json nothing = nlohmann::json::object();
+    parts.orientation = correctors::readNoneOrientation(JsonReader(nothing, "no orientation"));
+  }
+  Corrector corrector(std::move(parts));
+  corrector.choice_ = std::move(choice);
+  corrector.table_ = std::move(table);
+  corrector.report_ = reportOf(corrector.table_.nodes, corrector);
+  corrector.report_.notes = std::move(notes);
   return corrector;
 }
 

@@ -52,6 +52,12 @@ class Corrector : public Evaluator {
   /// What it is good for, as far as its table stated it.
   const Setup& setup() const { return setup_; }
 
+  /// What another program made.
+  /// @param parts without an orientation part: none is corrected
+  /// @param table rows that stand for it, where it takes them being true
+  static Corrector imported(Parts parts, CorrectorChoice choice, CalibrationTable table,
+                            std::vector<std::string> notes);
+
   /// The same calibration with its position part baked to a dense lattice: 64 coefficients a sample whatever the method
   /// was, and it needs nothing else. Covers what it covered, up to a cell more at holes and edges of a local method.
   /// The report holds the lattice's figures, and the largest deviation that was seen as a note.

@@ -107,6 +107,27 @@ void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::spa
   }
 }
 
+void Evaluator::correctPositions(std::span<const Eigen::Vector3d> p_tracked_m,
+                                 std::span<Eigen::Vector3d> p_true_m) const {
+  FT_CHECK(p_tracked_m.size() == p_true_m.size());
+  std::array<Eigen::Vector3d, kBlock> covered_m;
+  std::array<std::size_t, kBlock> slots;
+  for (std::size_t start = 0; start < p_tracked_m.size(); start += kBlock) {
+    const std::size_t end = std::min(start + kBlock, p_tracked_m.size());
+    std::size_t n_covered = 0;
+    for (std::size_t i = start; i < end; ++i) {
+      p_true_m[i] = p_tracked_m[i];
+      if (!parts_.position->covers(p_tracked_m[i])) continue;
+      covered_m[n_covered] = p_tracked_m[i];
+      slots[n_covered++] = i;
+    }
+    const std::span p_m = std::span(covered_m).first(n_covered);
+    parts_.position->correct(p_m, p_m);
+    for (std::size_t k = 0; k < n_covered; ++k) p_true_m[slots[k]] = covered_m[k];
+    for (std::size_t i = start; i < end; ++i) p_true_m[i] = parts_.alignment.reference_from_tracker * p_true_m[i];
+  }
+}
+
 Eigen::Vector3d Evaluator::correctPosition_m(const Eigen::Vector3d& p_tracked_m) const {
   if (!parts_.position->covers(p_tracked_m)) return parts_.alignment.reference_from_tracker * p_tracked_m;
   const Eigen::Vector3d p_true_m = p_tracked_m + parts_.position->displacement_m(p_tracked_m);

@@ -37,6 +37,8 @@ class Evaluator {
                std::span<const std::optional<int>> sensors = {}) const;
   /// Where the position part takes orientation: the mean over the orientations that were fitted.
   Eigen::Vector3d correctPosition_m(const Eigen::Vector3d& p_tracked_m) const;
+  /// @param p_true_m same length; may be the same memory
+  void correctPositions(std::span<const Eigen::Vector3d> p_tracked_m, std::span<Eigen::Vector3d> p_true_m) const;
   /// Whether the position part is a function of the tracked pose, not of position alone.
   bool takesOrientation() const { return parts_.position->takesOrientation(); }
 

@@ -28,7 +28,8 @@ constexpr ReaderRow<PositionModel> kPositionReaders[] = {{"none", readNonePositi
                                                          {"bspline", readBsplinePosition},
                                                          {"harmonic_field", readHarmonicFieldPosition},
                                                          {"physics_residual", readPhysicsResidualPosition},
-                                                         {"auto", readAutomaticPosition}};
+                                                         {"auto", readAutomaticPosition},
+                                                         {"imported", readImportedPosition}};
 
 constexpr ReaderRow<OrientationModel> kOrientationReaders[] = {
     {"none", readNoneOrientation},
@@ -38,7 +39,8 @@ constexpr ReaderRow<OrientationModel> kOrientationReaders[] = {
     {"local_quaternion", readLocalQuaternionOrientation},
     {"polynomial_euler", readPolynomialEulerOrientation},
     {"polynomial_quaternion", readPolynomialQuaternionOrientation},
-    {"hmq_matrix", readHmqMatrixOrientation}};
+    {"hmq_matrix", readHmqMatrixOrientation},
+    {"imported", readImportedOrientation}};
 
 template <class Model>
 Result<ModelReader<Model>> findReader(std::span<const ReaderRow<Model>> rows, const std::string& kind,

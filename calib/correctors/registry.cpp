@@ -5,7 +5,7 @@
 // 2. In the fit, check the data first (fit_checks.h) and say in one sentence what was seen and what is needed; treat
 //    dimension 2 (one plane) or say in `note()` what is not claimed.
 // 3. Declare settings with unit, range and default.
-// 4. Add the row below, in the order menus shall show it.
+// 4. Add the row below, in the order menus shall show it, and its reader in readers.cpp, which the runtime uses too.
 // 5. Add to tests/calib/correctors/corrector_contract_test.cpp what the method must recover exactly. The other
 //    contracts (same bits after reloading, same result twice, finite, errors on bad data) run over every row by
 //    themselves.
@@ -67,10 +67,14 @@ std::span<const OrientationMethod> orientationMethods() {
 }
 
 Result<const PositionMethod*> findPositionMethod(std::string_view id) {
+  static const PositionMethod imported = importedPosition();
+  if (id == imported.id) return &imported;
   return findMethod(positionMethods(), "position", id);
 }
 
 Result<const OrientationMethod*> findOrientationMethod(std::string_view id) {
+  static const OrientationMethod imported = importedOrientation();
+  if (id == imported.id) return &imported;
   return findMethod(orientationMethods(), "orientation", id);
 }
 

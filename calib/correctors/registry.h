@@ -20,7 +20,8 @@ namespace fieldtrue::correctors {
 std::span<const PositionMethod> positionMethods();
 std::span<const OrientationMethod> orientationMethods();
 
-/// The row of an id. @error kBadInput naming the known ids
+/// The row of an id; of `imported` too, which is read and never fitted, and so stands in no list. @error kBadInput
+/// naming the known ids
 Result<const PositionMethod*> findPositionMethod(std::string_view id);
 Result<const OrientationMethod*> findOrientationMethod(std::string_view id);
 

@@ -236,8 +236,9 @@ std::string sentences(const CalibrationDifference& difference) {
           : std::string();
   const std::string unknown = "Nobody can tell whether the field changed: ";
   if (difference.first_own.mm.empty() || difference.second_own.mm.empty())
-    return unknown + "with so few places a calibration cannot be judged at places its fits did not see." + field +
-           other;
+    return unknown +
+           "a calibration of so few places, or of another program, cannot be judged at places its fits did not see." +
+           field + other;
   if (difference.first_at_second.mm.empty())
     return unknown + "too few places of the second lie where the first holds." + field + other;
   const std::string errs = "the first errs by " + withInterval(difference.first_at_second) +

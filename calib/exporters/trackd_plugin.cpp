@@ -11,6 +11,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPlugin = "libfieldtrue_trackd.so";
+constexpr const char* kParameters = "fieldtrue.params";
 constexpr const char* kCalibration = "calibration.ftcal.json";
 
 /// Where the plug-in lies beside this program: as installed, or as built.
@@ -26,8 +27,8 @@ Result<fs::path> pluginPath() {
 
 std::string parametersText(const ExportSubject& subject) {
   return factLines(subject.facts("feet and degrees at the host, as below")) +
-         "# What the plug-in is told. trackd: DeviceOption <device> calib " + kPlugin +
-         " fieldtrue.params\n"
+         "# What the plug-in is told. trackd: DeviceOption <device> calib " + kPlugin + " " + kParameters +
+         "\n"
          "calibration=" +
          kCalibration +
          "\n"
@@ -42,7 +43,7 @@ Result<void> fill(const fs::path& folder, const ExportSubject& subject) {
   FT_TRY(const std::string bytes, readFile(plugin));
   FT_TRY_VOID(writeFileAtomically(folder / kPlugin, [&](std::ostream& out) { out << bytes; }));
   FT_TRY_VOID(subject.corrector().save(folder / kCalibration));
-  return writeFileAtomically(folder / "fieldtrue.params", [&](std::ostream& out) { out << parametersText(subject); });
+  return writeFileAtomically(folder / kParameters, [&](std::ostream& out) { out << parametersText(subject); });
 }
 
 tl::unexpected<Error> notWritten(const fs::path& path, const std::error_code& error) {
@@ -53,6 +54,8 @@ tl::unexpected<Error> notWritten(const fs::path& path, const std::error_code& er
 Result<Written> write(const ExportSubject& subject, const ExportOptions&, const fs::path& path, const RunControl&) {
   const fs::path beside = path.string() + ".part", old = path.string() + ".old";
   std::error_code error;
+  if (fs::exists(path, error) && !fs::exists(path / kParameters, error))
+    return fail(ErrorCode::kIo, path.string() + " is there and is no folder of this format; choose another name");
   fs::remove_all(beside, error);
   if (!fs::create_directory(beside, error)) return notWritten(path, error);
   if (auto filled = fill(beside, subject); !filled) {

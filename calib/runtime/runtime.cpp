@@ -163,6 +163,13 @@ void fieldtrue_correct_many(const fieldtrue_calibration* calibration, int sensor
                  std::min(kBlock, n - start));
 }
 
+void fieldtrue_correct_positions(const fieldtrue_calibration* calibration, const double* tracked_m, double* corrected_m,
+                                 size_t n) {
+  static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
+  calibration->content.evaluator().correctPositions({reinterpret_cast<const Eigen::Vector3d*>(tracked_m), n},
+                                                    {reinterpret_cast<Eigen::Vector3d*>(corrected_m), n});
+}
+
 double fieldtrue_uncertainty_m(const fieldtrue_calibration* calibration, const fieldtrue_pose* tracked) {
   const calibration::Evaluator& evaluator = calibration->content.evaluator();
   const Pose pose = poseFrom(*tracked);

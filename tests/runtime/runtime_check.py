@@ -123,6 +123,17 @@ def euler(q):
 
 def check_trackd(check, folder):
     run(check.cli, "export", "--calibration", check.at("gp.ftcal.json"), "--format", "trackd_plugin", "--out", folder / "plug")
+    again = subprocess.run([str(check.cli), "export", "--calibration", check.at("gp.ftcal.json"), "--format", "trackd_plugin",
+                            "--out", str(folder / "plug/fieldtrue.params")], capture_output=True, text=True, check=False)
+    judged("trackd writes over nothing", again.returncode == 1 and "--force" in again.stderr, again.stderr.strip()[-60:])
+    (folder / "mine").mkdir()
+    (folder / "mine/gp_measured-to-true.trackd").mkdir()
+    (folder / "mine/gp_measured-to-true.trackd/precious").touch()
+    for force in ([], ["--force"]):
+        done = subprocess.run([str(check.cli), "export", "--calibration", check.at("gp.ftcal.json"), "--format", "trackd_plugin",
+                               "--out", str(folder / "mine"), *force], capture_output=True, text=True, check=False)
+        judged(f"a folder of somebody else's stays {force}", done.returncode == 1
+               and (folder / "mine/gp_measured-to-true.trackd/precious").exists(), done.stderr.strip()[-60:])
     plugin = ctypes.CDLL(str(folder / "plug/libfieldtrue_trackd.so"))
     plugin.calib_init.restype = ctypes.c_void_p
     plugin.calib_init.argtypes = [ctypes.POINTER(ctypes.c_char_p), ctypes.c_int]

@@ -19,6 +19,7 @@ std::unique_ptr<PositionModel> readGaussianProcessPosition(const JsonReader& par
 std::unique_ptr<PositionModel> readHarmonicFieldPosition(const JsonReader& parameters);
 std::unique_ptr<PositionModel> readHexahedralShapePosition(const JsonReader& parameters);
 std::unique_ptr<PositionModel> readHmqPosition(const JsonReader& parameters);
+std::unique_ptr<PositionModel> readImportedPosition(const JsonReader& parameters);
 std::unique_ptr<PositionModel> readLocalPosition(const JsonReader& parameters);  ///< Of every local method.
 std::unique_ptr<PositionModel> readNeuralNetworkPosition(const JsonReader& parameters);
 std::unique_ptr<PositionModel> readNonePosition(const JsonReader& parameters);
@@ -30,6 +31,7 @@ std::unique_ptr<PositionModel> readTetrahedralPosition(const JsonReader& paramet
 std::unique_ptr<PositionModel> readTrilinearPosition(const JsonReader& parameters);
 
 std::unique_ptr<OrientationModel> readHmqMatrixOrientation(const JsonReader& parameters);
+std::unique_ptr<OrientationModel> readImportedOrientation(const JsonReader& parameters);
 std::unique_ptr<OrientationModel> readLocalQuaternionOrientation(const JsonReader& parameters);
 std::unique_ptr<OrientationModel> readNoneOrientation(const JsonReader& parameters);
 std::unique_ptr<OrientationModel> readPolynomialEulerOrientation(const JsonReader& parameters);

@@ -25,6 +25,7 @@ PositionMethod physicsResidualPosition();
 PositionMethod polynomialPosition();
 PositionMethod rbfPosition();
 PositionMethod bsplinePosition();
+PositionMethod importedPosition();
 
 OrientationMethod noneOrientation();
 OrientationMethod rigidOrientation();
@@ -34,5 +35,6 @@ OrientationMethod tetrahedralQuaternionOrientation();
 OrientationMethod hmqMatrixOrientation();
 OrientationMethod polynomialEulerOrientation();
 OrientationMethod polynomialQuaternionOrientation();
+OrientationMethod importedOrientation();
 
 }  // namespace fieldtrue::correctors

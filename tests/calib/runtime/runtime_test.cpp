@@ -150,7 +150,13 @@ class RuntimeTest : public QObject {
     fieldtrue_correct_many(calibration.get(), FIELDTRUE_FIRST_SENSOR, c.data(), seen.data(), c.size());
     const std::size_t n_batch = n_allocations - before;
     if (FT_COUNTS_ALLOCATIONS) QCOMPARE(n_batch, std::size_t{0});
+    std::vector<double> positions_m;
+    for (const fieldtrue_pose& pose : c) positions_m.insert(positions_m.end(), pose.position_m, pose.position_m + 3);
+    const std::size_t before_positions = n_allocations;
+    fieldtrue_correct_positions(calibration.get(), positions_m.data(), positions_m.data(), c.size());
+    if (FT_COUNTS_ALLOCATIONS) QCOMPARE(n_allocations - before_positions, std::size_t{0});
     for (std::size_t i = 0; i < poses.size(); ++i) {
+      QVERIFY2(Eigen::Vector3d::Map(&positions_m[3 * i]) == expected[i].position_m, std::to_string(i).c_str());
       const Pose got = outOfC(seen[i]);
       QVERIFY2((got.position_m == expected[i].position_m), std::to_string(i).c_str());
       QVERIFY2((got.orientation.coeffs() == canonical(expected[i].orientation).coeffs()), std::to_string(i).c_str());

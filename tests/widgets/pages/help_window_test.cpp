@@ -81,7 +81,7 @@ void HelpWindowTest::f1OpensThePageOfTheStep_data() {
   row("acquire", "recording");
   row("compare", "comparing");
   row("gap", "diagnosis");
-  row("export", "files-and-commands");
+  row("export", "export");
 }
 
 void HelpWindowTest::f1OpensThePageOfTheStep() {
