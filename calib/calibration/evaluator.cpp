@@ -96,7 +96,7 @@ void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::spa
   if (!position.takesOrientation()) position.correct(p_m, p_m);
   std::size_t next = 0;
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
-    const Pose tracked = tracker_from_sensor[i];
+    const Pose& tracked = tracker_from_sensor[i];
     const Eigen::Vector3d p_true_m = is_covered[i] ? covered_m[next++] : tracked.position_m;
     const Eigen::Quaterniond q_true = parts_.orientation->covers(tracked.position_m)
                                           ? parts_.orientation->correct(tracked.position_m, tracked.orientation)

@@ -27,6 +27,7 @@ std::atomic<std::size_t> n_allocations{0};
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // Counts what the whole program allocates: Eigen's memory, and what `new` takes, come from here.
+// NOLINTNEXTLINE(bugprone-reserved-identifier): glibc's own, by which malloc may be replaced.
 extern "C" void* __libc_malloc(std::size_t size);
 extern "C" void* malloc(std::size_t size) {
   n_allocations.fetch_add(1, std::memory_order_relaxed);
