@@ -73,8 +73,8 @@ FIELDTRUE_API void fieldtrue_correct(const fieldtrue_calibration* calibration, i
 FIELDTRUE_API void fieldtrue_correct_many(const fieldtrue_calibration* calibration, int sensor,
                                           const fieldtrue_pose* tracked, fieldtrue_pose* corrected, size_t n);
 
-/* Corrects n positions, x y z one after the other [m]; a correction of whole poses as its mean over the orientations that
- * were calibrated. corrected_m may be tracked_m. */
+/* Corrects n positions, x y z one after the other [m]; a correction of whole poses as its mean over the orientations
+ * that were calibrated. corrected_m may be tracked_m. */
 FIELDTRUE_API void fieldtrue_correct_positions(const fieldtrue_calibration* calibration, const double* tracked_m,
                                                double* corrected_m, size_t n);
 

@@ -115,8 +115,7 @@ void BlindSmallSetTest::everySessionIsAnswered() {
     for (const Session& session : round->sessions())
       QVERIFY2(session.answer.is_answered, (session.file + ": " + session.answer.trouble).c_str());
     const json answers = documentOf(round->path / "answers.json");
-    for (const json& record : answers["sessions"])
-      QVERIFY2(record["exit_status"] == 0, record.dump().c_str());
+    for (const json& record : answers["sessions"]) QVERIFY2(record["exit_status"] == 0, record.dump().c_str());
   }
 }
 

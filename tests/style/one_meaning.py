@@ -8,7 +8,8 @@ The linker keeps one of two such definitions and says nothing (undefined behavio
   - a function of one namespace defined in two files.
 What stands in an anonymous namespace, or is static, belongs to its file alone. `main` is one a program.
 
-usage: one_meaning.py FOLDER...      exit status 0: none found; 1: found, one line each
+usage: one_meaning.py FOLDER... [-FILE...]      -FILE: one that takes another's place in a program of its own
+exit status 0: none found; 1: found, one line each
 """
 import re
 import sys
@@ -25,6 +26,7 @@ NOT_RESULTS = {"return", "else", "using", "typedef", "case", "throw", "new", "de
 def without_comments_and_strings(text):
     pattern = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.S)
     text = pattern.sub(lambda m: '""' if m.group(0)[0] in "\"R'" else " ", text)
+    text = re.sub(r"\b[A-Z0-9_]+_API\b", " ", text)  # Says who sees a name, not what it means.
     return re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", "", text, flags=re.M)
 
 
@@ -119,7 +121,10 @@ def read(path, types, results, definitions):
 def main(folders):
     types, definitions = defaultdict(set), defaultdict(set)
     results = defaultdict(lambda: defaultdict(set))
-    files = [p for folder in folders for p in sorted(Path(folder).rglob("*")) if p.suffix in (".h", ".cpp")]
+    left_out = {Path(argument[1:]) for argument in folders if argument.startswith("-")}
+    folders = [argument for argument in folders if not argument.startswith("-")]
+    files = [p for folder in folders for p in sorted(Path(folder).rglob("*"))
+             if p.suffix in (".h", ".cpp") and p not in left_out]
     if not files:
         print("no .h or .cpp file in " + " ".join(folders))
         return 1

@@ -2,6 +2,7 @@
 
 #include <QCheckBox>
 #include <QDateTime>
+#include <QDesktopServices>
 #include <QDir>
 #include <QDoubleSpinBox>
 #include <QFileDialog>
@@ -12,6 +13,7 @@
 #include <QListWidget>
 #include <QPushButton>
 #include <QStackedWidget>
+#include <QUrl>
 #include <QVBoxLayout>
 
 #include "calib/core/setup.h"
@@ -398,9 +400,9 @@ void ExportPage::onWritten(const QString& path, const Result<std::string>& writt
     const QString note = QString::fromStdString(*written);
     workbench_.showMessage({tr("Written: %1").arg(QDir::toNativeSeparators(path)) +
                                 (note.isEmpty() ? QString() : QStringLiteral(". ") + note),
-                            Severity::kInfo,
-                            {},
-                            {}});
+                            Severity::kInfo, tr("Open the folder"), [path] {
+                              QDesktopServices::openUrl(QUrl::fromLocalFile(QFileInfo(path).absolutePath()));
+                            }});
   } else {
     workbench_.showMessage({QString::fromStdString(written.error().message), Severity::kDanger, {}, {}});
   }

@@ -96,8 +96,7 @@ constexpr std::array kRows = {
     PageRow{"compare", QT_TRANSLATE_NOOP("StepRail", "Compare"), "compare", "comparing", make<ComparePage>,
             markCompare},
     PageRow{"gap", QT_TRANSLATE_NOOP("StepRail", "Gap"), "gap", "diagnosis", makeGapPage, markGap},
-    PageRow{"export", QT_TRANSLATE_NOOP("StepRail", "Export"), "export", "export", make<ExportPage>,
-            markExport},
+    PageRow{"export", QT_TRANSLATE_NOOP("StepRail", "Export"), "export", "export", make<ExportPage>, markExport},
     PageRow{"difference", QT_TRANSLATE_NOOP("StepRail", "Changes"), "difference", "comparing", make<DifferencePage>,
             markStart},
 };
