@@ -16,8 +16,8 @@
 namespace fieldtrue::importers {
 
 std::span<const Importer> importers() {
-  static const std::vector<Importer> table{fcsvImporter(), anserImporter(), plusImporter(), columnsImporter(),
-                                           trajImporter()};
+  static const std::vector<Importer> table{fcsvImporter(),         anserImporter(),   plusImporter(),
+                                           plusSequenceImporter(), columnsImporter(), trajImporter()};
   return table;
 }
 

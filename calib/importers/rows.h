@@ -9,6 +9,7 @@ Importer anserImporter();
 Importer columnsImporter();
 Importer fcsvImporter();
 Importer plusImporter();
+Importer plusSequenceImporter();
 Importer trajImporter();
 
 }  // namespace fieldtrue::importers

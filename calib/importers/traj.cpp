@@ -4,15 +4,13 @@
 #include "calib/core/declare.h"
 #include "calib/core/file_io.h"
 #include "calib/core/trimmed.h"
+#include "calib/importers/pose_matrix.h"
 #include "calib/importers/rows.h"
 #include "calib/tables/csv_reader.h"
 
 namespace fieldtrue::importers {
 
 namespace {
-
-/// The matrices are printed with six digits; more than this is no rotation.
-constexpr double kLargestRotationError = 1e-2;
 
 /// Four numbers of a line; none when it holds anything else.
 std::optional<Eigen::RowVector4d> numbersOf(std::string_view line) {
@@ -26,15 +24,6 @@ std::optional<Eigen::RowVector4d> numbersOf(std::string_view line) {
     rest = trimmed(rest.substr(end));
   }
   return rest.empty() ? std::optional(row) : std::nullopt;
-}
-
-/// What keeps a matrix from being a pose, empty when nothing.
-std::string wrongWith(const Eigen::Matrix4d& matrix) {
-  if (matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) return "the last row is not 0 0 0 1";
-  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
-  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (error > kLargestRotationError || R.determinant() < 0.0) return "its upper left part is not a rotation";
-  return {};
 }
 
 Result<std::vector<SampleRow>> readMatrices(std::istream& in, const std::string& name, double rate_hz) {
@@ -56,7 +45,7 @@ Result<std::vector<SampleRow>> readMatrices(std::istream& in, const std::string&
     if (!numbers) return bad("a row of a matrix needs 4 finite numbers, got '" + line.substr(0, 60) + "'");
     matrix.row(next_row++) = *numbers;
     if (next_row < 4) continue;
-    if (const std::string wrong = wrongWith(matrix); !wrong.empty()) return bad("the matrix is no pose: " + wrong);
+    if (const std::string wrong = wrongWithPose(matrix); !wrong.empty()) return bad("the matrix is no pose: " + wrong);
     next_row = 0;
     SampleRow row;
     row.sample.time_s = static_cast<double>(rows.size()) / rate_hz;

@@ -44,13 +44,13 @@ class ImporterContractTest : public QObject {
       FT_VERIFY_OK(resolveSettings(importer.id, importer.settings, {}));
       QVERIFY(*findImporter(importer.id) == &importer);
     }
-    QVERIFY((ids == std::set<std::string>{"fcsv", "anser", "plus", "columns", "traj"}));
+    QVERIFY((ids == std::set<std::string>{"fcsv", "anser", "plus", "plus_sequence", "columns", "traj"}));
   }
 
   void unknownIdNamesTheKnown() {
     const auto found = findImporter("xml");
     QVERIFY(!found && found.error().code == ErrorCode::kBadInput);
-    FT_VERIFY_MATCH(holdsAll(found.error().message, {"'xml'", "fcsv, anser, plus, columns, traj"}));
+    FT_VERIFY_MATCH(holdsAll(found.error().message, {"'xml'", "fcsv, anser, plus, plus_sequence, columns, traj"}));
   }
 
   void absentFile_data() { addRows(); }
