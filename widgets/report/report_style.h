@@ -43,7 +43,7 @@ summary { margin: 12px 0; cursor: pointer; color: var(--accent); }
 @page { margin: 12mm; }
 @media print { :root { --page: #ffffff; --text: #000000; --muted: #444444; --line: #bbbbbb; --panel: #f2f2f2; }
   body { max-width: none; padding: 0; font-size: 11pt; } h1 { font-size: 18pt; } .verdict { font-size: 13pt; }
-  figure, tr, dl { break-inside: avoid; } h2, h3 { break-after: avoid; } .wide { overflow-x: visible; } table { font-size: 8pt; } .range { min-width: 0; }
+  figure, tr, dl { break-inside: avoid; } h2, h3 { break-after: avoid; } .wide { overflow-x: visible; } table { font-size: 8pt; } th, td { padding-left: 4px; padding-right: 4px; } .range { min-width: 0; }
   .verdict, h1 { break-after: avoid; } }
 )";
 

@@ -1,11 +1,14 @@
 #include "widgets/shell/main_window.h"
 
 #include <QCloseEvent>
+#include <QDragEnterEvent>
 #include <QFileInfo>
 #include <QHBoxLayout>
+#include <QMimeData>
 #include <QSettings>
 #include <QShortcut>
 #include <QStackedWidget>
+#include <QUrl>
 #include <QVBoxLayout>
 
 #include "widgets/shell/device_strip.h"
@@ -19,6 +22,7 @@ namespace fieldtrue::widgets {
 
 MainWindow::MainWindow(QWidget* parent) : QMainWindow(parent), workbench_(new Workbench(this)) {
   setWindowTitle(tr("Fieldtrue"));
+  setAcceptDrops(true);
   auto* center = new QWidget(this);
   auto* columns = new QHBoxLayout(center);
   columns->setContentsMargins(0, 0, 0, 0);
@@ -88,6 +92,27 @@ void MainWindow::openHelp() {
   help_->showPage(QLatin1String(page_->guide));
   help_->raise();
   help_->activateWindow();
+}
+
+void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
+  if (event->mimeData()->hasUrls()) event->acceptProposedAction();
+}
+
+void MainWindow::dropEvent(QDropEvent* event) {
+  const QList<QUrl> urls = event->mimeData()->urls();
+  const QString path = urls.isEmpty() ? QString() : urls.front().toLocalFile();
+  if (path.isEmpty()) return;
+  event->acceptProposedAction();
+  if (path.endsWith(QStringLiteral(".fieldtrue"))) {
+    workbench_->openSession(path);
+    return;
+  }
+  workbench_->showMessage({tr("%1 is no session (*.fieldtrue), and only sessions open here; tables and other programs' "
+                              "files come in with fieldtrue-cli import.")
+                               .arg(QFileInfo(path).fileName()),
+                           Severity::kAttention,
+                           {},
+                           {}});
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {

@@ -4,11 +4,15 @@
 #include <QApplication>
 #include <QComboBox>
 #include <QDir>
+#include <QDragEnterEvent>
+#include <QFileInfo>
 #include <QLabel>
+#include <QMimeData>
 #include <QPushButton>
 #include <QTemporaryDir>
 #include <QTest>
 #include <QThreadPool>
+#include <QUrl>
 
 #include "acquisition/session/session_store.h"
 #include "calib/calibration/alignment.h"
@@ -66,6 +70,23 @@ class RefusedTablesTest : public testing::WindowDriver {
     record(folder_.filePath("mm.fieldtrue"), {1000.0, false});
     record(folder_.filePath("two.fieldtrue"), {1.0, true});
     record(folder_.filePath("good.fieldtrue"), {});
+  }
+  void aDroppedSessionOpensAndNothingElseDoes() {
+    const auto drop = [&](const QString& path) {
+      QMimeData data;
+      data.setUrls({QUrl::fromLocalFile(path)});
+      QDragEnterEvent enter({100, 100}, Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+      QApplication::sendEvent(window_.get(), &enter);
+      QVERIFY(enter.isAccepted());
+      QDropEvent dropped({100.0, 100.0}, Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+      QApplication::sendEvent(window_.get(), &dropped);
+      QVERIFY(dropped.isAccepted());
+    };
+    drop(folder_.filePath("places.nodes.csv"));
+    QVERIFY(!window_->workbench().sessionIsOpen());
+    drop(folder_.filePath("good.fieldtrue"));
+    QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().sessionIsOpen(), 20000);
+    QCOMPARE(QFileInfo(window_->workbench().sessionPath()).fileName(), QStringLiteral("good.fieldtrue"));
   }
   void init() {
     window_ = std::make_unique<MainWindow>();
