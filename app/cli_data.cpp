@@ -3,12 +3,15 @@
 #include <set>
 #include <string>
 
+#include "acquisition/session/imported_session.h"
 #include "acquisition/session/session_store.h"
 #include "app/cli.h"
 #include "app/cli_values.h"
 #include "calib/exporters/imported_calibration.h"
+#include "calib/importers/column_guess.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
+#include "calib/importers/text_table.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/simulation/simulator.h"
 #include "calib/tables/table_io.h"
@@ -141,15 +144,56 @@ struct ImportOptions {
   std::string in;
   std::string truth;
   TablePaths out;
+  std::string session;
   std::string calibration;
+  bool guess = false;
 };
+
+constexpr std::size_t kRowsShown = 5;
+
+/// The command that reads a file which is of a known format.
+Answer knownFormat(const std::string& id, const std::string& label, const ImportOptions& options) {
+  Answer answer;
+  answer.json = {{"format", id}};
+  answer.text = label + "\nfieldtrue-cli import --format " + id + " --in '" + options.in + "'\n";
+  return answer;
+}
+
+/// What a file seems to hold, and the command that reads it so. Nothing is written.
+Outcome runGuess(const ImportOptions& options) {
+  if (const importers::Importer* importer = importers::recogniseRecording(options.in))
+    return knownFormat(importer->id, importer->label, options);
+  if (const exporters::CalibrationFormat* format = exporters::recogniseCalibration(options.in))
+    return knownFormat(format->id, format->label, options);
+  const auto guess = importers::guessColumns(options.in);
+  if (!guess) return notPossible(guess.error());
+  const auto preview = importers::previewText(options.in, guess->settings, kRowsShown);
+  if (!preview) return notPossible(preview.error());
+  const std::string format = importers::formatText(guess->settings) + (guess->has_unit ? "" : ",unit=?");
+  Answer answer;
+  answer.json = {{"format", format},
+                 {"settings", toJson(guess->settings)},
+                 {"reasons", guess->reasons},
+                 {"has_unit", guess->has_unit},
+                 {"columns", preview->columns},
+                 {"rows", preview->rows}};
+  for (const std::string& reason : guess->reasons) answer.text.append(reason).append("\n");
+  const auto show = [&](const std::vector<std::string>& fields) {
+    for (const std::string& field : fields) answer.text.append("  ").append(field);
+    answer.text += "\n";
+  };
+  show(preview->columns);
+  for (const std::vector<std::string>& row : preview->rows) show(row);
+  answer.text += "fieldtrue-cli import --format '" + format + "' --in '" + options.in + "'\n";
+  return answer;
+}
 
 Outcome runImportCalibration(const exporters::CalibrationFormat& format, const ImportOptions& options) {
   if (options.calibration.empty())
     return wrongUsage("format " + format.id + " holds a calibration; name the file to write with --calibration");
-  if (!options.out.nodes.empty() || !options.out.samples.empty() || !options.truth.empty())
+  if (!options.out.nodes.empty() || !options.out.samples.empty() || !options.session.empty() || !options.truth.empty())
     return wrongUsage("format " + format.id +
-                      " holds a calibration and no table; leave --nodes, --samples and --truth out");
+                      " holds a calibration and no table; leave --nodes, --samples, --session and --truth out");
   const auto imported = exporters::importCalibration(format, options.in);
   if (!imported) return notPossible(imported.error());
   const auto saved = imported->save(options.calibration);
@@ -181,6 +225,8 @@ Read<std::pair<const importers::Importer*, Settings>> readFormat(const std::stri
 }
 
 Outcome runImport(const ImportOptions& options, const CommonOptions&) {
+  if (options.guess) return runGuess(options);
+  if (options.format.empty()) return wrongUsage("--format is required, or --guess to be told which");
   if (const exporters::CalibrationFormat* format = exporters::findCalibrationFormat(options.format))
     return runImportCalibration(*format, options);
   const auto format = readFormat(options.format);
@@ -192,8 +238,8 @@ Outcome runImport(const ImportOptions& options, const CommonOptions&) {
   if (!options.calibration.empty())
     return wrongUsage("format " + importer->id +
                       " holds measurements; fit a calibration to them with fieldtrue-cli fit");
-  if (options.out.nodes.empty() && options.out.samples.empty()) {
-    return wrongUsage("nothing to write; name a file with --nodes or --samples");
+  if (options.out.nodes.empty() && options.out.samples.empty() && options.session.empty()) {
+    return wrongUsage("nothing to write; name a file with --nodes, --samples or --session");
   }
   std::optional<std::filesystem::path> truth;
   if (!options.truth.empty()) truth = options.truth;
@@ -203,15 +249,26 @@ Outcome runImport(const ImportOptions& options, const CommonOptions&) {
     if (const auto units = recording::checkUnits(*imported->table); !units)
       imported->notes.push_back(units.error().message);
   }
-  if (!options.out.nodes.empty() && !imported->table) {
-    return notPossible(options.in +
-                       " holds no true positions, so there is no node table; write its samples with --samples");
+  const bool needs_table = !options.out.nodes.empty() || !options.session.empty();
+  if (needs_table && !imported->table) {
+    return notPossible(options.in + " holds no true positions, so there is no node table" +
+                       (options.session.empty() ? "" : " and no session") + "; write its samples with --samples");
   }
   if (!options.out.samples.empty() && !imported->samples) {
     return notPossible(options.in + " holds means only, so there is no sample table; leave --samples out");
   }
-  return writeTables(options.out, imported->table ? &*imported->table : nullptr,
-                     imported->samples ? &*imported->samples : nullptr, imported->notes);
+  if (!options.session.empty()) {
+    const auto made = acquisition::makeSession(QString::fromStdString(options.session), *imported->table,
+                                               imported->samples, options.in + " by " + options.format);
+    if (!made) return notPossible(made.error());
+  }
+  Outcome written = writeTables(options.out, imported->table ? &*imported->table : nullptr,
+                                imported->samples ? &*imported->samples : nullptr, imported->notes);
+  if (written && !options.session.empty()) {
+    written->json["session"] = {{"file", options.session}};
+    written->text += "session written to " + options.session + "; open it with fieldtrue\n";
+  }
+  return written;
 }
 
 void addImport(CommandLine& line) {
@@ -219,13 +276,16 @@ void addImport(CommandLine& line) {
   command
       ->add_option("--format", options->format,
                    "Format, with settings as in columns:key=value,...; see fieldtrue-cli formats")
-      ->type_name("ID")
-      ->required();
+      ->type_name("ID");
+  command->add_flag(
+      "--guess", options->guess,
+      "Guess the format, and of a table of text columns and unit, and show the first rows; write nothing");
   command->add_option("--in", options->in, "File to read")->type_name("FILE")->required();
   command->add_option("--truth", options->truth, "File with the true positions, where the format needs one")
       ->type_name("FILE");
   command->add_option("--nodes", options->out.nodes, "Node table to write")->type_name("FILE");
   command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
+  command->add_option("--session", options->session, "Session to make, to be opened in the window")->type_name("FILE");
   command->add_option("--calibration", options->calibration, "Calibration to write, where the format holds one")
       ->type_name("FILE");
 }

@@ -7,6 +7,8 @@ namespace fieldtrue::acquisition {
 
 namespace {
 
+constexpr double kNoTimes_s = -1.0;
+
 void append(QVariantList& values, const Pose& pose) {
   const Eigen::Quaterniond& q = pose.orientation;
   for (const double part :
@@ -50,35 +52,57 @@ PlannedPlace readPlace(const QSqlQuery& row, int first) {
   return place;
 }
 
-QVariantList takeValues(const std::vector<Sample>& samples, const NodeStatistics& statistics) {
-  FT_CHECK(!samples.empty());
-  QVariantList values{samples.front().sensor};
-  append(values, statistics.mean);
-  const Eigen::Matrix3d& c = statistics.covariance_m2;
-  for (const double part : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2), statistics.sd_rot_rad,
-                            statistics.autocorrelation, statistics.n_effective, statistics.quantum_m}) {
+namespace {
+
+QVariantList takeValues(const Node& mean, double autocorrelation, double quantum_m) {
+  QVariantList values{mean.sensor};
+  Pose pose = mean.tracker_from_sensor;
+  if (!mean.has_orientation) pose.orientation.coeffs().setZero();
+  append(values, pose);
+  const Eigen::Matrix3d c = mean.covariance_m2.value_or(Eigen::Matrix3d::Zero());
+  for (const double part : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2), mean.sd_rot_rad.value_or(0.0),
+                            autocorrelation, mean.n_effective, quantum_m}) {
     values << part;
   }
-  const auto [first, last] = std::minmax_element(samples.begin(), samples.end(),
-                                                 [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
-  values << static_cast<qlonglong>(statistics.n_used) << static_cast<qlonglong>(statistics.rejections.size())
-         << first->time_s << last->time_s;
+  const bool has_times = mean.t_start_s && mean.t_end_s;
+  values << mean.n_used << mean.n_rejected << (has_times ? *mean.t_start_s : 0.0)
+         << (has_times ? *mean.t_end_s : kNoTimes_s);
   return values;
 }
+
+}  // namespace
+
+QVariantList takeValues(const std::vector<Sample>& samples, const NodeStatistics& statistics) {
+  FT_CHECK(!samples.empty());
+  Node mean;
+  mean.sensor = samples.front().sensor;
+  setStatistics(mean, statistics);
+  const auto [first, last] = std::minmax_element(samples.begin(), samples.end(),
+                                                 [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+  mean.t_start_s = first->time_s;
+  mean.t_end_s = last->time_s;
+  return takeValues(mean, statistics.autocorrelation, statistics.quantum_m);
+}
+
+QVariantList takeValues(const Node& mean) { return takeValues(mean, 0.0, 0.0); }
 
 void readTake(const QSqlQuery& row, int first, Node& node) {
   node.sensor = row.value(first).toInt();
   node.tracker_from_sensor = readPose(row, first + 1);
+  node.has_orientation = !node.tracker_from_sensor.orientation.coeffs().isZero(0.0);
+  if (!node.has_orientation) node.tracker_from_sensor.orientation.setIdentity();
   const auto value = [&](int offset) { return row.value(first + offset).toDouble(); };
   Eigen::Matrix3d covariance;
   covariance << value(8), value(11), value(12), value(11), value(9), value(13), value(12), value(13), value(10);
   // Tables hold SDs. The square of the rounded root is what they read back, and so what every reader of a session gets.
   covariance.diagonal() = covariance.diagonal().cwiseSqrt().cwiseAbs2().eval();
-  node.covariance_m2 = covariance;
-  node.sd_rot_rad = value(14);
+  // A take has at least its floor.
+  if (!covariance.isZero(0.0)) node.covariance_m2 = covariance;
+  if (value(14) > 0.0) node.sd_rot_rad = value(14);
   node.n_effective = value(16);
   node.n_used = row.value(first + 18).toInt();
   node.n_rejected = row.value(first + 19).toInt();
+  if (value(21) < value(20)) return;
   node.t_start_s = value(20);
   node.t_end_s = value(21);
 }

@@ -20,6 +20,9 @@ inline constexpr const char* kTakeColumns =
     " sd_rot_rad, autocorrelation, n_effective, quantum_m, n_used, n_rejected, t_start_s, t_end_s";
 /// @param samples not empty
 QVariantList takeValues(const std::vector<Sample>& samples, const NodeStatistics& statistics);
+/// Of a mean whose samples are not known. What a mean may lack is written so: no orientation as a quaternion of zeros,
+/// no scatter as zeros, no times as an end before the start.
+QVariantList takeValues(const Node& mean);
 /// The take's part of a node row; identity, truth and role are left alone.
 void readTake(const QSqlQuery& row, int first_column, Node& node);
 

@@ -148,6 +148,15 @@ struct SessionStore::Impl {
     return added.lastInsertId().toLongLong();
   }
 
+  Result<qlonglong> addTake(std::size_t place, const std::string& suspicious, QVariantList values) const {
+    FT_TRY(const auto action, addAction(place, "take", suspicious));
+    values.prepend(action);
+    FT_TRY_VOID(file->run(
+        QStringLiteral("INSERT INTO takes(action, %1) VALUES(%2)").arg(kTakeColumns, placeholders(values.size())),
+        values));
+    return action;
+  }
+
   Result<void> addSamples(qlonglong action, const std::vector<Sample>& samples,
                           const NodeStatistics& statistics) const {
     std::map<std::size_t, QString> rejected;
@@ -353,13 +362,21 @@ Result<void> SessionStore::storeTake(std::size_t place, const std::vector<Sample
                                      const NodeStatistics& statistics, const std::string& suspicious) {
   FT_CHECK(place < places().size());
   return impl_->store([&]() -> Result<void> {
-    FT_TRY(const auto action, impl_->addAction(place, "take", suspicious));
-    QVariantList values = takeValues(samples, statistics);
-    values.prepend(action);
-    FT_TRY_VOID(impl_->file->run(
-        QStringLiteral("INSERT INTO takes(action, %1) VALUES(%2)").arg(kTakeColumns, placeholders(values.size())),
-        values));
+    FT_TRY(const auto action, impl_->addTake(place, suspicious, takeValues(samples, statistics)));
     return impl_->addSamples(action, samples, statistics);
+  });
+}
+
+Result<void> SessionStore::storeForeign(const std::vector<ForeignTake>& takes) {
+  return impl_->store([&]() -> Result<void> {
+    for (const ForeignTake& take : takes) {
+      FT_CHECK(take.place < places().size());
+      FT_TRY(const auto action, impl_->addTake(take.place, {}, takeValues(take.mean)));
+      FT_TRY_VOID(impl_->addSamples(action, take.samples, {}));
+      if (take.mean.role == NodeRole::kSkipped)
+        FT_TRY_VOID(impl_->addAction(take.place, "skip", "skipped in the imported recording"));
+    }
+    return {};
   });
 }
 

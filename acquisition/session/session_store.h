@@ -23,6 +23,13 @@ struct LooseSample {
   std::optional<int> cancelled_node;  ///< Where it was to be taken; none between the places.
 };
 
+/// What another program recorded at a place.
+struct ForeignTake {
+  std::size_t place = 0;
+  Node mean;
+  std::vector<Sample> samples;  ///< Empty where only the mean is known.
+};
+
 /// Its row of a sample table: node -1, and `cancelled:<node>` as status when it is of a take.
 SampleRow rowOf(LooseSample reading);
 
@@ -61,6 +68,8 @@ class SessionStore {
   /// @error kIo with the reason (disk full): nothing of the take is stored
   Result<void> storeTake(std::size_t place, const std::vector<Sample>& samples, const NodeStatistics& statistics,
                          const std::string& suspicious);
+  /// Stores takes that another program made, all of them or none.
+  Result<void> storeForeign(const std::vector<ForeignTake>& takes);
   Result<void> skip(std::size_t place, const std::string& reason);
   /// Takes back the last take or skip (any number of times). @return the place it concerned, none when nothing is left
   Result<std::optional<std::size_t>> undo();

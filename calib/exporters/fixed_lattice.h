@@ -10,6 +10,4 @@ Result<Written> writeFixedLattice(const ExportSubject& subject, const ExportOpti
                                   const std::filesystem::path& path, const LatticePoints& points,
                                   const LatticeForm& form, const std::string& label, const RunControl& control);
 
-inline constexpr double kFoot_m = 0.3048;
-
 }  // namespace fieldtrue::exporters

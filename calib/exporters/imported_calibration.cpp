@@ -126,6 +126,16 @@ const CalibrationFormat* findCalibrationFormat(std::string_view id) {
   return nullptr;
 }
 
+const CalibrationFormat* recogniseCalibration(const std::filesystem::path& path) {
+  for (const CalibrationFormat& format : calibrationFormats()) {
+    const Result<const Exporter*> reader = readerFor(format, path);
+    if (!reader) continue;
+    const Result<LatticeField> field = (*reader)->read(path);
+    if (field && check(*field, path.filename().string())) return &format;
+  }
+  return nullptr;
+}
+
 Result<Corrector> importCalibration(const CalibrationFormat& format, const std::filesystem::path& path) {
   const std::string name = path.filename().string();
   FT_TRY(const Exporter* exporter, readerFor(format, path));

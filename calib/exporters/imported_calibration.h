@@ -24,6 +24,9 @@ std::span<const CalibrationFormat> calibrationFormats();
 /// Null where no format has that id.
 const CalibrationFormat* findCalibrationFormat(std::string_view id);
 
+/// The format whose reader takes a file; null where none does.
+const CalibrationFormat* recogniseCalibration(const std::filesystem::path& path);
+
 /// A calibration as another program wrote it. Nobody's measurements are in it: its rows are points of the lattice, its
 /// error is not known, and its notes say so.
 /// @error kBadInput for what is not such a file, or a lattice that is too large; kIo

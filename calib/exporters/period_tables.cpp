@@ -1,6 +1,7 @@
 #include <sstream>
 
 #include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/exporters/fixed_lattice.h"
 #include "calib/exporters/itk_field.h"
 #include "calib/exporters/rows.h"

@@ -4,11 +4,11 @@
 #include <tuple>
 
 #include "calib/core/declare.h"
-#include "calib/core/file_io.h"
+#include "calib/core/units.h"
 #include "calib/importers/averaging.h"
 #include "calib/importers/rows.h"
+#include "calib/importers/text_table.h"
 #include "calib/importers/truth.h"
-#include "calib/tables/csv_reader.h"
 
 namespace fieldtrue::importers {
 
@@ -18,7 +18,8 @@ using Column = std::optional<std::size_t>;
 using Group = std::optional<std::vector<std::size_t>>;
 
 struct Layout {
-  Group position, rotation, true_position, true_rotation;
+  Group position, rotation, angles, true_position, true_rotation, true_angles;
+  bool hasRotation() const { return rotation || angles; }
   Column node, sensor, visit, time, status;
 };
 
@@ -28,15 +29,16 @@ struct Row {
   std::optional<Pose> truth;
 };
 
-double unitOf_m(const std::string& unit) {
-  static const std::map<std::string, double> units{{"mm", 1e-3}, {"cm", 1e-2}, {"in", 0.0254}, {"m", 1.0}};
-  return units.at(unit);
-}
+/// What one of the table's numbers of length is worth.
+struct Units {
+  double tracked_m = 1.0;
+  double true_m = 1.0;
+};
 
-char separatorOf(const std::string& name) {
-  static const std::map<std::string, char> separators{
-      {"comma", ','}, {"semicolon", ';'}, {"tab", '\t'}, {"space", ' '}};
-  return separators.at(name);
+Units unitsOf(const Settings& settings) {
+  const double tracked_m = lengthUnit_m(choiceSetting(settings, "unit"));
+  const std::string& of_truth = choiceSetting(settings, "unit_true");
+  return {tracked_m, of_truth == kSameUnit ? tracked_m : lengthUnit_m(of_truth)};
 }
 
 /// The columns that a group of settings names: all of them, or none when every name is blank.
@@ -59,11 +61,13 @@ Result<Group> findGroup(const CsvReader& reader, const Settings& settings, const
 
 Result<Layout> findLayout(const CsvReader& reader, const Settings& settings) {
   Layout layout;
-  const std::array<std::pair<std::vector<std::string>, Group*>, 4> groups{
+  const std::array<std::pair<std::vector<std::string>, Group*>, 6> groups{
       {{{"x", "y", "z"}, &layout.position},
        {{"qw", "qx", "qy", "qz"}, &layout.rotation},
+       {{"azimuth", "elevation", "roll"}, &layout.angles},
        {{"x_true", "y_true", "z_true"}, &layout.true_position},
-       {{"qw_true", "qx_true", "qy_true", "qz_true"}, &layout.true_rotation}}};
+       {{"qw_true", "qx_true", "qy_true", "qz_true"}, &layout.true_rotation},
+       {{"azimuth_true", "elevation_true", "roll_true"}, &layout.true_angles}}};
   for (const auto& [keys, group] : groups) {
     FT_TRY(const Group found, findGroup(reader, settings, keys));
     *group = found;
@@ -78,6 +82,8 @@ Result<Layout> findLayout(const CsvReader& reader, const Settings& settings) {
     if (found) *column = (*found)[0];
   }
   if (!layout.position) return fail(ErrorCode::kBadInput, "columns: the settings x, y and z must name columns");
+  if ((layout.rotation && layout.angles) || (layout.true_rotation && layout.true_angles))
+    return fail(ErrorCode::kBadInput, "columns: an orientation is given twice, as a quaternion and as angles");
   return layout;
 }
 
@@ -88,7 +94,15 @@ Eigen::Vector3d position_m(CsvReader& reader, const std::vector<std::size_t>& co
   return unit_m * Eigen::Vector3d(x, y, z);
 }
 
-Row readRow(CsvReader& reader, const Layout& layout, double unit_m, int row_number) {
+Eigen::Quaterniond orientation(CsvReader& reader, const Group& quaternion, const Group& angles) {
+  if (!angles) return reader.quaternion(quaternion).value_or(Eigen::Quaterniond::Identity());
+  Eigen::Vector3d angles_rad;
+  for (Eigen::Index i = 0; i < 3; ++i)
+    angles_rad[i] = reader.number((*angles)[static_cast<std::size_t>(i)]) * kRadPerDeg;
+  return canonical(rotationFromEuler(angles_rad));
+}
+
+Row readRow(CsvReader& reader, const Layout& layout, const Units& units, int row_number) {
   Row row;
   Sample& sample = row.tracked.sample;
   row.tracked.node = reader.optionalInteger(layout.node).value_or(row_number);
@@ -96,22 +110,22 @@ Row readRow(CsvReader& reader, const Layout& layout, double unit_m, int row_numb
   sample.sensor = reader.optionalInteger(layout.sensor).value_or(0);
   sample.time_s = reader.optionalNumber(layout.time).value_or(0.0);
   if (layout.status) sample.status = reader.field(*layout.status);
-  sample.tracker_from_sensor.position_m = position_m(reader, *layout.position, unit_m);
-  sample.tracker_from_sensor.orientation = reader.quaternion(layout.rotation).value_or(Eigen::Quaterniond::Identity());
+  sample.tracker_from_sensor.position_m = position_m(reader, *layout.position, units.tracked_m);
+  sample.tracker_from_sensor.orientation = orientation(reader, layout.rotation, layout.angles);
   markMissing(sample);
   if (layout.true_position && row.tracked.node >= 0) {
-    row.truth = Pose{position_m(reader, *layout.true_position, unit_m),
-                     reader.quaternion(layout.true_rotation).value_or(Eigen::Quaterniond::Identity())};
+    row.truth = Pose{position_m(reader, *layout.true_position, units.true_m),
+                     orientation(reader, layout.true_rotation, layout.true_angles)};
   }
   return row;
 }
 
-Result<std::vector<Row>> readRows(CsvReader& reader, const Layout& layout, double unit_m) {
+Result<std::vector<Row>> readRows(CsvReader& reader, const Layout& layout, const Units& units) {
   std::vector<Row> rows;
   while (true) {
     FT_TRY(const bool more, reader.next());
     if (!more) break;
-    rows.push_back(readRow(reader, layout, unit_m, static_cast<int>(rows.size())));
+    rows.push_back(readRow(reader, layout, units, static_cast<int>(rows.size())));
     if (reader.error()) return tl::unexpected(*reader.error());
   }
   if (rows.empty()) return fail(ErrorCode::kBadInput, reader.name() + " has a header but no rows");
@@ -132,7 +146,7 @@ Result<std::vector<Node>> nodesOf(const std::vector<Row>& rows, const Layout& la
     const int count = visits[{node.node, node.sensor}]++;
     node.visit = layout.visit ? row.tracked.visit : count;
     node.tracker_from_sensor = sample.tracker_from_sensor;
-    node.has_orientation = layout.rotation.has_value();
+    node.has_orientation = layout.hasRotation();
     if (layout.time) node.t_start_s = node.t_end_s = sample.time_s;
     if (!keys.emplace(node.node, node.sensor, node.visit).second) {
       return fail(ErrorCode::kBadInput, "columns: node " + std::to_string(node.node) + ", sensor " +
@@ -191,7 +205,7 @@ Result<std::vector<Node>> makeNodes(const std::vector<Row>& rows, const std::vec
                                     const Layout& layout, bool average, std::vector<std::string>& notes) {
   if (!average) return nodesOf(rows, layout);
   if (!layout.node) return fail(ErrorCode::kBadInput, "columns: average=true needs node= to name the column of places");
-  FT_TRY(AveragedNodes averaged, averageRows(samples, {}, layout.rotation.has_value(), "Node"));
+  FT_TRY(AveragedNodes averaged, averageRows(samples, {}, layout.hasRotation(), "Node"));
   notes.insert(notes.end(), averaged.notes.begin(), averaged.notes.end());
   return std::move(averaged.nodes);
 }
@@ -222,18 +236,17 @@ Result<Import> assemble(const std::vector<Row>& rows, const Layout& layout,
 
 Result<Import> importColumns(const std::filesystem::path& path, const std::optional<std::filesystem::path>& truth_path,
                              const Settings& settings) {
-  FT_TRY(std::ifstream in, openForReading(path));
-  FT_TRY(CsvReader reader,
-         CsvReader::open(in, path.filename().string(), separatorOf(choiceSetting(settings, "separator"))));
+  FT_TRY(TextTable text, TextTable::open(path, settings));
+  CsvReader& reader = text.reader();
   FT_TRY(const Layout layout, findLayout(reader, settings));
   if (layout.true_position && truth_path) {
     return fail(ErrorCode::kBadInput,
                 "columns: the truth is given twice, by x_true, y_true, z_true and by a truth file");
   }
-  if (layout.true_rotation && !layout.true_position) {
-    return fail(ErrorCode::kBadInput, "columns: qw_true to qz_true need x_true, y_true and z_true");
+  if ((layout.true_rotation || layout.true_angles) && !layout.true_position) {
+    return fail(ErrorCode::kBadInput, "columns: a true orientation needs x_true, y_true and z_true");
   }
-  FT_TRY(const std::vector<Row> rows, readRows(reader, layout, unitOf_m(choiceSetting(settings, "unit"))));
+  FT_TRY(const std::vector<Row> rows, readRows(reader, layout, unitsOf(settings)));
   return assemble(rows, layout, truth_path, settings);
 }
 
@@ -242,10 +255,7 @@ Setting textSetting(std::string key, std::string label, std::string usual, std::
   return declare::choice(std::move(key), std::move(label), std::move(choices), std::move(usual), std::move(help));
 }
 
-}  // namespace
-
-/// Any table with a header row: the settings name its columns, unit and separator.
-Importer columnsImporter() {
+std::vector<Setting> columnSettings() {
   std::vector<Setting> settings;
   for (const char* axis : {"x", "y", "z"}) {
     settings.push_back(textSetting(axis, std::string("Tracked ") + axis, axis, "Column of the tracked position"));
@@ -253,6 +263,11 @@ Importer columnsImporter() {
   for (const char* part : {"qw", "qx", "qy", "qz"}) {
     settings.push_back(
         textSetting(part, std::string("Tracked ") + part, "", "Column of the tracked orientation; blank = none"));
+  }
+  for (const char* angle : {"azimuth", "elevation", "roll"}) {
+    settings.push_back(textSetting(angle, std::string("Tracked ") + angle, "",
+                                   "Column of the tracked orientation's angle in degrees, Rz(az) Ry(el) Rx(roll); "
+                                   "blank = none"));
   }
   for (const char* axis : {"x_true", "y_true", "z_true"}) {
     settings.push_back(
@@ -262,22 +277,38 @@ Importer columnsImporter() {
     settings.push_back(
         textSetting(part, "True " + std::string(part, 2), "", "Column of the true orientation; blank = none"));
   }
+  for (const char* angle : {"azimuth", "elevation", "roll"}) {
+    settings.push_back(textSetting(angle + std::string("_true"), std::string("True ") + angle, "",
+                                   "Column of the true orientation's angle in degrees; blank = none"));
+  }
   settings.push_back(textSetting("node", "Place", "", "Column of the place's number; blank = every row is a place"));
   settings.push_back(textSetting("sensor", "Sensor", "", "Column of the sensor's number; blank = 0"));
   settings.push_back(textSetting("visit", "Visit", "", "Column of the visit's number; blank = counted"));
   settings.push_back(textSetting("time", "Time", "", "Column of the time in seconds; blank = none"));
   settings.push_back(textSetting("status", "Status", "", "Column of the tracker's error mark; blank = none"));
-  settings.push_back(textSetting("unit", "Unit", "mm", "Unit of all positions", {"mm", "cm", "in", "m"}));
-  settings.push_back(textSetting("separator", "Separator", "comma", "What stands between fields",
-                                 {"comma", "semicolon", "tab", "space"}));
+  settings.push_back(textSetting("unit", "Unit", "mm", "Unit of the positions", lengthUnits()));
+  std::vector<std::string> units = lengthUnits();
+  units.insert(units.begin(), kSameUnit);
+  settings.push_back(textSetting("unit_true", "Unit of the truth", kSameUnit, "Unit of the true positions", units));
+  settings.push_back(textSetting("separator", "Separator", "comma", "What stands between fields", separatorNames()));
+  settings.push_back(textSetting("decimal", "Decimal mark", "point", "How fractions are written", {"point", "comma"}));
+  settings.push_back(declare::flag("header", "Names in the first row", true,
+                                   "Without them the columns are called column1, column2, and so on"));
   settings.push_back(textSetting("frame", "Frame of the truth", "jig", "What the true positions are measured against",
                                  {"tracker", "jig", "room"}));
   settings.push_back(declare::flag("average", "Rows are samples", false,
                                    "Average the rows of each node and visit instead of taking each as a mean"));
+  return settings;
+}
+
+}  // namespace
+
+/// Any table of text: the settings name its columns, unit and separator.
+Importer columnsImporter() {
   return {.id = "columns",
-          .label = "Table with named columns (.csv)",
-          .source = "any program that writes a header row",
-          .settings = settings,
+          .label = "Text table, columns chosen (.csv, .txt)",
+          .source = "any program that writes rows of numbers",
+          .settings = columnSettings(),
           .read = importColumns};
 }
 

@@ -60,7 +60,7 @@ Result<Import> importFcsv(const std::filesystem::path& in, const std::optional<s
 
 Result<FcsvPoints> readFcsv(const std::filesystem::path& path) {
   FT_TRY(std::ifstream in, openForReading(path));
-  FT_TRY(CsvReader reader, CsvReader::open(in, path.filename().string(), ',', true));
+  FT_TRY(CsvReader reader, CsvReader::open(in, path.filename().string(), ',', CsvHeader::kComment));
   constexpr std::array<std::string_view, 3> kPosition{"x", "y", "z"};
   FT_TRY(const std::vector<std::size_t> columns, reader.require(kPosition));
   FcsvPoints fcsv;
@@ -83,6 +83,7 @@ Importer fcsvImporter() {
           .label = "3D Slicer markups (.fcsv) and their true positions",
           .source = "3D Slicer 4.x, markups fiducial file",
           .needs_truth = true,
+          .extension = ".fcsv",
           .read = importFcsv};
 }
 

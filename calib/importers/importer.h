@@ -25,6 +25,7 @@ struct Importer {
   std::string source;
   std::vector<Setting> settings = {};  ///< Written `--format id:key=value,...`.
   bool needs_truth = false;            ///< Whether `--truth` must be given.
+  std::string extension = {};          ///< Tells the format where reading it alone cannot.
   Result<Import> (*read)(const std::filesystem::path& in, const std::optional<std::filesystem::path>& truth,
                          const Settings& settings) = nullptr;
 };

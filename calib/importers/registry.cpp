@@ -16,9 +16,24 @@
 namespace fieldtrue::importers {
 
 std::span<const Importer> importers() {
-  static const std::vector<Importer> table{fcsvImporter(),         anserImporter(),   plusImporter(),
+  static const std::vector<Importer> table{nodesImporter(),        fcsvImporter(),    anserImporter(), plusImporter(),
                                            plusSequenceImporter(), columnsImporter(), trajImporter()};
   return table;
+}
+
+const Importer* recogniseRecording(const std::filesystem::path& path) {
+  for (const Importer& row : importers()) {
+    if (row.id == "columns") continue;
+    if (row.needs_truth ? path.extension() == row.extension : row.read(path, {}, usualSettings(row)).has_value())
+      return &row;
+  }
+  return nullptr;
+}
+
+Settings usualSettings(const Importer& importer) {
+  Settings usual;
+  for (const Setting& setting : importer.settings) usual[setting.key] = setting.default_value;
+  return usual;
 }
 
 Result<const Importer*> findImporter(std::string_view id) {

@@ -17,5 +17,10 @@ namespace fieldtrue::importers {
 std::span<const Importer> importers();
 /// @error kBadInput naming the known ids
 Result<const Importer*> findImporter(std::string_view id);
+/// The format that a file is of by what it holds: the first whose reader takes it, tables of chosen columns left out.
+/// Null where none does.
+const Importer* recogniseRecording(const std::filesystem::path& path);
+/// The settings of a format as they are declared.
+Settings usualSettings(const Importer& importer);
 
 }  // namespace fieldtrue::importers

@@ -8,6 +8,7 @@ namespace fieldtrue::importers {
 Importer anserImporter();
 Importer columnsImporter();
 Importer fcsvImporter();
+Importer nodesImporter();
 Importer plusImporter();
 Importer plusSequenceImporter();
 Importer trajImporter();

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "calib/core/file_io.h"
 #include "calib/core/trimmed.h"
@@ -40,9 +41,9 @@ std::optional<double> parseFinite(std::string_view text) {
   return value;
 }
 
-Result<CsvReader> CsvReader::open(std::istream& in, std::string name, char separator, bool is_comment_header) {
+Result<CsvReader> CsvReader::open(std::istream& in, std::string name, char separator, CsvHeader header) {
   CsvReader reader(in, std::move(name), separator);
-  FT_TRY_VOID(reader.readHeader(is_comment_header));
+  FT_TRY_VOID(reader.readHeader(header));
   return reader;
 }
 
@@ -66,7 +67,8 @@ std::optional<CsvReader::MetadataLine> CsvReader::metadataLine(char mark) const 
   return MetadataLine{std::string(key), std::string(trimmed(text.substr(at + 1))), line()};
 }
 
-Result<void> CsvReader::readHeader(bool is_comment_header) {
+Result<void> CsvReader::readHeader(CsvHeader header) {
+  const bool is_comment_header = header == CsvHeader::kComment;
   while (true) {
     FT_TRY(const bool more, lines_.next(line_));
     if (!more) {
@@ -86,6 +88,11 @@ Result<void> CsvReader::readHeader(bool is_comment_header) {
     if (!trimmed(line_).empty()) break;
   }
   if (!splitLine()) return tl::unexpected(*error_);
+  if (header == CsvHeader::kNone) {
+    first_row_waits_ = true;
+    for (std::size_t i = 1; i <= fields_.size(); ++i) columns_.push_back("column" + std::to_string(i));
+    return {};
+  }
   columns_.assign(fields_.begin(), fields_.end());
   return checkColumns();
 }
@@ -156,6 +163,8 @@ bool CsvReader::splitLine() {
 }
 
 Result<bool> CsvReader::next() {
+  // Split again: the reader may have been moved, and its fields point into its line.
+  if (std::exchange(first_row_waits_, false)) return splitLine();
   while (true) {
     const Result<bool> more = lines_.next(line_);
     if (!more || !*more) return more;
@@ -224,9 +233,16 @@ std::vector<std::string> CsvReader::unknown(std::span<const std::string_view> kn
   return others;
 }
 
+std::optional<double> CsvReader::finite(std::string_view text) const {
+  if (!decimal_comma_) return parseFinite(text);
+  std::string pointed(text);
+  std::replace(pointed.begin(), pointed.end(), ',', '.');
+  return parseFinite(pointed);
+}
+
 double CsvReader::number(std::size_t column) {
   const std::string_view text = field(column);
-  if (const std::optional<double> value = parseFinite(text)) return *value;
+  if (const std::optional<double> value = finite(text)) return *value;
   failAt(column, text.empty() ? "the field is blank, a number is needed" : inQuotes(text) + " is not a finite number");
   return 0.0;
 }
@@ -237,7 +253,7 @@ int CsvReader::integer(std::size_t column) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc() && end == text.data() + text.size() && !text.empty()) return value;
   // Spreadsheets write the whole numbers of a column with blanks as 3.0.
-  const std::optional<double> decimal = parseFinite(text);
+  const std::optional<double> decimal = finite(text);
   const bool is_whole = decimal && *decimal == std::floor(*decimal) && std::abs(*decimal) < 2147483648.0;
   if (is_whole) return static_cast<int>(*decimal);
   failAt(column,

@@ -15,6 +15,13 @@
 
 namespace fieldtrue {
 
+/// Where a table's columns have their names.
+enum class CsvHeader {
+  kRow,      ///< In the first row.
+  kComment,  ///< In the comment line `# columns = a,b,c`, as 3D Slicer writes it.
+  kNone,     ///< Nowhere: they are called column1, column2, ...
+};
+
 /// Streams a comma-separated table with a header row: columns by name, `#` lines of metadata above it, errors that
 /// name file, line and column. Accepts a byte-order mark, CRLF, blank lines and quoted fields within a line.
 ///
@@ -30,10 +37,11 @@ class CsvReader {
   /// Reads up to the header row.
   /// @param name stands in messages
   /// @param separator a blank also separates by runs of blanks
-  /// @param is_comment_header whether the header is the comment line `# columns = a,b,c`, as 3D Slicer writes it
   /// @error kBadInput when there is no header, a column has no name or a name comes twice; kIo
   static Result<CsvReader> open(std::istream& in, std::string name, char separator = ',',
-                                bool is_comment_header = false);
+                                CsvHeader header = CsvHeader::kRow);
+  /// From here on numbers may be written with a comma for the point.
+  void allowDecimalComma() { decimal_comma_ = true; }
 
   const std::string& name() const { return lines_.name(); }
   const std::vector<std::string>& columns() const { return columns_; }
@@ -71,7 +79,8 @@ class CsvReader {
 
  private:
   CsvReader(std::istream& in, std::string name, char separator) : lines_(in, std::move(name)), separator_(separator) {}
-  Result<void> readHeader(bool is_comment_header);
+  Result<void> readHeader(CsvHeader header);
+  std::optional<double> finite(std::string_view text) const;
   std::optional<MetadataLine> metadataLine(char mark) const;
   bool splitLine();
   std::string_view takeQuoted(std::size_t& at);
@@ -80,6 +89,8 @@ class CsvReader {
 
   LineReader lines_;
   char separator_;
+  bool decimal_comma_ = false;
+  bool first_row_waits_ = false;  ///< It was read to count the columns of a table without names.
   std::vector<std::string> columns_;
   std::vector<MetadataLine> metadata_;
   std::optional<MetadataLine> late_metadata_;  ///< The first below the header row.

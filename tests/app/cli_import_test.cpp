@@ -86,6 +86,45 @@ class CliImportTest : public QObject {
     QVERIFY(run.json().at("samples").at("rows").get<int>() > 100);
   }
 
+  void realRecordingsAreRecognised_data() {
+    QTest::addColumn<QString>("file");
+    QTest::addColumn<QString>("format");
+    QTest::newRow("anser") << "anser_duplo/nodes.csv" << "anser";
+    QTest::newRow("lighthouse") << "lighthouse/20200917_Exp1.nodes.csv" << "nodes";
+    QTest::newRow("PLUS samples") << "pluslib_fcal/samples.csv" << "plus";
+    QTest::newRow("trajectory") << "polhemus_hand/user1_cup0.traj" << "traj";
+    QTest::newRow("means by their columns")
+        << "pluslib_fcal/nodes.csv"
+        << "columns:x=tip_mean_x_mm,y=tip_mean_y_mm,z=tip_mean_z_mm,x_true=true_x_mm,y_true=true_y_mm,"
+           "z_true=true_z_mm,node=landmark";
+  }
+  void realRecordingsAreRecognised() {
+    FT_REQUIRE_REAL_DATA();
+    QFETCH(QString, file);
+    QFETCH(QString, format);
+    const CliRun run = runCli({"import", "--guess", "--in", data(file.toStdString()), "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    QCOMPARE(QString::fromStdString(run.json().at("format").get<std::string>()), format);
+  }
+
+  /// To the byte: what a session gives back is what was in the table.
+  void recordingsComeBackFromTheirSession() {
+    FT_REQUIRE_REAL_DATA();
+    const QString before = folder_.filePath("before.csv"), after = folder_.filePath("after.csv");
+    for (const char* file : {"lighthouse/20200917_Exp1.nodes.csv", "lighthouse/20201002_Exp2.nodes.csv"}) {
+      const QString session = folder_.filePath("s.fieldtrue");
+      FT_VERIFY_STATUS(
+          runCli({"import", "--format", "nodes", "--in", data(file), "--nodes", before, "--session", session}), 0);
+      FT_VERIFY_STATUS(runCli({"tables", "--session", session, "--nodes", after}), 0);
+      QFile first(before), second(after);
+      QVERIFY(first.open(QIODevice::ReadOnly) && second.open(QIODevice::ReadOnly));
+      QCOMPARE(second.readAll(), first.readAll());
+      // What is there is not replaced.
+      FT_VERIFY_STATUS(runCli({"import", "--format", "nodes", "--in", data(file), "--session", session}), 1);
+      QVERIFY(QFile::remove(session));
+    }
+  }
+
   void formatsAreListedWithTheirSettings() {
     const CliRun run = runCli({"formats", "--json"});
     FT_VERIFY_STATUS(run, 0);

@@ -56,6 +56,7 @@ DifferencePage::DifferencePage(Workbench& workbench, QWidget* parent) : QWidget(
   splitter->setCollapsible(0, false);
   rows->addWidget(splitter, 1);
   connect(&workbench_, &Workbench::correctorChanged, this, &DifferencePage::onSessionCalibration);
+  connect(&workbench_, &Workbench::earlierCalibrationChosen, first_, &QLineEdit::setText);
   connect(&workbench_, &Workbench::closing, this, [this] { jobs_.stop(); });
   showDifference();
 }

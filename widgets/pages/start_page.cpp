@@ -59,10 +59,13 @@ StartPage::StartPage(Workbench& workbench, QWidget* parent) : QWidget(parent), w
                                      tr("Serial line, network or the simulated tracker."), false);
   auto* open = makeChoice(QStringLiteral("startOpen"), QStringLiteral("folder"), tr("Open a session"),
                           tr("Goes on exactly where it was closed."), false);
+  auto* import = makeChoice(QStringLiteral("startImport"), QStringLiteral("import"), tr("Import a file"),
+                            tr("A recording or a calibration of another program, or any table of poses."), false);
   connect(demo, &QPushButton::clicked, this, [this] { workbench_.startDemonstration(); });
   connect(connect_tracker, &QPushButton::clicked, this, [this] { workbench_.goToPage(QStringLiteral("connect")); });
   connect(open, &QPushButton::clicked, this, &StartPage::openWithDialog);
-  for (QPushButton* button : {demo, connect_tracker, open}) layout->addWidget(button);
+  connect(import, &QPushButton::clicked, this, [this] { workbench_.goToPage(QStringLiteral("import")); });
+  for (QPushButton* button : {demo, connect_tracker, open, import}) layout->addWidget(button);
 
   layout->addSpacing(12);
   recent_ = new QVBoxLayout;

@@ -107,12 +107,8 @@ void MainWindow::dropEvent(QDropEvent* event) {
     workbench_->openSession(path);
     return;
   }
-  workbench_->showMessage({tr("%1 is no session (*.fieldtrue), and only sessions open here; tables and other programs' "
-                              "files come in with fieldtrue-cli import.")
-                               .arg(QFileInfo(path).fileName()),
-                           Severity::kAttention,
-                           {},
-                           {}});
+  if (path.endsWith(QStringLiteral(".ftcal.json"))) return workbench_->compareWith(path);
+  workbench_->importFile(path);
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {

@@ -13,6 +13,7 @@
 #include "widgets/pages/difference_page.h"
 #include "widgets/pages/export_page.h"
 #include "widgets/pages/gap_page.h"
+#include "widgets/pages/import_page.h"
 #include "widgets/pages/plan_page.h"
 #include "widgets/pages/start_page.h"
 
@@ -99,6 +100,7 @@ constexpr std::array kRows = {
     PageRow{"export", QT_TRANSLATE_NOOP("StepRail", "Export"), "export", "export", make<ExportPage>, markExport},
     PageRow{"difference", QT_TRANSLATE_NOOP("StepRail", "Changes"), "difference", "comparing", make<DifferencePage>,
             markStart},
+    PageRow{"import", QT_TRANSLATE_NOOP("StepRail", "Import"), "import", "importing", make<ImportPage>, markStart},
 };
 
 }  // namespace

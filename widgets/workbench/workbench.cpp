@@ -469,6 +469,16 @@ void Workbench::goToPage(const QString& page) {
   emit pageRequested(page);
 }
 
+void Workbench::importFile(const QString& path) {
+  goToPage(QStringLiteral("import"));
+  emit importRequested(path);
+}
+
+void Workbench::compareWith(const QString& calibration) {
+  goToPage(QStringLiteral("difference"));
+  emit earlierCalibrationChosen(calibration);
+}
+
 void Workbench::setGapReport(std::optional<gap::GapReport> report) {
   gap_report_ = std::move(report);
   emit gapReportChanged();

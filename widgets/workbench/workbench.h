@@ -111,6 +111,8 @@ class Workbench : public QObject {
 
   /// @param page its id, "acquire"; kept in the session so that it opens where it was
   void goToPage(const QString& page);
+  void importFile(const QString& path);          ///< Shows it on the page that imports.
+  void compareWith(const QString& calibration);  ///< Shows it as the earlier one of two calibrations.
   void showMessage(const Message& message);
   /// What was said of a condition, or of one within it, is no longer so.
   void endCondition(const QString& condition) { emit conditionEnded(condition); }
@@ -132,6 +134,8 @@ class Workbench : public QObject {
   void gapReportChanged();
   void fittingChanged();  ///< A fit of the session's calibration began or ended.
   void pageRequested(const QString& page);
+  void importRequested(const QString& path);
+  void earlierCalibrationChosen(const QString& path);
   void messageShown(const fieldtrue::widgets::Message& message);
   void conditionEnded(const QString& condition);
   void closing();  ///< The window goes: long work of the pages must stop.

@@ -125,8 +125,8 @@ class ColumnsTest : public QObject {
                                  << QByteArray("x to z belong together, z is missing");
     QTest::newRow("not a number") << QByteArray("n,x,y,z\n1,1,?,3\n") << QByteArray("node") << QByteArray("n")
                                   << QByteArray("table.csv, line 2, column y: '?'");
-    QTest::newRow("unit") << good << QByteArray("unit") << QByteArray("ft")
-                          << QByteArray("unit must be one of mm, cm, in, m, got 'ft'");
+    QTest::newRow("unit") << good << QByteArray("unit") << QByteArray("yd")
+                          << QByteArray("unit must be one of mm, cm, in, ft, m, got 'yd'");
     QTest::newRow("separator") << good << QByteArray("separator") << QByteArray("tab")
                                << QByteArray("must be separated by commas");
     QTest::newRow("no rows") << QByteArray("n,x,y,z\n") << QByteArray("node") << QByteArray("n")

@@ -44,7 +44,7 @@ class ImporterContractTest : public QObject {
       FT_VERIFY_OK(resolveSettings(importer.id, importer.settings, {}));
       QVERIFY(*findImporter(importer.id) == &importer);
     }
-    QVERIFY((ids == std::set<std::string>{"fcsv", "anser", "plus", "plus_sequence", "columns", "traj"}));
+    QVERIFY((ids == std::set<std::string>{"nodes", "fcsv", "anser", "plus", "plus_sequence", "columns", "traj"}));
   }
 
   void unknownIdNamesTheKnown() {

@@ -144,14 +144,6 @@ class DifferencePageTest : public WindowDriver {
     find<QLineEdit>("differenceSecond")->setText(folder_.filePath(second));
     click("differenceRun");
   }
-
-  void picture(const QString& name) {
-    const QString folder = qEnvironmentVariable("FIELDTRUE_ARTEFACTS");
-    if (folder.isEmpty()) return;
-    QVERIFY(QDir().mkpath(folder));
-    QTest::qWait(400);
-    QVERIFY(window_->grab().save(folder + QLatin1Char('/') + name + QStringLiteral(".png")));
-  }
 };
 
 FIELDTRUE_WINDOW_TEST(DifferencePageTest)

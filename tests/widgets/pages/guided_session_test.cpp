@@ -68,7 +68,6 @@ class GuidedSessionTest : public testing::WindowDriver {
 
  private:
   void openWindow();
-  void picture(const QString& name);
   bool waitUntilStillAtPlace();
   bool takeWith(Qt::Key key);
   const acquisition::AcquisitionStatus& status() { return window_->workbench().status(); }
@@ -94,12 +93,6 @@ void GuidedSessionTest::openWindow() {
   window_->show();
   window_->activateWindow();
   QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
-}
-
-void GuidedSessionTest::picture(const QString& name) {
-  QTest::qWait(400);
-  const QString path = artefacts_ + QLatin1Char('/') + name + QStringLiteral(".png");
-  QVERIFY2(window_->grab().save(path), qPrintable(path));
 }
 
 void GuidedSessionTest::startPageOffersWhatToDo() {

@@ -71,7 +71,7 @@ class RefusedTablesTest : public testing::WindowDriver {
     record(folder_.filePath("two.fieldtrue"), {1.0, true});
     record(folder_.filePath("good.fieldtrue"), {});
   }
-  void aDroppedSessionOpensAndNothingElseDoes() {
+  void aDroppedSessionOpensAndAnythingElseIsImported() {
     const auto drop = [&](const QString& path) {
       QMimeData data;
       data.setUrls({QUrl::fromLocalFile(path)});
@@ -84,6 +84,7 @@ class RefusedTablesTest : public testing::WindowDriver {
     };
     drop(folder_.filePath("places.nodes.csv"));
     QVERIFY(!window_->workbench().sessionIsOpen());
+    QVERIFY(onPage("page_import"));
     drop(folder_.filePath("good.fieldtrue"));
     QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().sessionIsOpen(), 20000);
     QCOMPARE(QFileInfo(window_->workbench().sessionPath()).fileName(), QStringLiteral("good.fieldtrue"));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <QDir>
 #include <QTemporaryDir>
 #include <QTest>
 #include <memory>
@@ -28,6 +29,14 @@ class WindowDriver : public QObject {
     return testing::find<T>(*window_, name);
   }
   void click(const char* name) { QTest::mouseClick(find<QWidget>(name), Qt::LeftButton); }
+  /// Keeps a picture of the window where pictures are asked for.
+  void picture(const QString& name) {
+    const QString folder = qEnvironmentVariable("FIELDTRUE_ARTEFACTS");
+    if (folder.isEmpty()) return;
+    QVERIFY(QDir().mkpath(folder));
+    QTest::qWait(400);
+    QVERIFY(window_->grab().save(folder + QLatin1Char('/') + name + QStringLiteral(".png")));
+  }
   bool onPage(const QString& name) { return find<QWidget>(qPrintable(name))->isVisible(); }
 
   QTemporaryDir folder_;
