@@ -89,10 +89,14 @@ class CliImportTest : public QObject {
   void realRecordingsAreRecognised_data() {
     QTest::addColumn<QString>("file");
     QTest::addColumn<QString>("format");
-    QTest::newRow("anser") << "anser_duplo/nodes.csv" << "anser";
-    QTest::newRow("lighthouse") << "lighthouse/20200917_Exp1.nodes.csv" << "nodes";
-    QTest::newRow("PLUS samples") << "pluslib_fcal/samples.csv" << "plus";
-    QTest::newRow("trajectory") << "polhemus_hand/user1_cup0.traj" << "traj";
+    QTest::newRow("anser") << "anser_duplo/nodes.csv"
+                           << "anser";
+    QTest::newRow("lighthouse") << "lighthouse/20200917_Exp1.nodes.csv"
+                                << "nodes";
+    QTest::newRow("PLUS samples") << "pluslib_fcal/samples.csv"
+                                  << "plus";
+    QTest::newRow("trajectory") << "polhemus_hand/user1_cup0.traj"
+                                << "traj";
     QTest::newRow("means by their columns")
         << "pluslib_fcal/nodes.csv"
         << "columns:x=tip_mean_x_mm,y=tip_mean_y_mm,z=tip_mean_z_mm,x_true=true_x_mm,y_true=true_y_mm,"
