@@ -1,7 +1,6 @@
 #include "widgets/pages/export_page.h"
 
 #include <QCheckBox>
-#include <QDateTime>
 #include <QDesktopServices>
 #include <QDir>
 #include <QDoubleSpinBox>
@@ -11,24 +10,16 @@
 #include <QLabel>
 #include <QLineEdit>
 #include <QListWidget>
+#include <QProgressBar>
 #include <QPushButton>
 #include <QStackedWidget>
 #include <QUrl>
 #include <QVBoxLayout>
 
 #include "calib/core/setup.h"
-#include "calib/core/thread_pool.h"
-#include "calib/exporters/export_calibration.h"
-#include "calib/exporters/registry.h"
-#include "calib/tables/table_io.h"
-#include "calib/tables/table_writer.h"
 #include "widgets/compare/method_list.h"
 #include "widgets/forms/empty_page.h"
 #include "widgets/forms/number_box.h"
-#include "widgets/report/report.h"
-#include "widgets/style/unit_texts.h"
-#include "widgets/views/draw_picture.h"
-#include "widgets/workbench/background.h"
 #include "widgets/workbench/compared_methods.h"
 
 namespace fieldtrue::widgets {
@@ -38,42 +29,15 @@ constexpr int kExportColumnWidth = 720;
 constexpr int kRowHeight = 36;
 constexpr int kMostRows = 12;
 constexpr int kGap = 24;
+constexpr int kExportSteps = 1000;
 constexpr double kLeastDeviation_mm = 0.001;
 constexpr double kUsualDeviation_mm = 0.05;
 constexpr double kMostDeviation_mm = 10.0;
 
-/// Heading of the formats for one purpose.
-QString sectionOf(exporters::Purpose purpose) {
-  switch (purpose) {
-    case exporters::Purpose::kFieldtrue:
-      return ExportPage::tr("For Fieldtrue");
-    case exporters::Purpose::kSlicer:
-      return ExportPage::tr("For 3D Slicer and ITK");
-    case exporters::Purpose::kParaView:
-      return ExportPage::tr("For ParaView and VTK");
-    case exporters::Purpose::kVrui:
-      return ExportPage::tr("For Vrui");
-    case exporters::Purpose::kNumbers:
-      return ExportPage::tr("For Python, MATLAB and spreadsheets");
-    case exporters::Purpose::kProgram:
-      return ExportPage::tr("For a program of your own");
-    case exporters::Purpose::kPeriod:
-      return ExportPage::tr("For CAVE software of its time");
-    case exporters::Purpose::kRigid:
-      return ExportPage::tr("For PLUS and VRPN: the rigid part");
-  }
-  return {};
-}
-
-Result<std::string> said(const Result<void>& written, const std::string& note = {}) {
-  if (!written) return tl::unexpected(written.error());
-  return note;
-}
-
 }  // namespace
 
-ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
-  fillTargets();
+ExportPage::ExportPage(Workbench& workbench, QWidget* parent)
+    : QWidget(parent), workbench_(workbench), targets_(exportTargets(workbench)) {
   auto* content = new QWidget(this);
   auto* outer = new QHBoxLayout(content);
   auto* column = new QWidget(content);
@@ -102,6 +66,13 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   row->addWidget(path_, 1);
   row->addWidget(browse_button);
   row->addWidget(write_);
+  progress_ = new QProgressBar(column);
+  progress_->setRange(0, kExportSteps);
+  progress_->setAccessibleName(tr("Files being written"));
+  stop_ = new QPushButton(tr("Stop"), column);
+  stop_->setObjectName(QStringLiteral("exportStop"));
+  row->addWidget(progress_);
+  row->addWidget(stop_);
   layout->addStretch(1);
   layout->addWidget(title);
   layout->addWidget(calibration_);
@@ -126,6 +97,9 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
 
   fillList();
   connect(list_, &QListWidget::currentRowChanged, this, &ExportPage::onTarget);
+  connect(list_, &QListWidget::itemChanged, this, &ExportPage::onTarget);
+  connect(stop_, &QPushButton::clicked, this, &ExportPage::stop);
+  connect(&workbench_, &Workbench::closing, this, [this] { jobs_.stop(); });
   connect(browse_button, &QPushButton::clicked, this, &ExportPage::browse);
   connect(write_, &QPushButton::clicked, this, &ExportPage::write);
   connect(&workbench_, &Workbench::correctorChanged, this, &ExportPage::onData);
@@ -141,7 +115,7 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
 void ExportPage::fillList() {
   QString section;
   for (std::size_t at = 0; at < targets_.size(); ++at) {
-    const Target& target = targets_[at];
+    const ExportTarget& target = targets_[at];
     if (target.section != section) {
       section = target.section;
       auto* heading = new QListWidgetItem(section, list_);
@@ -154,6 +128,8 @@ void ExportPage::fillList() {
     auto* item = new QListWidgetItem(QStringLiteral("    %1   (%2)").arg(target.label, target.extension), list_);
     item->setSizeHint(QSize(0, kRowHeight));
     item->setData(Qt::UserRole, static_cast<int>(at));
+    item->setFlags(item->flags() | Qt::ItemIsUserCheckable);
+    item->setCheckState(Qt::Unchecked);
     items_.push_back(item);
   }
 }
@@ -163,7 +139,7 @@ QWidget* ExportPage::makeBake() {
   pitch_ = new QLabel(tr("The lattice is off the method by at most"), bake_row_);
   inverse_ = new QCheckBox(tr("True to measured, for programs that resample"), bake_row_);
   inverse_->setObjectName(QStringLiteral("exportInverse"));
-  connect(inverse_, &QCheckBox::toggled, this, &ExportPage::onDirection);
+  connect(inverse_, &QCheckBox::toggled, this, &ExportPage::onTarget);
   bake_ = new QCheckBox(tr("Bake to a lattice that is fast to evaluate, off the method by at most"), bake_row_);
   bake_->setObjectName(QStringLiteral("exportBake"));
   deviation_ = new NumberBox(bake_row_);
@@ -184,87 +160,6 @@ QWidget* ExportPage::makeBake() {
   row->addWidget(inverse_);
   row->addStretch(1);
   return bake_row_;
-}
-
-ExportPage::Writing ExportPage::calibrationWriter(const exporters::Exporter& exporter) const {
-  const bool bake = exporter.knows_pose && bake_->isChecked() && !workbench_.corrector()->isBaked();
-  const double deviation_m = deviation_->value() / 1000.0;
-  exporters::ExportOptions options;
-  options.name = QFileInfo(workbench_.sessionPath()).completeBaseName().toStdString();
-  options.mean_orientation = true;
-  options.held_out = heldOutError();
-  if (exporter.has_free_pitch) options.max_deviation_m = deviation_m;
-  if (exporter.may_be_inverse && inverse_->isChecked()) options.direction = exporters::Direction::kTrueToMeasured;
-  return [corrector = *workbench_.corrector(), exporter = &exporter, bake, deviation_m,
-          options](const std::string& path) -> Result<std::string> {
-    RunControl control;
-    control.parallel_for = threadedFor(0);
-    const Result<calibration::Corrector> written =
-        bake ? corrector.baked(deviation_m, control) : Result<calibration::Corrector>(corrector);
-    if (!written) return tl::unexpected(written.error());
-    FT_TRY(const auto done, exporters::exportCalibration(*exporter, *written, options, path, control));
-    std::string note = bake ? written->report().notes.back() : std::string();
-    for (const std::string& one : done.notes) note += (note.empty() ? "" : " ") + one;
-    return note;
-  };
-}
-
-/// Of the method that is written, if the comparison on screen judged it.
-std::optional<exporters::HeldOutError> ExportPage::heldOutError() const {
-  if (!workbench_.comparison() || !workbench_.correctorIsCurrent()) return std::nullopt;
-  const calibration::CorrectorChoice& choice = workbench_.corrector()->choice();
-  for (const evaluation::MethodScore& score : workbench_.comparison()->position)
-    if (score.method == choice.position_id && score.settings == choice.position_settings && !score.skipped)
-      return exporters::HeldOutError{score.stats.rms / 1000.0, toText(workbench_.comparison()->validation)};
-  return std::nullopt;
-}
-
-void ExportPage::fillTargets() {
-  for (const exporters::Exporter& exporter : exporters::exporters())
-    targets_.push_back({QString::fromStdString(exporter.id), QString::fromStdString(exporter.label),
-                        QString::fromStdString(exporter.extension),
-                        tr("For %1. In the file: %2.")
-                            .arg(QString::fromStdString(exporter.reads_it), QString::fromStdString(exporter.in_words)),
-                        sectionOf(exporter.purpose), &exporter,
-                        [this, &exporter] { return calibrationWriter(exporter); }});
-  targets_.push_back({QStringLiteral("nodes"), tr("Node table"), QStringLiteral(".nodes.csv"),
-                      tr("One row per place: what the rig says and what the tracker said."), tr("Recording and report"),
-                      nullptr, [this] {
-                        return [table = workbench_.recordedTable()](const std::string& path) {
-                          return said(writeNodeTable(std::filesystem::path(path), table));
-                        };
-                      }});
-  targets_.push_back({QStringLiteral("samples"), tr("Raw samples"), QStringLiteral(".samples.csv"),
-                      tr("Every reading that was taken at the places."), tr("Recording and report"), nullptr, [this] {
-                        return [samples = workbench_.samples()](const std::string& path) {
-                          return said(writeSampleTable(std::filesystem::path(path), samples));
-                        };
-                      }});
-  targets_.push_back(
-      {QStringLiteral("report"), tr("Report"), QStringLiteral(".html"),
-       tr("One page with pictures, the method table, the verdict and where it all came from; any browser."),
-       tr("Recording and report"), nullptr, [this] {
-         return [input = reportInput()](const std::string& path) { return said(writeHtmlReport(input, path)); };
-       }});
-}
-
-ReportInput ExportPage::reportInput() const {
-  ReportInput input;
-  input.draw = drawPictures;
-  input.table = workbench_.table();
-  if (workbench_.comparison()) input.comparison = *workbench_.comparison();
-  input.gap = workbench_.gapReport();
-  input.source = workbench_.sessionPath().toStdString();
-  input.plan = toJson(workbench_.plan()).dump();
-  input.places = workbench_.status().session->places;
-  input.states = workbench_.status().recorded->states;
-  if (!workbench_.comparisonIsFinal()) {
-    const Workbench::MethodCount count = workbench_.comparedMethods();
-    input.notes.push_back("The comparison tells " + std::to_string(count.done) + " of " + std::to_string(count.wanted) +
-                          " methods that were asked for: it was not finished.");
-  }
-  input.made_at = QDateTime::currentDateTime().toString(Qt::ISODate).toStdString();
-  return input;
 }
 
 void ExportPage::onData() {
@@ -323,89 +218,171 @@ void ExportPage::showCalibration() {
   }
 }
 
-const ExportPage::Target* ExportPage::chosen() const {
+const ExportTarget* ExportPage::chosen() const {
   const QListWidgetItem* item = list_->currentItem();
   if (item == nullptr || !item->data(Qt::UserRole).isValid()) return nullptr;
   return &targets_[static_cast<std::size_t>(item->data(Qt::UserRole).toInt())];
 }
 
-QString ExportPage::suggestedPath(const Target& target) const {
-  const QFileInfo session(workbench_.sessionPath());
-  QString name = session.completeBaseName();
+std::vector<const ExportTarget*> ExportPage::wanted() const {
+  std::vector<const ExportTarget*> wanted;
+  for (std::size_t row = 0; row < targets_.size(); ++row)
+    if (items_[row]->checkState() == Qt::Checked && (items_[row]->flags() & Qt::ItemIsEnabled))
+      wanted.push_back(&targets_[row]);
+  return wanted;
+}
+
+QString ExportPage::suggestedName(const ExportTarget& target) const {
+  QString name = QFileInfo(workbench_.sessionPath()).completeBaseName();
   if (target.exporter && target.exporter->purpose != exporters::Purpose::kFieldtrue && !target.exporter->knows_pose)
-    name += inverse_->isVisibleTo(bake_row_) && inverse_->isChecked() ? QStringLiteral("_true-to-measured")
-                                                                      : QStringLiteral("_measured-to-true");
-  return session.absolutePath() + QLatin1Char('/') + name + target.extension;
+    name += target.exporter->may_be_inverse && inverse_->isChecked() ? QStringLiteral("_true-to-measured")
+                                                                     : QStringLiteral("_measured-to-true");
+  return name + target.extension;
 }
 
 void ExportPage::onTarget() {
-  const Target* target = chosen();
+  const std::vector<const ExportTarget*> several = wanted();
+  const ExportTarget* target = several.size() == 1 ? several.front() : chosen();
   if (!target) return;
-  about_->setText(target->reads_it);
-  const exporters::Exporter* exporter = target->exporter;
-  const bool is_lattice = exporter && exporter->has_free_pitch;
-  const bool can_be_baked = exporter && exporter->knows_pose;
-  bake_row_->setVisible(is_lattice || can_be_baked || (exporter && exporter->may_be_inverse));
+  const auto any = [&](const auto& is) {
+    const auto of_exporter = [&](const ExportTarget* one) { return one->exporter && is(*one->exporter); };
+    return several.empty() ? of_exporter(target) : std::any_of(several.begin(), several.end(), of_exporter);
+  };
+  const bool is_lattice = any([](const exporters::Exporter& one) { return one.has_free_pitch; });
+  const bool can_be_baked = any([](const exporters::Exporter& one) { return one.knows_pose; });
+  const bool may_be_inverse = any([](const exporters::Exporter& one) { return one.may_be_inverse; });
+  bake_row_->setVisible(is_lattice || can_be_baked || may_be_inverse);
   bake_->setVisible(can_be_baked);
   bake_->setEnabled(workbench_.corrector() && !workbench_.corrector()->isBaked());
   pitch_->setVisible(is_lattice);
   deviation_->setVisible(is_lattice || can_be_baked);
   deviation_->setEnabled(is_lattice || (can_be_baked && bake_->isEnabled() && bake_->isChecked()));
-  inverse_->setVisible(exporter && exporter->may_be_inverse);
-  path_->setText(suggestedPath(*target));
+  inverse_->setVisible(may_be_inverse);
+  about_->setText(several.size() > 1 ? tr("Each file is named after the session and its format.") : target->reads_it);
+  write_->setText(several.size() > 1 ? tr("Write %1 files").arg(several.size()) : tr("Write the file"));
+  const QString folder = QFileInfo(workbench_.sessionPath()).absolutePath();
+  path_->setText(several.size() > 1 ? folder : folder + QLatin1Char('/') + suggestedName(*target));
+  showBusy();
 }
 
-void ExportPage::onDirection() {
-  if (const Target* target = chosen()) path_->setText(suggestedPath(*target));
+void ExportPage::showBusy() {
+  const bool busy = jobs_.busy();
+  progress_->setVisible(busy);
+  stop_->setVisible(busy);
+  write_->setEnabled(!busy);
 }
 
 void ExportPage::browse() {
-  const Target* target = chosen();
+  const std::vector<const ExportTarget*> several = wanted();
+  const ExportTarget* target = several.size() == 1 ? several.front() : chosen();
   if (!target) return;
-  const QString path =
-      QFileDialog::getSaveFileName(this, tr("Write to"), path_->text(), QStringLiteral("*") + target->extension);
+  const QString path = several.size() > 1 ? QFileDialog::getExistingDirectory(this, tr("Write into"), path_->text())
+                                          : QFileDialog::getSaveFileName(this, tr("Write to"), path_->text(),
+                                                                         QStringLiteral("*") + target->extension);
   if (path.isEmpty()) return;
-  replaceable_ = path;  // The dialog asks.
+  if (several.size() <= 1) replaceable_ = {path};  // The dialog asks.
   path_->setText(path);
 }
 
-void ExportPage::write() {
-  const Target* target = chosen();
-  const QString path = path_->text();
-  if (!target || path.isEmpty()) return;
-  if (target->exporter && !workbench_.correctorCorrects()) return;
-  if (target->id == QLatin1String("report") && !workbench_.comparisonIsCurrent()) {
-    workbench_.showMessage({tr("The report shows the comparison; compare the methods first."), Severity::kAttention,
-                            tr("Compare"), [this] { workbench_.goToPage(QStringLiteral("compare")); }});
-    return;
+/// The files that are asked for, as their writing is to find them.
+std::vector<ExportPage::File> ExportPage::files() const {
+  const std::vector<const ExportTarget*> several = wanted();
+  if (several.size() > 1) {
+    std::vector<File> files;
+    for (const ExportTarget* target : several)
+      files.push_back({path_->text() + QLatin1Char('/') + suggestedName(*target), target});
+    return files;
   }
-  if (QFileInfo::exists(path) && path != replaceable_) {
-    workbench_.showMessage({tr("%1 exists already; nothing was written.").arg(QDir::toNativeSeparators(path)),
-                            Severity::kAttention, tr("Replace it"), [this, path] {
-                              replaceable_ = path;
-                              if (path_->text() == path) write();
-                            }});
-    return;
-  }
-  write_->setEnabled(false);
-  runInBackground(
-      this, [work = target->prepare(), path] { return work(path.toStdString()); },
-      [this, path](const Result<std::string>& written) { onWritten(path, written); });
+  const ExportTarget* target = several.empty() ? chosen() : several.front();
+  if (!target || path_->text().isEmpty()) return {};
+  return {{path_->text(), target}};
 }
 
-void ExportPage::onWritten(const QString& path, const Result<std::string>& written) {
-  write_->setEnabled(true);
-  if (written) {
-    replaceable_ = path;
-    const QString note = QString::fromStdString(*written);
-    workbench_.showMessage({tr("Written: %1").arg(QDir::toNativeSeparators(path)) +
-                                (note.isEmpty() ? QString() : QStringLiteral(". ") + note),
-                            Severity::kInfo, tr("Open the folder"), [path] {
-                              QDesktopServices::openUrl(QUrl::fromLocalFile(QFileInfo(path).absolutePath()));
-                            }});
-  } else {
-    workbench_.showMessage({QString::fromStdString(written.error().message), Severity::kDanger, {}, {}});
+void ExportPage::write() {
+  const std::vector<File> wanted_files = files();
+  QStringList present;
+  for (const File& file : wanted_files) {
+    if (file.target->exporter && !workbench_.correctorCorrects()) return;
+    if (file.target->id == QLatin1String("report") && !workbench_.comparisonIsCurrent()) {
+      workbench_.showMessage({tr("The report shows the comparison; compare the methods first."), Severity::kAttention,
+                              tr("Compare"), [this] { workbench_.goToPage(QStringLiteral("compare")); }});
+      return;
+    }
+    if (QFileInfo::exists(file.path) && !replaceable_.contains(file.path)) present << file.path;
   }
+  if (wanted_files.empty()) return;
+  if (!present.isEmpty()) return askToReplace(present);
+  std::vector<Writing> writings;
+  const ExportChoices choices{bake_->isChecked(), inverse_->isChecked(), deviation_->value() / 1000.0};
+  for (const File& file : wanted_files) writings.push_back({file.path, file.target->prepare(choices), {}});
+  progress_->setValue(0);
+  jobs_.run([writings](const RunControl& control) { return writeAll(writings, control); },
+            [this](const Result<std::vector<Writing>>& written) { onWritten(*written); },
+            [this](double fraction) { progress_->setValue(static_cast<int>(fraction * kExportSteps)); });
+  showBusy();
+}
+
+void ExportPage::askToReplace(const QStringList& present) {
+  const QString text = present.size() == 1
+                           ? tr("%1 exists already; nothing was written.").arg(QDir::toNativeSeparators(present[0]))
+                           : tr("%1 of these files exist already; nothing was written.").arg(present.size());
+  workbench_.showMessage(
+      {text, Severity::kAttention, present.size() == 1 ? tr("Replace it") : tr("Replace them"), [this, present] {
+         replaceable_ = present;
+         const std::vector<File> now = files();
+         const bool same = std::all_of(present.begin(), present.end(), [&](const QString& path) {
+           return std::any_of(now.begin(), now.end(), [&](const File& file) { return file.path == path; });
+         });
+         if (same) write();
+       }});
+}
+
+/// One after the other, so that a stop leaves whole files.
+std::vector<ExportPage::Writing> ExportPage::writeAll(std::vector<Writing> writings, const RunControl& control) {
+  const double each = 1.0 / static_cast<double>(writings.size());
+  for (std::size_t i = 0; i < writings.size() && !control.stop.stop_requested(); ++i) {
+    RunControl part = control;
+    part.progress = [&control, each, i](double fraction) {
+      control.progress((static_cast<double>(i) + fraction) * each);
+    };
+    writings[i].result = writings[i].write(writings[i].path.toStdString(), part);
+    control.progress(static_cast<double>(i + 1) * each);
+  }
+  return writings;
+}
+
+void ExportPage::stop() {
+  jobs_.stop();
+  showBusy();
+  workbench_.showMessage({tr("Stopped: files that were not finished are not there."), Severity::kInfo, {}, {}});
+}
+
+void ExportPage::onWritten(const std::vector<Writing>& written) {
+  showBusy();
+  QStringList failures, notes;
+  for (const Writing& file : written) {
+    if (file.result) {
+      if (!replaceable_.contains(file.path)) replaceable_ << file.path;
+      if (!file.result->empty()) notes << QString::fromStdString(*file.result);
+    } else {
+      failures << QString::fromStdString(file.result.error().message);
+    }
+  }
+  const QString first = written.front().path;
+  const auto open_folder = [first] { QDesktopServices::openUrl(QUrl::fromLocalFile(QFileInfo(first).absolutePath())); };
+  const auto n_written = static_cast<qsizetype>(written.size()) - failures.size();
+  if (n_written == 0) {
+    workbench_.showMessage({failures.join(QLatin1Char(' ')), Severity::kDanger, {}, {}});
+    return;
+  }
+  QStringList told{
+      written.size() == 1
+          ? tr("Written: %1").arg(QDir::toNativeSeparators(first))
+          : tr("%1 files written to %2").arg(n_written).arg(QDir::toNativeSeparators(QFileInfo(first).absolutePath()))};
+  if (written.size() == 1) told << notes;
+  if (!failures.isEmpty()) told << tr("%1 could not be: %2").arg(failures.size()).arg(failures.join(QLatin1Char(' ')));
+  workbench_.showMessage({told.join(QStringLiteral(". ")), failures.isEmpty() ? Severity::kInfo : Severity::kAttention,
+                          tr("Open the folder"), open_folder});
 }
 
 }  // namespace fieldtrue::widgets

@@ -1,9 +1,10 @@
 #pragma once
 
+#include <QStringList>
 #include <QWidget>
 
-#include "calib/exporters/exporter.h"
-#include "widgets/report/report.h"
+#include "widgets/pages/export_targets.h"
+#include "widgets/workbench/background.h"
 #include "widgets/workbench/workbench.h"
 
 class QCheckBox;
@@ -12,6 +13,7 @@ class QLabel;
 class QListWidget;
 class QListWidgetItem;
 class QLineEdit;
+class QProgressBar;
 class QPushButton;
 class QStackedWidget;
 
@@ -24,26 +26,19 @@ class ExportPage : public QWidget {
   explicit ExportPage(Workbench& workbench, QWidget* parent = nullptr);
 
  private:
-  using Writing = std::function<Result<std::string>(const std::string& path)>;
-  /// One thing that can be written; every exporter of the registry is one, the tables and the report are the others.
-  struct Target {
-    QString id;
-    QString label;
-    QString extension;
-    QString reads_it;
-    QString section;                                ///< The heading it stands under.
-    const exporters::Exporter* exporter = nullptr;  ///< Of a calibration's format.
-    /// Copies what is needed in the window's thread and returns the writing itself, which runs beside it and answers
-    /// with what is to be said of it.
-    std::function<Writing()> prepare;
+  struct File {
+    QString path;
+    const ExportTarget* target = nullptr;
   };
-  void fillTargets();
+  /// One file on its way to the disk.
+  struct Writing {
+    QString path;
+    ExportWriting write;
+    Result<std::string> result;
+  };
   void fillList();
   QWidget* makeBake();
-  Writing calibrationWriter(const exporters::Exporter& exporter) const;
-  std::optional<exporters::HeldOutError> heldOutError() const;
   void onTarget();
-  void onDirection();
   void onData();
   void showCalibration();
   /// What the comparison says of the calibration; empty where there is none of the present places.
@@ -51,13 +46,19 @@ class ExportPage : public QWidget {
   QString setupOfCalibration() const;
   void browse();
   void write();
-  void onWritten(const QString& path, const Result<std::string>& written);
-  ReportInput reportInput() const;
-  QString suggestedPath(const Target& target) const;
-  const Target* chosen() const;
+  void askToReplace(const QStringList& present);
+  static std::vector<Writing> writeAll(std::vector<Writing> writings, const RunControl& control);
+  void stop();
+  void onWritten(const std::vector<Writing>& written);
+  void showBusy();
+  std::vector<File> files() const;
+  QString suggestedName(const ExportTarget& target) const;
+  const ExportTarget* chosen() const;
+  /// Those that are ticked; where none is, the chosen one is meant.
+  std::vector<const ExportTarget*> wanted() const;
 
   Workbench& workbench_;
-  std::vector<Target> targets_;
+  std::vector<ExportTarget> targets_;
   std::vector<QListWidgetItem*> items_;  ///< Of each target.
   QStackedWidget* stack_;
   QListWidget* list_;
@@ -69,8 +70,11 @@ class ExportPage : public QWidget {
   QLabel* pitch_;
   QDoubleSpinBox* deviation_;
   QLineEdit* path_;
-  QString replaceable_;  ///< A file that may be written over: the person was asked, or it was written from here.
+  QStringList replaceable_;  ///< Files that may be written over: the person was asked, or they were written from here.
+  BackgroundJobs jobs_{this};
   QPushButton* write_;
+  QPushButton* stop_;
+  QProgressBar* progress_;
 };
 
 }  // namespace fieldtrue::widgets

@@ -22,10 +22,10 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr std::size_t kRowsShown = 12;
+constexpr std::size_t kPreviewRows = 12;
 constexpr std::size_t kNotesShown = 3;
-constexpr int kFormWidth = 340;
-constexpr int kMargin = 20;
+constexpr int kImportFormWidth = 340;
+constexpr int kImportMargin = 20;
 
 const importers::Importer& columnsFormat() { return *importers::findImporter("columns").value(); }
 
@@ -55,7 +55,7 @@ QString lines(const std::vector<std::string>& sentences, std::size_t most) {
 
 ImportPage::ImportPage(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
   auto* layout = new QVBoxLayout(this);
-  layout->setContentsMargins(kMargin, kMargin, kMargin, kMargin);
+  layout->setContentsMargins(kImportMargin, kImportMargin, kImportMargin, kImportMargin);
   layout->setSpacing(12);
   auto* title = new QLabel(tr("Import"), this);
   title->setProperty("role", "title");
@@ -80,9 +80,9 @@ ImportPage::ImportPage(Workbench& workbench, QWidget* parent) : QWidget(parent),
   columns_ = new ColumnTable(this);
   columns_->setObjectName(QStringLiteral("importColumns"));
   form_ = new SettingsForm(this);
-  form_->setMaximumWidth(kFormWidth);
+  form_->setMaximumWidth(kImportFormWidth);
   auto* middle = new QHBoxLayout;
-  middle->setSpacing(kMargin);
+  middle->setSpacing(kImportMargin);
   middle->addWidget(columns_, 1);
   middle->addWidget(form_, 0, Qt::AlignTop);
   guess_ = new QLabel(this);
@@ -212,7 +212,7 @@ void ImportPage::look(std::optional<int> chosen) {
         }
         if (!is_columns(formats[static_cast<std::size_t>(found.format)])) return found;
         FT_TRY(found.guess, importers::guessColumns(path));
-        FT_TRY(found.preview, importers::previewText(path, found.guess->settings, kRowsShown));
+        FT_TRY(found.preview, importers::previewText(path, found.guess->settings, kPreviewRows));
         return found;
       },
       [this](Result<Look> found) { onLook(std::move(found)); });
@@ -262,7 +262,7 @@ void ImportPage::showFormat(const Look& found) {
 void ImportPage::onHowItIsWritten() {
   if (!readsColumns()) return read();
   const Settings now = settings();
-  const Result<importers::TextPreview> preview = importers::previewText(file_->text().toStdString(), now, kRowsShown);
+  const Result<importers::TextPreview> preview = importers::previewText(file_->text().toStdString(), now, kPreviewRows);
   if (!preview) {
     make_->setEnabled(false);
     return tell(text(preview.error().message), true);

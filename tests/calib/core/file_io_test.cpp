@@ -112,7 +112,7 @@ class FileIoTest : public QObject {
       out << "half";
       throw std::logic_error("mistake");
     };
-    QVERIFY_EXCEPTION_THROWN((void)writeFileAtomically(path_, throwing), std::logic_error);
+    QVERIFY_THROWS_EXCEPTION(std::logic_error, (void)writeFileAtomically(path_, throwing));
     QCOMPARE(*readFile(path_), std::string("old"));
     QCOMPARE(filesIn(path_.parent_path()), std::size_t{1});
   }

@@ -48,7 +48,7 @@ class PoseTest : public QObject {
     QVERIFY(difference.norm() < 1e-15);
   }
   void canonicalOfZeroIsAMistake() {
-    QVERIFY_EXCEPTION_THROWN(canonical(Eigen::Quaterniond(0, 0, 0, 0)), std::logic_error);
+    QVERIFY_THROWS_EXCEPTION(std::logic_error, canonical(Eigen::Quaterniond(0, 0, 0, 0)));
   }
 
   void rotationVectors_data() {

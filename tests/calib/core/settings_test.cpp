@@ -181,8 +181,8 @@ class SettingsTest : public QObject {
   void wrongAccessIsAMistake() {
     const auto settings = resolveSettings("m", declared(), {});
     FT_VERIFY_OK(settings);
-    QVERIFY_EXCEPTION_THROWN(numberSetting(*settings, "degree"), std::logic_error);
-    QVERIFY_EXCEPTION_THROWN(numberSetting(*settings, "absent"), std::logic_error);
+    QVERIFY_THROWS_EXCEPTION(std::logic_error, numberSetting(*settings, "degree"));
+    QVERIFY_THROWS_EXCEPTION(std::logic_error, numberSetting(*settings, "absent"));
   }
 
   void survivesJson() {

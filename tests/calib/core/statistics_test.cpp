@@ -279,7 +279,7 @@ class StatisticsTest : public QObject {
     QCOMPARE(quantile({8, 1, 4, 2}, 0.95), 4.0 + 0.85 * 4.0);
     QCOMPARE(quantile({8, 1, 4, 2}, 0.0), 1.0);
     QCOMPARE(quantile({8, 1, 4, 2}, 1.0), 8.0);
-    QVERIFY_EXCEPTION_THROWN(median({}), std::logic_error);
+    QVERIFY_THROWS_EXCEPTION(std::logic_error, median({}));
   }
 
   void setsNodeAndLeavesItsIdentity() {

@@ -72,11 +72,10 @@ class ThreadPoolTest : public QObject {
 
   void aThrowingBodyEndsTheLoopAndReachesTheCaller() {
     const ParallelFor parallel = threadedFor(3);
-    QVERIFY_EXCEPTION_THROWN(parallel(100,
-                                      [](std::size_t i) {
-                                        if (i == 3) throw std::logic_error("three");
-                                      }),
-                             std::logic_error);
+    const auto throwing = [](std::size_t i) {
+      if (i == 3) throw std::logic_error("three");
+    };
+    QVERIFY_THROWS_EXCEPTION(std::logic_error, parallel(100, throwing));
     std::atomic<int> after = 0;
     parallel(10, [&](std::size_t) { ++after; });
     QCOMPARE(after.load(), 10);

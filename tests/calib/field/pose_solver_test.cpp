@@ -229,7 +229,7 @@ void PoseSolverTest::refusesWhatHasNoPose() {
   QCOMPARE(solvePose(broken, kC, x).error(), SolveError::kNotFinite);
   broken(1, 2) = std::numeric_limits<double>::infinity();
   QCOMPARE(solvePose(broken, kC, x, limits).error(), SolveError::kNotFinite);
-  QVERIFY_EXCEPTION_THROWN((void)solvePose(Eigen::Matrix3d::Identity(), 0.0, x), std::logic_error);
+  QVERIFY_THROWS_EXCEPTION(std::logic_error, (void)solvePose(Eigen::Matrix3d::Identity(), 0.0, x));
 }
 
 FIELDTRUE_TEST(PoseSolverTest)

@@ -1,0 +1,153 @@
+#include "widgets/pages/export_page.h"
+
+#include <QDoubleSpinBox>
+#include <QLabel>
+#include <QLineEdit>
+#include <QListWidget>
+#include <QPushButton>
+#include <QTest>
+#include <QThreadPool>
+
+#include "acquisition/session/imported_session.h"
+#include "acquisition/session/session_store.h"
+#include "calib/tables/table_io.h"
+#include "tests/support/matchers.h"
+#include "tests/support/synthetic.h"
+#include "tests/widgets/pages/window_driver.h"
+#include "widgets/style/theme.h"
+
+/// Several files at once: what is ticked, where it goes, what is said, and a stop.
+using namespace fieldtrue;
+using namespace fieldtrue::widgets;
+using namespace fieldtrue::testing;
+
+class ExportPageTest : public WindowDriver {
+  Q_OBJECT
+
+ private slots:
+  void initTestCase() {
+    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
+    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
+    window_ = std::make_unique<MainWindow>();
+    window_->resize(1280, 800);
+    window_->show();
+    QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
+    window_->workbench().openSession(makeFittedSession());
+    QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().corrector().has_value(), kWaitMs);
+    click("step_export");
+  }
+
+  void cleanupTestCase() {
+    QThreadPool::globalInstance()->waitForDone();
+    window_.reset();
+  }
+
+  void severalFilesAreWrittenAtOnce() {
+    tick({"(.nrrd)", "(.npz)", "(.nodes.csv)"});
+    QCOMPARE(find<QPushButton>("exportWrite")->text(), QStringLiteral("Write 3 files"));
+    picture("6-export");
+    writeInto("several");
+    QCOMPARE(names("several"), QStringList({"lab.nodes.csv", "lab_measured-to-true.npz", "lab_measured-to-true.nrrd"}));
+    const auto nodes = readNodeTable(folder_.filePath("several/lab.nodes.csv").toStdString());
+    FT_VERIFY_OK(nodes);
+    QCOMPARE(nodes->table.nodes.size(), table().nodes.size());
+    QVERIFY(isSaid("3 files written"));
+  }
+
+  void whatIsThereIsAskedFor() {
+    QVERIFY(QFile::remove(folder_.filePath("several/lab_measured-to-true.npz")));
+    QFile theirs(folder_.filePath("other/lab.nodes.csv"));
+    QVERIFY(QDir().mkpath(folder_.filePath("other")) && theirs.open(QIODevice::WriteOnly) && theirs.write("x") == 1);
+    theirs.close();
+    type("exportPath", folder_.filePath("other"));
+    click("exportWrite");
+    QVERIFY(isSaid("exists already"));
+    QCOMPARE(names("other"), QStringList({"lab.nodes.csv"}));
+    QTest::mouseClick(find<QWidget>("messageLine")->findChild<QPushButton*>(), Qt::LeftButton);
+    QTRY_COMPARE_WITH_TIMEOUT(names("other").size(), 3, kWaitMs);
+    QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("exportWrite")->isEnabled(), kWaitMs);
+  }
+
+  /// One that cannot be does not keep the others.
+  void whatCannotBeWrittenIsNamed() {
+    tick({"(.npz)", "olynomial"});
+    writeInto("part");
+    QVERIFY(names("part").contains(QStringLiteral("lab_measured-to-true.npz")));
+    QVERIFY(isSaid("could not be"));
+    QVERIFY(isSaid("polynomial"));
+  }
+
+  void aStopLeavesNothingHalfWritten() {
+    tick({"(.nrrd)", "(.npz)"});
+    find<QDoubleSpinBox>("exportDeviation")->setValue(0.001);
+    QVERIFY(QDir().mkpath(folder_.filePath("stopped")));
+    type("exportPath", folder_.filePath("stopped"));
+    click("exportWrite");
+    QVERIFY(find<QPushButton>("exportStop")->isVisible() && !find<QPushButton>("exportWrite")->isEnabled());
+    click("exportStop");
+    QVERIFY(!find<QPushButton>("exportStop")->isVisible() && find<QPushButton>("exportWrite")->isEnabled());
+    QThreadPool::globalInstance()->waitForDone();
+    for (const QString& name : names("stopped")) QVERIFY2(!name.contains(QStringLiteral("tmp")), qPrintable(name));
+    QVERIFY(names("stopped").size() < 2);
+  }
+
+ private:
+  static CalibrationTable table() {
+    SyntheticOptions options;
+    options.counts = {5, 4, 3};
+    options.smooth_distortion_m = 0.01;
+    CalibrationTable table = syntheticTable(options, {.seed = 3});
+    table.metadata.alignment_known = true;
+    return table;
+  }
+
+  QString makeFittedSession() {
+    QString path = folder_.filePath("lab.fieldtrue");
+    const auto made = acquisition::makeSession(path, table(), {}, "lab.csv");
+    const auto fitted = calibration::Corrector::fit(table().nodes, table().metadata,
+                                                    calibration::parseCorrectorChoice("rbf", "none").value(),
+                                                    calibration::AlignMode::kNone);
+    if (!made || !fitted) qFatal("not made");
+    auto store = acquisition::SessionStore::open(path);
+    if (!store->storeFit("rbf", fitted->toText()) || !store->setState("page", "export")) qFatal("not stored");
+    return path;
+  }
+
+  void tick(const std::vector<const char*>& words) {
+    auto* list = find<QListWidget>("exportList");
+    for (int row = 0; row < list->count(); ++row) {
+      QListWidgetItem* item = list->item(row);
+      if (!(item->flags() & Qt::ItemIsUserCheckable)) continue;
+      const bool wanted = std::any_of(words.begin(), words.end(),
+                                      [&](const char* word) { return item->text().contains(QLatin1String(word)); });
+      item->setCheckState(wanted ? Qt::Checked : Qt::Unchecked);
+    }
+  }
+
+  void type(const char* name, const QString& text) {
+    auto* edit = find<QLineEdit>(name);
+    QTest::keyClick(edit, Qt::Key_A, Qt::ControlModifier);
+    QTest::keyClicks(edit, text);
+  }
+
+  void writeInto(const char* folder) {
+    QVERIFY(QDir().mkpath(folder_.filePath(folder)));
+    type("exportPath", folder_.filePath(folder));
+    click("exportWrite");
+    QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("exportWrite")->isEnabled(), kWaitMs);
+  }
+
+  QStringList names(const char* folder) {
+    return QDir(folder_.filePath(folder)).entryList(QDir::Files | QDir::Hidden, QDir::Name);
+  }
+
+  bool isSaid(const char* words) {
+    const auto labels = find<QWidget>("messageLine")->findChildren<QLabel*>();
+    return std::any_of(labels.begin(), labels.end(),
+                       [&](const QLabel* label) { return label->text().contains(QLatin1String(words)); });
+  }
+};
+
+FIELDTRUE_WINDOW_TEST(ExportPageTest)
+#include "export_page_test.moc"
