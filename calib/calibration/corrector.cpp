@@ -6,7 +6,7 @@
 #include "calib/calibration/alignment.h"
 #include "calib/core/spacing.h"
 #include "calib/core/statistics.h"
-#include "calib/correctors/baked/baked_lattice_maker.h"
+#include "calib/correctors/baked/baked_position.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/readers.h"
@@ -131,7 +131,8 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
                 "This calibration is baked already; bake anew from the one that was fitted, or fit it again");
   std::vector<Eigen::Vector3d> places_m;
   for (const Node& node : table_.nodes) places_m.push_back(node.tracker_from_sensor.position_m);
-  FT_TRY(auto lattice, correctors::bakeLattice(*parts().position, region(), places_m, max_deviation_m, control));
+  FT_TRY(auto lattice,
+         correctors::bakePosition(*parts().position, region(), places_m, orientationsSeen(), max_deviation_m, control));
   Parts baked_parts = parts();
   baked_parts.is_baked = true;
   baked_parts.position = std::move(lattice);
@@ -144,8 +145,8 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
   corrector.report_.notes = report_.notes;
   corrector.report_.notes.push_back(corrector.parts().position->note());
   if (takesOrientation())
-    corrector.report_.notes.push_back("Baked as the mean over the " + std::to_string(orientationsSeen().size()) +
-                                      " orientations it was fitted on: a lattice takes no orientation.");
+    corrector.report_.notes.push_back(
+        "Baked with the sensor's orientation: within the bound at poses drawn in the region.");
   return corrector;
 }
 

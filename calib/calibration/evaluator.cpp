@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "calib/correctors/baked/baked_lattice.h"
+#include "calib/correctors/baked/baked_position.h"
 #include "calib/correctors/readers.h"
 
 namespace fieldtrue::calibration {
@@ -46,8 +46,7 @@ Evaluator::Parts evaluatorPartsFrom(const JsonReader& content) {
   Evaluator::Parts parts;
   parts.alignment = alignmentFrom(content["alignment"]);
   parts.is_baked = position.has("baked");
-  parts.position =
-      parts.is_baked ? correctors::BakedLattice::fromJson(position["baked"]) : read_position(position["parameters"]);
+  parts.position = parts.is_baked ? correctors::readBaked(position["baked"]) : read_position(position["parameters"]);
   parts.orientation = read_orientation(orientation["parameters"]);
   parts.region = Region::fromJson(content["region"]);
   return parts;
@@ -83,17 +82,20 @@ void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::spa
                              std::span<const std::optional<int>> sensors) const {
   const correctors::PositionModel& position = *parts_.position;
   std::array<Eigen::Vector3d, kBlock> covered_m;
+  std::array<Pose, kBlock> covered;
   std::array<bool, kBlock> is_covered;
   std::size_t n_covered = 0;
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
     is_covered[i] = position.covers(tracker_from_sensor[i].position_m);
     if (!is_covered[i]) continue;
     covered_m[n_covered] = tracker_from_sensor[i].position_m;
-    if (position.takesOrientation()) covered_m[n_covered] += position.displacementAt_m(tracker_from_sensor[i]);
-    ++n_covered;
+    covered[n_covered++] = tracker_from_sensor[i];
   }
   const std::span p_m = std::span(covered_m).first(n_covered);
-  if (!position.takesOrientation()) position.correct(p_m, p_m);
+  if (position.takesOrientation())
+    position.correctPoses(std::span<const Pose>(covered).first(n_covered), p_m);
+  else
+    position.correct(p_m, p_m);
   std::size_t next = 0;
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
     const Pose& tracked = tracker_from_sensor[i];

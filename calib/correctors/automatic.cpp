@@ -33,6 +33,12 @@ class AutomaticModel : public PositionModel {
   }
   bool takesOrientation() const override { return model_->takesOrientation(); }
   Eigen::Vector3d displacementAt_m(const Pose& tracked) const override { return model_->displacementAt_m(tracked); }
+  void correctPoses(std::span<const Pose> tracked, std::span<Eigen::Vector3d> p_corrected_m) const override {
+    model_->correctPoses(tracked, p_corrected_m);
+  }
+  Result<std::unique_ptr<PositionModel>> onLattices(const LatticeMaker& maker, double max_deviation_m) const override {
+    return model_->onLattices(maker, max_deviation_m);
+  }
   std::optional<double> uncertaintyAt_m(const Pose& tracked) const override { return model_->uncertaintyAt_m(tracked); }
   Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const override { return model_->jacobian(p_tracked_m); }
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {

@@ -61,7 +61,7 @@ FIELDTRUE_API const char* fieldtrue_error(void);
 
 /* The same correction on a dense lattice, which costs the same whatever the method was and allocates nothing: within
  * max_deviation_um [um] of this one in position, and, where its orientation part is costly, within max_angle_deg [deg]
- * in orientation, both inside the calibrated region. A correction of whole poses cannot be baked here. */
+ * in orientation, both inside the calibrated region. A correction of whole poses keeps taking the orientation. */
 FIELDTRUE_API fieldtrue_status fieldtrue_bake(const fieldtrue_calibration* calibration, double max_deviation_um,
                                               double max_angle_deg, fieldtrue_calibration** baked);
 

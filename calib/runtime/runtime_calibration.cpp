@@ -6,7 +6,7 @@
 #include "calib/calibration/calibration_envelope.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/json_text.h"
-#include "calib/correctors/baked/baked_lattice_maker.h"
+#include "calib/correctors/baked/baked_position.h"
 #include "calib/runtime/baked_orientation.h"
 
 namespace fieldtrue::runtime {
@@ -53,14 +53,10 @@ void RuntimeCalibration::prepare() const {
 Result<RuntimeCalibration> RuntimeCalibration::baked(double max_deviation_m, double max_angle_rad) const {
   if (!(max_deviation_m > 0.0 && std::isfinite(max_deviation_m) && max_angle_rad > 0.0 && std::isfinite(max_angle_rad)))
     return fail(ErrorCode::kBadInput, "Baking needs a largest deviation and a largest angle above 0");
-  if (evaluator_.takesOrientation())
-    return fail(
-        ErrorCode::kUnsupported,
-        "This correction depends on how the sensor is turned, which a lattice over position cannot hold; bake it "
-        "with fieldtrue-cli as its mean over the orientations, or use it as it is");
   Evaluator::Parts parts = evaluator_.parts();
   if (!parts.is_baked) {
-    FT_TRY(parts.position, correctors::bakeLattice(*parts.position, parts.region, places_m_, max_deviation_m, {}));
+    FT_TRY(parts.position,
+           correctors::bakePosition(*parts.position, parts.region, places_m_, orientations_seen_, max_deviation_m, {}));
     parts.is_baked = true;
   }
   FT_TRY(parts.orientation, bakeOrientation(parts.orientation, parts.region, places_m_, max_angle_rad));

@@ -21,8 +21,8 @@ class RuntimeCalibration {
   /// With both parts on lattices, the orientation part only where it is costly.
   /// @param max_deviation_m of positions inside the region, positive [m]
   /// @param max_angle_rad of orientations there, positive [rad]
-  /// @error kBadInput; kUnsupported when no lattice within the memory allowed stays within the bounds, or for a
-  ///        correction of whole poses; kDegenerate without a region
+  /// @error kBadInput; kUnsupported when no lattice within the memory allowed stays within the bounds;
+  ///        kDegenerate without a region
   Result<RuntimeCalibration> baked(double max_deviation_m, double max_angle_rad) const;
 
   const calibration::Evaluator& evaluator() const { return evaluator_; }

@@ -118,12 +118,18 @@ class CliPoseTest : public QObject {
     FT_VERIFY_MATCH(near(seen_m, corrector->correctPosition_m({0.5, 0.1, 0.1}), 1e-12));
   }
 
-  void aLatticeTakesNoOrientationAndSaysSo() {
+  void latticesTakeTheOrientationToo() {
     const CliRun run = runCli({"fit", "--nodes", at("three.csv"), "--position", "gaussian_process", "--bake-um", "50",
                                "--out", at("baked.ftcal.json")});
     FT_VERIFY_STATUS(run, 0);
-    FT_VERIFY_MATCH(holdsAll(run.out.toStdString(), {"Baked as the mean over the 3 orientations"}));
-    QCOMPARE(json::parse(readWhole(at("baked.ftcal.json")).toStdString()).at("inputs").get<std::string>(), "position");
+    FT_VERIFY_MATCH(holdsAll(run.out.toStdString(), {"Baked with the sensor's orientation"}));
+    QCOMPARE(json::parse(readWhole(at("baked.ftcal.json")).toStdString()).at("inputs").get<std::string>(), "pose");
+    const auto baked = calibration::Corrector::load(at("baked.ftcal.json").toStdString());
+    const auto exact = calibration::Corrector::load(at("pose.ftcal.json").toStdString());
+    const auto table = readNodeTable(at("three.csv").toStdString());
+    for (const Node& node : table->table.nodes)
+      FT_VERIFY_MATCH(near(baked->correct(node.tracker_from_sensor).position_m,
+                           exact->correct(node.tracker_from_sensor).position_m, 50e-6));
   }
 };
 

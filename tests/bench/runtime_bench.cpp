@@ -187,3 +187,4 @@ BENCHMARK_CAPTURE(exactMany, polynomial, "polynomial:degree=3", "none");
 BENCHMARK_CAPTURE(exactMany, gaussian_process, "gaussian_process", "none");
 BENCHMARK_CAPTURE(exactMany, neural_network, "neural_network", "none");
 BENCHMARK_CAPTURE(exactMany, poses, "gaussian_process:inputs=pose", "none");
+BENCHMARK_CAPTURE(bakedMany, poses, "gaussian_process:inputs=pose", "none");

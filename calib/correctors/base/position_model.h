@@ -1,13 +1,26 @@
 #pragma once
 
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
 
+#include "calib/core/error.h"
 #include "calib/core/pose.h"
 
 namespace fieldtrue::correctors {
+
+class PositionModel;
+
+/// Puts a function of position on a lattice that is fast to evaluate.
+class LatticeMaker {
+ public:
+  virtual ~LatticeMaker() = default;
+  /// @param of_position what takes no orientation; @param max_deviation_m the lattice may be off it by, in the region
+  virtual Result<std::unique_ptr<PositionModel>> make(const PositionModel& of_position,
+                                                      double max_deviation_m) const = 0;
+};
 
 /// A fitted, immutable position correction p_true = p_tracked + d(p_tracked), both in the tracker frame [m].
 class PositionModel {
@@ -29,6 +42,13 @@ class PositionModel {
   /// Corrected positions of a batch; the default loops, fast methods override.
   /// @param p_corrected_m same length as p_tracked_m; may be the same memory
   virtual void correct(std::span<const Eigen::Vector3d> p_tracked_m, std::span<Eigen::Vector3d> p_corrected_m) const;
+
+  /// The same with how the sensor is turned.
+  virtual void correctPoses(std::span<const Pose> tracker_from_sensor, std::span<Eigen::Vector3d> p_corrected_m) const;
+
+  /// The same correction with lattices in place of what costs time; the default is one lattice of all of it.
+  /// @error kUnsupported where it takes orientation in a way that lattices cannot hold; as LatticeMaker::make
+  virtual Result<std::unique_ptr<PositionModel>> onLattices(const LatticeMaker& maker, double max_deviation_m) const;
 
   /// d p_corrected / d p_tracked (3x3, dimensionless); the default takes central differences of 0.1 mm.
   virtual Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const;

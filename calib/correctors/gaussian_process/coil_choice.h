@@ -4,8 +4,8 @@
 #include <string>
 
 #include "calib/core/run_control.h"
+#include "calib/correctors/base/sensor_coils.h"
 #include "calib/correctors/gaussian_process/pose_process.h"
-#include "calib/correctors/gaussian_process/sensor_coils.h"
 
 namespace fieldtrue::correctors {
 

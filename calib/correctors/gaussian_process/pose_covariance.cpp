@@ -9,16 +9,6 @@
 namespace fieldtrue::correctors {
 namespace {
 
-/// Squares of c / length of one rotation with others. c^2 = 4 sin^2(angle/2) = 4 (1 - (q . q')^2).
-void squaredChords(double length_rad, const Eigen::Quaterniond& q, std::span<const Eigen::Quaterniond> others,
-                   double* squares) {
-  const double scale = 4.0 / (length_rad * length_rad);
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    const double cosine = q.coeffs().dot(others[i].coeffs());
-    squares[i] = scale * std::max(0.0, 1.0 - cosine * cosine);
-  }
-}
-
 /// Positions in a frame, as arrays.
 struct LocalRows {
   std::array<std::vector<double>, 3> u;
@@ -56,14 +46,6 @@ PoseRows PoseRows::without(std::span<const std::size_t> out) const {
 
 PoseRows PoseRows::only(std::span<const std::size_t> kept) const {
   return {picked(p_m, kept), picked(q, kept), picked(place, kept), picked(noise_m2, kept), placing_m2};
-}
-
-Eigen::VectorXd turnCorrelation(RadialKernel kernel, double turn_length_rad, const Eigen::Quaterniond& q,
-                                std::span<const Eigen::Quaterniond> others) {
-  Eigen::VectorXd correlation(static_cast<Eigen::Index>(others.size()));
-  squaredChords(turn_length_rad, q, others, correlation.data());
-  radialValues(kernel, 0.0, correlation.data(), others.size(), correlation.data());
-  return correlation;
 }
 
 FieldFrame turnFrame(const FieldFrame& frame, const PoseScales& scales) {

@@ -10,6 +10,7 @@
 #include "calib/correctors/gaussian_process/gaussian_process_search.h"
 #include "calib/correctors/radial/rbf_field.h"
 #include "calib/correctors/radial/rbf_system.h"
+#include "calib/correctors/radial/turn_correlation.h"
 
 namespace fieldtrue::correctors {
 
@@ -37,10 +38,6 @@ struct PoseRows {
   PoseRows without(std::span<const std::size_t> out) const;
   PoseRows only(std::span<const std::size_t> kept) const;
 };
-
-/// matern(c / turn_length_rad) of a rotation with each of others.
-Eigen::VectorXd turnCorrelation(RadialKernel kernel, double turn_length_rad, const Eigen::Quaterniond& q,
-                                std::span<const Eigen::Quaterniond> others);
 
 /// The frame of the part that changes as the sensor turns.
 FieldFrame turnFrame(const FieldFrame& frame, const PoseScales& scales);

@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "calib/core/geometry.h"
+#include "calib/correctors/baked/turning_lattices_maker.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
 
@@ -61,6 +62,15 @@ class PosePosition : public PositionModel {
     return sd_m(p_tracked_m, meanTurn().with_rows, meanTurn().among);
   }
   std::string note() const override { return note_; }
+  Result<std::unique_ptr<PositionModel>> onLattices(const LatticeMaker& maker, double max_deviation_m) const override {
+    const TurningPart part{field_.kernel(),
+                           turnFrame(frame_, scales_),
+                           rows_.p_m,
+                           rows_.q,
+                           squareOf(scales_.turn_sd_m) * solution_.coefficients,
+                           scales_.turn_length_rad};
+    return makeTurningLattices(StillPart(*this), part, maker, max_deviation_m);
+  }
 
   nlohmann::json parameters() const override {
     nlohmann::json positions = nlohmann::json::array(), orientations = nlohmann::json::array();
@@ -89,6 +99,18 @@ class PosePosition : public PositionModel {
   }
 
  private:
+  /// What does not change as the sensor turns, with the uncertainty of the mean over the orientations.
+  class StillPart : public PositionModel {
+   public:
+    explicit StillPart(const PosePosition& whole) : whole_(whole) {}
+    Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_m) const override { return whole_.field_.value(p_m); }
+    std::optional<double> uncertainty_m(const Eigen::Vector3d& p_m) const override { return whole_.uncertainty_m(p_m); }
+    nlohmann::json parameters() const override { return {}; }
+
+   private:
+    const PosePosition& whole_;
+  };
+
   RadialField turnedField(const Eigen::MatrixXd& coefficients) const {
     return {field_.kernel(),
             0.0,

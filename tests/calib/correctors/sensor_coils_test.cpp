@@ -1,4 +1,4 @@
-#include "calib/correctors/gaussian_process/sensor_coils.h"
+#include "calib/correctors/base/sensor_coils.h"
 
 #include <Eigen/Eigenvalues>
 #include <QTest>

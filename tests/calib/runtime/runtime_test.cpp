@@ -234,10 +234,21 @@ class RuntimeTest : public QObject {
       QCOMPARE(mean.orientation_wxyz[0], 0.0);
       QVERIFY(std::isnan(calibration.nearestOrientation_deg(c)));
     }
-    fieldtrue_calibration* made = nullptr;
-    QCOMPARE(fieldtrue_bake(calibration.get(), 50.0, 0.02, &made), FIELDTRUE_IMPOSSIBLE);
-    QVERIFY(made == nullptr);
-    FT_VERIFY_MATCH(holdsAll(fieldtrue_error(), {"how the sensor is turned"}));
+  }
+
+  void aCorrectionOfPosesIsBakedWithItsOrientations() {
+    const CalibrationTable table = bentTable(4);
+    const Calibration exact = loaded(fitted(table, "gaussian_process:inputs=pose", "none"));
+    const Calibration baked = exact.baked(50.0, 0.02);
+    QVERIFY(baked.takesOrientation());
+    const auto poses = inC(somePoses(table, 3000));
+    const Worst worst = differenceInside(exact, baked, poses);
+    QVERIFY2(worst.position_m < 50e-6, std::to_string(1e6 * worst.position_m).c_str());
+    std::vector<fieldtrue_pose> corrected(poses.size());
+    const std::size_t before = n_allocations;
+    fieldtrue_correct_many(baked.get(), FIELDTRUE_FIRST_SENSOR, poses.data(), corrected.data(), poses.size());
+    fieldtrue_correct(baked.get(), FIELDTRUE_FIRST_SENSOR, &poses.front(), &corrected.front());
+    QCOMPARE(n_allocations - before, std::size_t{0});
   }
 
   void everySensorHasItsMounting() {

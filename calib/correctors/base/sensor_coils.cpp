@@ -1,4 +1,4 @@
-#include "calib/correctors/gaussian_process/sensor_coils.h"
+#include "calib/correctors/base/sensor_coils.h"
 
 #include <cmath>
 
@@ -34,6 +34,14 @@ class CoilsPosition : public PositionModel {
   bool takesOrientation() const override { return true; }
   Eigen::Vector3d displacementAt_m(const Pose& tracked) const override {
     return model_->displacementAt_m(tracked) + coils_.shift_m(tracked);
+  }
+  void correctPoses(std::span<const Pose> tracked, std::span<Eigen::Vector3d> p_corrected_m) const override {
+    model_->correctPoses(tracked, p_corrected_m);
+    for (std::size_t i = 0; i < tracked.size(); ++i) p_corrected_m[i] += coils_.shift_m(tracked[i]);
+  }
+  Result<std::unique_ptr<PositionModel>> onLattices(const LatticeMaker& maker, double max_deviation_m) const override {
+    FT_TRY(auto model, model_->onLattices(maker, max_deviation_m));
+    return std::make_unique<CoilsPosition>(std::move(model), coils_, mean_strain_);
   }
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
     return model_->displacement_m(p_tracked_m) + shiftOf_m(mean_strain_, p_tracked_m);
