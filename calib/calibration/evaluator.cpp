@@ -34,6 +34,16 @@ Alignment alignmentFrom(const JsonReader& from) {
 /// Poses that are corrected together, in memory of their own on the stack.
 constexpr std::size_t kBlock = 256;
 
+/// Of the poses those that are covered.
+void correctPoses(const correctors::PositionModel& position, std::span<const Pose> tracked,
+                  const std::array<bool, kBlock>& is_covered, std::span<Eigen::Vector3d> p_m) {
+  std::array<Pose, kBlock> covered;
+  std::size_t n_covered = 0;
+  for (std::size_t i = 0; i < tracked.size(); ++i)
+    if (is_covered[i]) covered[n_covered++] = tracked[i];
+  position.correctPoses(std::span<const Pose>(covered).first(n_covered), p_m);
+}
+
 }  // namespace
 
 Evaluator::Evaluator(Parts parts) : parts_(std::move(parts)) { FT_CHECK(parts_.position && parts_.orientation); }
@@ -82,18 +92,16 @@ void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::spa
                              std::span<const std::optional<int>> sensors) const {
   const correctors::PositionModel& position = *parts_.position;
   std::array<Eigen::Vector3d, kBlock> covered_m;
-  std::array<Pose, kBlock> covered;
   std::array<bool, kBlock> is_covered;
   std::size_t n_covered = 0;
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
     is_covered[i] = position.covers(tracker_from_sensor[i].position_m);
     if (!is_covered[i]) continue;
-    covered_m[n_covered] = tracker_from_sensor[i].position_m;
-    covered[n_covered++] = tracker_from_sensor[i];
+    covered_m[n_covered++] = tracker_from_sensor[i].position_m;
   }
   const std::span p_m = std::span(covered_m).first(n_covered);
   if (position.takesOrientation())
-    position.correctPoses(std::span<const Pose>(covered).first(n_covered), p_m);
+    correctPoses(position, tracker_from_sensor, is_covered, p_m);
   else
     position.correct(p_m, p_m);
   std::size_t next = 0;

@@ -3,6 +3,7 @@
 #include <QFileInfo>
 #include <QTemporaryDir>
 #include <QTest>
+#include <set>
 
 #include "acquisition/session/session_store.h"
 #include "tests/acquisition/session/session_samples.h"

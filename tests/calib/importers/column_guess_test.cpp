@@ -52,7 +52,7 @@ class ColumnGuessTest : public QObject {
       const qsizetype equals = pair.indexOf('=');
       const std::string key = pair.left(equals).toStdString();
       const std::string told = textOf(guess->settings.at(key));
-      QVERIFY2(told == pair.mid(equals + 1).toStdString(), qPrintable(QString::fromStdString(key + " is " + told)));
+      QVERIFY2(told == pair.mid(equals + 1).toStdString(), told.c_str());
     }
   }
 
