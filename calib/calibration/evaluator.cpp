@@ -46,7 +46,10 @@ void correctPoses(const correctors::PositionModel& position, std::span<const Pos
 
 }  // namespace
 
-Evaluator::Evaluator(Parts parts) : parts_(std::move(parts)) { FT_CHECK(parts_.position && parts_.orientation); }
+Evaluator::Evaluator(Parts parts)
+    : parts_(std::move(parts)), rotation_(parts_.alignment.reference_from_tracker.orientation.toRotationMatrix()) {
+  FT_CHECK(parts_.position && parts_.orientation);
+}
 
 Evaluator::Parts evaluatorPartsFrom(const JsonReader& content) {
   const JsonReader position = content["position"], orientation = content["orientation"];
@@ -68,7 +71,7 @@ Pose Evaluator::correct(const Pose& tracker_from_sensor, std::optional<int> sens
   corrected.position_m = p_tracked_m;
   if (parts_.position->covers(p_tracked_m))
     corrected.position_m += parts_.position->displacementAt_m(tracker_from_sensor);
-  corrected.position_m = parts_.alignment.reference_from_tracker * corrected.position_m;
+  corrected.position_m = toReference_m(corrected.position_m);
   const Eigen::Quaterniond q_true = parts_.orientation->covers(p_tracked_m)
                                         ? parts_.orientation->correct(p_tracked_m, tracker_from_sensor.orientation)
                                         : tracker_from_sensor.orientation;
@@ -111,7 +114,7 @@ void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::spa
     const Eigen::Quaterniond q_true = parts_.orientation->covers(tracked.position_m)
                                           ? parts_.orientation->correct(tracked.position_m, tracked.orientation)
                                           : tracked.orientation;
-    reference_from_sensor[i].position_m = parts_.alignment.reference_from_tracker * p_true_m;
+    reference_from_sensor[i].position_m = toReference_m(p_true_m);
     reference_from_sensor[i].orientation = parts_.alignment.reference_from_tracker.orientation * q_true *
                                            parts_.alignment.mountOf(sensors.empty() ? std::nullopt : sensors[i]);
   }
@@ -134,14 +137,14 @@ void Evaluator::correctPositions(std::span<const Eigen::Vector3d> p_tracked_m,
     const std::span p_m = std::span(covered_m).first(n_covered);
     parts_.position->correct(p_m, p_m);
     for (std::size_t k = 0; k < n_covered; ++k) p_true_m[slots[k]] = covered_m[k];
-    for (std::size_t i = start; i < end; ++i) p_true_m[i] = parts_.alignment.reference_from_tracker * p_true_m[i];
+    for (std::size_t i = start; i < end; ++i) p_true_m[i] = toReference_m(p_true_m[i]);
   }
 }
 
 Eigen::Vector3d Evaluator::correctPosition_m(const Eigen::Vector3d& p_tracked_m) const {
-  if (!parts_.position->covers(p_tracked_m)) return parts_.alignment.reference_from_tracker * p_tracked_m;
+  if (!parts_.position->covers(p_tracked_m)) return toReference_m(p_tracked_m);
   const Eigen::Vector3d p_true_m = p_tracked_m + parts_.position->displacement_m(p_tracked_m);
-  return parts_.alignment.reference_from_tracker * p_true_m;
+  return toReference_m(p_true_m);
 }
 
 std::optional<double> Evaluator::uncertainty_m(const Eigen::Vector3d& p_tracked_m) const {
@@ -158,9 +161,8 @@ bool Evaluator::covers(const Eigen::Vector3d& p_tracked_m) const {
 }
 
 Eigen::Matrix3d Evaluator::jacobian(const Eigen::Vector3d& p_tracked_m) const {
-  const Eigen::Matrix3d rotation = parts_.alignment.reference_from_tracker.orientation.toRotationMatrix();
-  return parts_.position->covers(p_tracked_m) ? Eigen::Matrix3d(rotation * parts_.position->jacobian(p_tracked_m))
-                                              : rotation;
+  return parts_.position->covers(p_tracked_m) ? Eigen::Matrix3d(rotation_ * parts_.position->jacobian(p_tracked_m))
+                                              : rotation_;
 }
 
 }  // namespace fieldtrue::calibration

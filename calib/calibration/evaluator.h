@@ -60,7 +60,12 @@ class Evaluator {
   void correctBlock(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
                     std::span<const std::optional<int>> sensors) const;
 
+  Eigen::Vector3d toReference_m(const Eigen::Vector3d& p_tracker_m) const {
+    return rotation_ * p_tracker_m + parts_.alignment.reference_from_tracker.position_m;
+  }
+
   Parts parts_;
+  Eigen::Matrix3d rotation_;  ///< Of the alignment.
 };
 
 /// What applies the calibration of a file's content; throws as a JsonReader does.

@@ -93,6 +93,8 @@ BakedLattice::BakedLattice(LatticeParts parts) : parts_(std::move(parts)) {
     FT_CHECK(parts_.counts[static_cast<std::size_t>(axis)] >= 4);
     arrays_.origin_m[axis] = parts_.origin_m[axis];
     arrays_.counts[axis] = parts_.counts[static_cast<std::size_t>(axis)];
+    low_m_[axis] = parts_.origin_m[axis] + parts_.spacing_m;
+    high_m_[axis] = parts_.origin_m[axis] + parts_.spacing_m * (arrays_.counts[axis] - 2);
   }
 }
 
@@ -148,15 +150,17 @@ std::optional<double> BakedLattice::uncertainty_m(const Eigen::Vector3d& p_track
 }
 
 bool BakedLattice::covers(const Eigen::Vector3d& p_tracked_m) const {
+  const auto is_within = [&](int axis) {
+    return p_tracked_m[axis] >= low_m_[axis] && p_tracked_m[axis] <= high_m_[axis];
+  };
+  if (!(is_within(0) && is_within(1) && is_within(2))) return false;
+  if (parts_.covered.empty()) return true;
   std::array<int, 3> cell;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double x_m = p_tracked_m[static_cast<Eigen::Index>(axis)];
-    const double t = (x_m - parts_.origin_m[static_cast<Eigen::Index>(axis)]) / parts_.spacing_m;
-    if (!(t >= 1.0 && t <= parts_.counts[axis] - 2)) return false;
     double u = 0.0;
-    cell[axis] = latticeCell(arrays_, static_cast<int>(axis), x_m, &u) - 1;
+    cell[axis] = latticeCell(arrays_, static_cast<int>(axis), p_tracked_m[static_cast<Eigen::Index>(axis)], &u) - 1;
   }
-  return parts_.covered.empty() || parts_.covered[latticeCellIndex(parts_, cell)];
+  return parts_.covered[latticeCellIndex(parts_, cell)];
 }
 
 nlohmann::json BakedLattice::parameters() const {

@@ -51,6 +51,7 @@ class BakedLattice : public PositionModel {
  private:
   LatticeParts parts_;
   LatticeArrays arrays_;
+  Eigen::Vector3d low_m_, high_m_;  ///< Where all 64 coefficients around a position are there.
 };
 
 /// Cells along an axis: those that have all their coefficients.
