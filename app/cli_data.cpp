@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <set>
@@ -159,6 +160,14 @@ Answer knownFormat(const std::string& id, const std::string& label, const Import
   return answer;
 }
 
+/// Whether the values can stand in a format's text and between a shell's quotes.
+bool isTypeable(const Settings& settings) {
+  return std::all_of(settings.begin(), settings.end(), [](const auto& setting) {
+    const std::string* text = std::get_if<std::string>(&setting.second);
+    return text == nullptr || text->find_first_of(",='\"\\") == std::string::npos;
+  });
+}
+
 /// What a file seems to hold, and the command that reads it so. Nothing is written.
 Outcome runGuess(const ImportOptions& options) {
   if (const importers::Importer* importer = importers::recogniseRecording(options.in))
@@ -169,7 +178,8 @@ Outcome runGuess(const ImportOptions& options) {
   if (!guess) return notPossible(guess.error());
   const auto preview = importers::previewText(options.in, guess->settings, kRowsShown);
   if (!preview) return notPossible(preview.error());
-  const std::string format = importers::formatText(guess->settings) + (guess->has_unit ? "" : ",unit=?");
+  std::string format = importers::formatText(guess->settings);
+  if (!guess->has_unit) format += format.find(':') == std::string::npos ? ":unit=?" : ",unit=?";
   Answer answer;
   answer.json = {{"format", format},
                  {"settings", toJson(guess->settings)},
@@ -184,7 +194,12 @@ Outcome runGuess(const ImportOptions& options) {
   };
   show(preview->columns);
   for (const std::vector<std::string>& row : preview->rows) show(row);
-  answer.text += "fieldtrue-cli import --format '" + format + "' --in '" + options.in + "'\n";
+  if (isTypeable(guess->settings))
+    answer.text += "fieldtrue-cli import --format '" + format + "' --in '" + options.in + "'\n";
+  else
+    answer.text +=
+        "a column that is used has , = or a quote in its name, which --format cannot take: rename it, or import "
+        "the file in the window\n";
   return answer;
 }
 

@@ -6,11 +6,14 @@
 #include <set>
 #include <utility>
 
+#include "calib/core/file_io.h"
 #include "calib/core/number_text.h"
 #include "calib/core/statistics.h"
+#include "calib/core/trimmed.h"
 #include "calib/importers/column_names.h"
 #include "calib/importers/registry.h"
 #include "calib/importers/text_table.h"
+#include "calib/tables/line_reader.h"
 
 namespace fieldtrue::importers {
 namespace {
@@ -23,11 +26,16 @@ constexpr double kSamplesAtLeast = 5.0;
 /// Widest and narrowest space that an electromagnetic tracker is calibrated in.
 constexpr double kWidest_m = 8.0;
 constexpr double kNarrowest_m = 0.1;
+/// Angles beyond are no radians.
+constexpr double kLargestRadians = 6.5;
+/// Numbers beyond are dates, or of another unit.
+constexpr double kLongestSession_s = 1e8;
 
 /// A group of columns that belong together.
 struct FoundGroup {
   std::string stem;
   bool is_true = false;
+  bool is_reading = false;
   std::vector<std::string> columns;
   std::set<std::string> units;
 };
@@ -42,12 +50,13 @@ std::vector<FoundGroup> groupsOf(const std::vector<std::string>& columns, const 
         std::find(stems.begin(), stems.end(), name.stem) == stems.end())
       stems.push_back(name.stem);
   for (const std::string& stem : stems) {
-    FoundGroup group{stem, false, {}, {}};
+    FoundGroup group{stem, false, false, {}, {}};
     for (const std::string& part : parts)
       for (std::size_t i = 0; i < names.size(); ++i) {
         if (names[i].part != part || names[i].stem != stem || group.columns.size() == parts.size()) continue;
         group.columns.push_back(columns[i]);
         group.is_true = names[i].is_true;
+        group.is_reading = names[i].is_reading;
         if (!names[i].unit.empty()) group.units.insert(names[i].unit);
         break;
       }
@@ -87,44 +96,93 @@ struct Guess {
     for (std::size_t i = 0; i < keys.size(); ++i) set(keys[i], group.columns[i]);
   }
 
-  void takePositions(std::set<std::string>& tracked_units, std::set<std::string>& true_units) {
-    std::vector<FoundGroup> groups = groupsOf(table.columns, names, {"x", "y", "z"});
-    const auto truth = std::find_if(groups.begin(), groups.end(), [](const auto& group) { return group.is_true; });
-    if (truth != groups.end()) {
-      assign({"x_true", "y_true", "z_true"}, *truth);
-      true_owner = ownerOf(truth->stem);
-      true_units = truth->units;
-      say("true position: " + listed(truth->columns) + ", by their names");
-      groups.erase(truth);
-    }
-    if (groups.empty()) {
-      say("no three columns are named like the coordinates of a position; choose them");
-      return;
-    }
-    assign({"x", "y", "z"}, groups.front());
-    tracked_owner = ownerOf(groups.front().stem);
-    tracked_units = groups.front().units;
-    say("tracked position: " + listed(groups.front().columns) + ", by their names");
-    if (groups.size() > 1 && truth == groups.end())
-      say("the columns " + listed(groups[1].columns) +
-          " are a position too; whether they are the true one could not be told");
+  /// The one group of a kind that there is, or null: which of several is meant nobody can tell.
+  template <class Is>
+  const FoundGroup* theOne(const std::vector<FoundGroup>& groups, Is is) {
+    const auto n = std::count_if(groups.begin(), groups.end(), is);
+    return n == 1 ? &*std::find_if(groups.begin(), groups.end(), is) : nullptr;
   }
 
-  void takeRotations(const std::vector<std::string>& parts, const std::string& words) {
+  bool takePosition(const FoundGroup& group, bool is_truth) {
+    const std::string what = is_truth ? "true position: " : "tracked position: ";
+    if (group.units.size() > 1) {
+      say(what + listed(group.columns) + " are in different units, which cannot be read; choose others");
+      return false;
+    }
+    assign(is_truth ? std::vector<std::string>{"x_true", "y_true", "z_true"} : std::vector<std::string>{"x", "y", "z"},
+           group);
+    (is_truth ? true_owner : tracked_owner) = ownerOf(group.stem);
+    say(what + listed(group.columns) + ", by their names");
+    return true;
+  }
+
+  void takePositions(std::set<std::string>& tracked_units, std::set<std::string>& true_units) {
+    const std::vector<FoundGroup> groups = groupsOf(table.columns, names, {"x", "y", "z"});
+    const auto is_truth = [](const FoundGroup& group) { return group.is_true && !group.is_reading; };
+    const auto is_reading = [](const FoundGroup& group) { return group.is_reading && !group.is_true; };
+    const FoundGroup* truth = theOne(groups, is_truth);
+    const FoundGroup* reading = theOne(groups, is_reading);
+    const bool is_plain = std::none_of(groups.begin(), groups.end(), is_reading);
+    if (is_plain) reading = theOne(groups, [&](const FoundGroup& group) { return !is_truth(group); });
+    if (truth != nullptr && takePosition(*truth, true)) true_units = truth->units;
+    if (reading != nullptr && takePosition(*reading, false)) tracked_units = reading->units;
+    if (groups.empty()) say("no three columns are named like the coordinates of a position; choose them");
+    for (const FoundGroup& group : groups)
+      if (&group != truth && &group != reading)
+        say("the columns " + listed(group.columns) +
+            " are a position too; whether the tracker's or the true one could not be told");
+    if (!groups.empty() && reading == nullptr)
+      say("which columns the tracker's readings are could not be told; choose them");
+  }
+
+  /// Whether angles may be read, and in which unit: told by their names, or by numbers that no radians are.
+  bool takeAngleUnit(const FoundGroup& group) {
+    if (group.units.size() == 1) {
+      set("angle_unit", *group.units.begin() == "rad" ? "rad" : "deg");
+      return true;
+    }
+    double largest = 0.0;
+    for (std::size_t i = 0; i < table.columns.size(); ++i) {
+      if (std::find(group.columns.begin(), group.columns.end(), table.columns[i]) == group.columns.end()) continue;
+      for (const auto& row : table.rows)
+        if (const double value = number(row[i]); std::isfinite(value)) largest = std::max(largest, std::abs(value));
+    }
+    return largest > kLargestRadians;
+  }
+
+  void takeRotations(const std::vector<std::string>& parts) {
+    const bool are_angles = parts.size() == 3;
     for (const FoundGroup& group : groupsOf(table.columns, names, parts)) {
+      const std::string own = ownerOf(group.stem);
+      const bool is_truth = true_owner && !own.empty() && own == *true_owner;
+      if (!is_truth && !(tracked_owner && (own.empty() || own == *tracked_owner))) {
+        say("whose orientation " + listed(group.columns) + " are could not be told, and they are left out");
+        continue;
+      }
       std::vector<std::string> keys = parts;
-      if (group.is_true)
+      if (is_truth)
         for (std::string& key : keys) key += "_true";
-      const std::optional<std::string>& owner = group.is_true ? true_owner : tracked_owner;
-      if (!owner || !choiceSetting(result.settings, keys.front()).empty()) continue;
-      if (const std::string own = ownerOf(group.stem); !own.empty() && own != *owner) {
-        say("the orientation " + listed(group.columns) +
-            " is another thing's than the position by its name, and is left out");
+      if (!choiceSetting(result.settings, keys.front()).empty()) continue;
+      if (are_angles && !takeAngleUnit(group)) {
+        say("the angles " + listed(group.columns) +
+            " may be degrees or radians, and are left out; choose them and their unit");
         continue;
       }
       assign(keys, group);
-      say(std::string(group.is_true ? "true" : "tracked") + " orientation: " + listed(group.columns) + words);
+      std::string how = ", by their names";
+      if (are_angles) how += "; " + choiceSetting(result.settings, "angle_unit") + ", Rz(az) Ry(el) Rx(roll)";
+      if (group.columns.front().ends_with('0')) how += "; 0 is taken for w, 1 to 3 for x, y, z";
+      say(std::string(is_truth ? "true" : "tracked") + " orientation: " + listed(group.columns) + how);
     }
+  }
+
+  /// Why a column that is named like a time cannot be one in seconds; empty where it can.
+  std::string whyNoTime(std::size_t column) const {
+    if (!names[column].unit.empty() && names[column].unit != "s") return " is in " + names[column].unit;
+    const bool is_date = std::any_of(table.rows.begin(), table.rows.end(), [&](const auto& row) {
+      return std::abs(number(row[column])) > kLongestSession_s;
+    });
+    return is_date ? " holds no seconds of a session" : std::string();
   }
 
   void takeSingles() {
@@ -148,15 +206,36 @@ struct Guess {
         say(is + " is set in every row, so that it would count as an error mark of every row, and is left out");
         continue;
       }
+      if (const std::string why = whyNoTime(column); std::string_view(key) == "time" && !why.empty()) {
+        say(is + why + ", and is left out: time counts in seconds");
+        continue;
+      }
       set(key, table.columns[column]);
       say(is + ", by its name");
     }
   }
 
-  void takeFirstColumns() {
-    if (table.columns.size() < kFewestColumns) return;
-    for (std::size_t i = 0; i < 3; ++i) set(std::string(1, "xyz"[i]), table.columns[i]);
-    say("no names: the first three columns are taken as the tracked position");
+  /// @param comment the line above the first row, which may hold the names
+  void takeFirstColumns(const std::string& comment) {
+    if (table.columns.size() == kFewestColumns) {
+      for (std::size_t i = 0; i < 3; ++i) set(std::string(1, "xyz"[i]), table.columns[i]);
+      say("no names: the three columns are taken as the tracked position");
+      return;
+    }
+    say(comment.empty()
+            ? "no names: choose the columns"
+            : "no names: choose the columns, or take the # off the line '" + comment + "' if these are their names");
+  }
+
+  void tellUnused() {
+    std::vector<std::string> unused;
+    for (const std::string& column : table.columns)
+      if (std::none_of(result.settings.begin(), result.settings.end(), [&](const auto& setting) {
+            const std::string* text = std::get_if<std::string>(&setting.second);
+            return text != nullptr && *text == column;
+          }))
+        unused.push_back(column);
+    if (!unused.empty()) say("not used: " + listed(unused));
   }
 
   /// Diagonal of the box around the tracked positions, in the table's unit.
@@ -243,6 +322,18 @@ bool hasDecimalComma(const TextPreview& table) {
   });
 }
 
+/// The line of comment right above the first row, without its mark; empty where there is none.
+Result<std::string> lastComment(const std::filesystem::path& path) {
+  FT_TRY(std::ifstream in, openForReading(path));
+  LineReader lines(in, path.filename().string());
+  std::string comment, line;
+  while (true) {
+    FT_TRY(const bool more, lines.next(line));
+    if (!more || !(line.empty() || line.starts_with('#'))) return comment;
+    comment = line.empty() ? "" : std::string(trimmed(std::string_view(line).substr(1)));
+  }
+}
+
 /// The settings that say how the file is written.
 Result<Settings> guessWriting(const std::filesystem::path& path, Settings settings) {
   settings["header"] = false;
@@ -266,6 +357,7 @@ Result<Settings> guessWriting(const std::filesystem::path& path, Settings settin
 }  // namespace
 
 Result<ColumnGuess> guessColumns(const std::filesystem::path& path) {
+  FT_TRY_VOID(openForReading(path));
   const Importer& columns = *findImporter("columns").value();
   Guess guess;
   FT_TRY(guess.result.settings, resolveSettings(columns.id, columns.settings, {}));
@@ -276,14 +368,16 @@ Result<ColumnGuess> guessColumns(const std::filesystem::path& path) {
   std::set<std::string> tracked_units, true_units;
   if (boolSetting(guess.result.settings, "header")) {
     guess.takePositions(tracked_units, true_units);
-    guess.takeRotations({"qw", "qx", "qy", "qz"}, ", by their names");
-    guess.takeRotations({"azimuth", "elevation", "roll"}, ", by their names; degrees, Rz(az) Ry(el) Rx(roll)");
+    guess.takeRotations({"qw", "qx", "qy", "qz"});
+    guess.takeRotations({"azimuth", "elevation", "roll"});
     guess.takeSingles();
   } else {
-    guess.takeFirstColumns();
+    FT_TRY(const std::string comment, lastComment(path));
+    guess.takeFirstColumns(comment);
   }
   guess.takeUnits(tracked_units, true_units);
   guess.takeAveraging();
+  guess.tellUnused();
   return guess.result;
 }
 

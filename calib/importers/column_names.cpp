@@ -29,8 +29,13 @@ Words wordsOf(const std::string& name) {
   return words;
 }
 
-const std::set<std::string> kTruthWords{"true",    "truth", "ref", "reference", "gt",    "ground", "actual",
-                                        "nominal", "rig",   "jig", "phantom",   "known", "real"};
+const std::set<std::string> kTruthWords{
+    "true", "truth", "ref",     "reference", "gt",    "ground",  "groundtruth", "nominal", "rig",
+    "jig",  "known", "phantom", "ideal",     "gold",  "target",  "expected",    "desired", "commanded",
+    "wahr", "soll",  "planned", "set",       "robot", "optical", "vicon",       "cmm"};
+const std::set<std::string> kReadingWords{"tracked", "tracker", "meas",   "measured", "measurement",
+                                          "raw",     "reading", "actual", "real",     "sensor",
+                                          "em",      "ist",     "stylus", "tip"};
 const std::set<std::string> kQuaternionWords{"q", "quat", "quaternion", "rot", "rotation", "orientation", "ori"};
 const std::set<std::string> kPositionWords{"p", "t", "pos", "position", "mean", "tracked", "meas", "measured", "raw"};
 /// Columns that tell of a position how sure or how wrong it is.
@@ -92,14 +97,20 @@ char quaternionPart(Words& words) {
   return 0;
 }
 
+/// Words that stand for units, and what they are called here.
+const std::map<std::string, std::string> kUnitWords{{"deg", "deg"},     {"degrees", "deg"}, {"rad", "rad"},
+                                                    {"radians", "rad"}, {"s", "s"},         {"sec", "s"},
+                                                    {"ms", "ms"},       {"us", "us"},       {"ns", "ns"}};
+
 std::string takeUnit(Words& words) {
   if (words.size() < 2) return {};
-  for (const std::string& unit : lengthUnits())
-    if (words.back() == unit) {
-      words.pop_back();
-      return unit;
-    }
-  return {};
+  const std::vector<std::string> lengths = lengthUnits();
+  const auto other = kUnitWords.find(words.back());
+  const bool is_length = std::find(lengths.begin(), lengths.end(), words.back()) != lengths.end();
+  if (!is_length && other == kUnitWords.end()) return {};
+  const std::string unit = is_length ? words.back() : other->second;
+  words.pop_back();
+  return unit;
 }
 
 std::string spaced(const Words& words) {
@@ -114,12 +125,8 @@ ColumnName readColumnName(const std::string& name) {
   Words words = wordsOf(name);
   ColumnName result;
   result.unit = takeUnit(words);
-  if (words.size() > 1 && std::set<std::string>{"deg", "degrees", "s"}.contains(words.back())) words.pop_back();
   if (std::any_of(words.begin(), words.end(), [](const auto& word) { return kNoPosition.contains(word); }))
     return result;
-  const auto tellTruth = [&](const std::string& word) {
-    result.is_true = result.is_true || kTruthWords.contains(word);
-  };
   if (const char part = quaternionPart(words)) {
     result.part = std::string("q") + part;
   } else {
@@ -131,7 +138,8 @@ ColumnName readColumnName(const std::string& name) {
     }
   }
   for (const std::string& word : words) {
-    tellTruth(word);
+    result.is_true = result.is_true || kTruthWords.contains(word);
+    result.is_reading = result.is_reading || kReadingWords.contains(word);
     if (result.part.empty()) result.part = wholeName(word);
   }
   const bool is_angle = result.part == "azimuth" || result.part == "elevation" || result.part == "roll";

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <map>
 #include <set>
@@ -26,19 +27,22 @@ struct Layout {
 /// One data row: what was tracked and, where the table has it, the truth.
 struct Row {
   SampleRow tracked;
+  bool has_orientation = false;
   std::optional<Pose> truth;
 };
 
-/// What one of the table's numbers of length is worth.
+/// What one of the table's numbers of length is worth, and one of its angles.
 struct Units {
   double tracked_m = 1.0;
   double true_m = 1.0;
+  double angle_rad = kRadPerDeg;
 };
 
 Units unitsOf(const Settings& settings) {
   const double tracked_m = lengthUnit_m(choiceSetting(settings, "unit"));
   const std::string& of_truth = choiceSetting(settings, "unit_true");
-  return {tracked_m, of_truth == kSameUnit ? tracked_m : lengthUnit_m(of_truth)};
+  return {tracked_m, of_truth == kSameUnit ? tracked_m : lengthUnit_m(of_truth),
+          choiceSetting(settings, "angle_unit") == "rad" ? 1.0 : kRadPerDeg};
 }
 
 /// The columns that a group of settings names: all of them, or none when every name is blank.
@@ -94,11 +98,13 @@ Eigen::Vector3d position_m(CsvReader& reader, const std::vector<std::size_t>& co
   return unit_m * Eigen::Vector3d(x, y, z);
 }
 
-Eigen::Quaterniond orientation(CsvReader& reader, const Group& quaternion, const Group& angles) {
-  if (!angles) return reader.quaternion(quaternion).value_or(Eigen::Quaterniond::Identity());
+/// None where the columns are absent or blank.
+std::optional<Eigen::Quaterniond> orientation(CsvReader& reader, const Group& quaternion, const Group& angles,
+                                              double angle_rad) {
+  if (!angles) return reader.quaternion(quaternion);
   Eigen::Vector3d angles_rad;
   for (Eigen::Index i = 0; i < 3; ++i)
-    angles_rad[i] = reader.number((*angles)[static_cast<std::size_t>(i)]) * kRadPerDeg;
+    angles_rad[i] = reader.number((*angles)[static_cast<std::size_t>(i)]) * angle_rad;
   return canonical(rotationFromEuler(angles_rad));
 }
 
@@ -111,11 +117,14 @@ Row readRow(CsvReader& reader, const Layout& layout, const Units& units, int row
   sample.time_s = reader.optionalNumber(layout.time).value_or(0.0);
   if (layout.status) sample.status = reader.field(*layout.status);
   sample.tracker_from_sensor.position_m = position_m(reader, *layout.position, units.tracked_m);
-  sample.tracker_from_sensor.orientation = orientation(reader, layout.rotation, layout.angles);
+  const auto turned = orientation(reader, layout.rotation, layout.angles, units.angle_rad);
+  row.has_orientation = turned.has_value();
+  sample.tracker_from_sensor.orientation = turned.value_or(Eigen::Quaterniond::Identity());
   markMissing(sample);
   if (layout.true_position && row.tracked.node >= 0) {
     row.truth = Pose{position_m(reader, *layout.true_position, units.true_m),
-                     orientation(reader, layout.true_rotation, layout.true_angles)};
+                     orientation(reader, layout.true_rotation, layout.true_angles, units.angle_rad)
+                         .value_or(Eigen::Quaterniond::Identity())};
   }
   return row;
 }
@@ -133,7 +142,7 @@ Result<std::vector<Row>> readRows(CsvReader& reader, const Layout& layout, const
 }
 
 /// Every row as a node of its own; visits count up per node and sensor where the table does not number them.
-Result<std::vector<Node>> nodesOf(const std::vector<Row>& rows, const Layout& layout) {
+Result<std::vector<Node>> nodesOf(const std::vector<Row>& rows, const Layout& layout, std::vector<std::string>& notes) {
   std::map<std::pair<int, int>, int> visits;
   std::set<std::tuple<int, int, int>> keys;
   std::vector<Node> nodes;
@@ -146,7 +155,7 @@ Result<std::vector<Node>> nodesOf(const std::vector<Row>& rows, const Layout& la
     const int count = visits[{node.node, node.sensor}]++;
     node.visit = layout.visit ? row.tracked.visit : count;
     node.tracker_from_sensor = sample.tracker_from_sensor;
-    node.has_orientation = layout.hasRotation();
+    node.has_orientation = row.has_orientation;
     if (layout.time) node.t_start_s = node.t_end_s = sample.time_s;
     if (!keys.emplace(node.node, node.sensor, node.visit).second) {
       return fail(ErrorCode::kBadInput, "columns: node " + std::to_string(node.node) + ", sensor " +
@@ -156,6 +165,14 @@ Result<std::vector<Node>> nodesOf(const std::vector<Row>& rows, const Layout& la
     nodes.push_back(node);
   }
   if (nodes.empty()) return fail(ErrorCode::kTooFewNodes, "columns: no row is a good reading at a place");
+  if (const std::size_t left_out = rows.size() - nodes.size())
+    notes.push_back(
+        std::to_string(left_out) + " of " + std::to_string(rows.size()) +
+        " rows are left out: a mark in status, a reading that stands for a missing one, or a place below 0");
+  const auto n_turned =
+      std::count_if(nodes.begin(), nodes.end(), [](const Node& node) { return node.has_orientation; });
+  if (n_turned > 0 && n_turned < std::ssize(nodes))
+    notes.push_back(std::to_string(std::ssize(nodes) - n_turned) + " rows have no orientation");
   return nodes;
 }
 
@@ -203,8 +220,13 @@ Result<TableMetadata> setForeignTruth(const std::filesystem::path& path, bool ha
 
 Result<std::vector<Node>> makeNodes(const std::vector<Row>& rows, const std::vector<SampleRow>& samples,
                                     const Layout& layout, bool average, std::vector<std::string>& notes) {
-  if (!average) return nodesOf(rows, layout);
+  if (!average) return nodesOf(rows, layout, notes);
   if (!layout.node) return fail(ErrorCode::kBadInput, "columns: average=true needs node= to name the column of places");
+  const auto lacks = [&](const Row& row) { return layout.hasRotation() && !row.has_orientation; };
+  if (std::any_of(rows.begin(), rows.end(), lacks))
+    return fail(ErrorCode::kBadInput,
+                "columns: some rows have no orientation, so a mean of it cannot be taken; leave "
+                "these rows out, or the columns of the orientation");
   FT_TRY(AveragedNodes averaged, averageRows(samples, {}, layout.hasRotation(), "Node"));
   notes.insert(notes.end(), averaged.notes.begin(), averaged.notes.end());
   return std::move(averaged.nodes);
@@ -266,7 +288,7 @@ std::vector<Setting> columnSettings() {
   }
   for (const char* angle : {"azimuth", "elevation", "roll"}) {
     settings.push_back(textSetting(angle, std::string("Tracked ") + angle, "",
-                                   "Column of the tracked orientation's angle in degrees, Rz(az) Ry(el) Rx(roll); "
+                                   "Column of the tracked orientation's angle, Rz(az) Ry(el) Rx(roll); "
                                    "blank = none"));
   }
   for (const char* axis : {"x_true", "y_true", "z_true"}) {
@@ -279,7 +301,7 @@ std::vector<Setting> columnSettings() {
   }
   for (const char* angle : {"azimuth", "elevation", "roll"}) {
     settings.push_back(textSetting(angle + std::string("_true"), std::string("True ") + angle, "",
-                                   "Column of the true orientation's angle in degrees; blank = none"));
+                                   "Column of the true orientation's angle; blank = none"));
   }
   settings.push_back(textSetting("node", "Place", "", "Column of the place's number; blank = every row is a place"));
   settings.push_back(textSetting("sensor", "Sensor", "", "Column of the sensor's number; blank = 0"));
@@ -290,6 +312,8 @@ std::vector<Setting> columnSettings() {
   std::vector<std::string> units = lengthUnits();
   units.insert(units.begin(), kSameUnit);
   settings.push_back(textSetting("unit_true", "Unit of the truth", kSameUnit, "Unit of the true positions", units));
+  settings.push_back(
+      textSetting("angle_unit", "Unit of the angles", "deg", "Unit of azimuth, elevation and roll", {"deg", "rad"}));
   settings.push_back(textSetting("separator", "Separator", "comma", "What stands between fields", separatorNames()));
   settings.push_back(textSetting("decimal", "Decimal mark", "point", "How fractions are written", {"point", "comma"}));
   settings.push_back(declare::flag("header", "Names in the first row", true,

@@ -38,15 +38,20 @@ std::vector<std::string> separatorNames() {
 Result<TextTable> TextTable::open(const std::filesystem::path& path, const Settings& settings) {
   TextTable table;
   FT_TRY(std::ifstream in, openForReading(path));
+  const bool has_decimal_comma = choiceSetting(settings, "decimal") == "comma";
+  if (has_decimal_comma && choiceSetting(settings, "separator") == "comma")
+    return fail(ErrorCode::kBadInput,
+                "columns: a comma cannot both separate fields and stand in numbers; choose another "
+                "separator or decimal=point");
   table.in_ = std::make_unique<std::ifstream>(std::move(in));
   const std::string& name = choiceSetting(settings, "separator");
   const auto separator =
       std::find_if(kSeparators.begin(), kSeparators.end(), [&](const auto& one) { return name == one.first; });
   FT_CHECK(separator != kSeparators.end());
   FT_TRY(CsvReader reader, CsvReader::open(*table.in_, path.filename().string(), separator->second,
-                                           boolSetting(settings, "header") ? CsvHeader::kRow : CsvHeader::kNone));
+                                           boolSetting(settings, "header") ? CsvHeader::kLooseRow : CsvHeader::kNone));
   table.reader_ = std::make_unique<CsvReader>(std::move(reader));
-  if (choiceSetting(settings, "decimal") == "comma") table.reader_->allowDecimalComma();
+  if (has_decimal_comma) table.reader_->allowDecimalComma();
   return table;
 }
 

@@ -60,7 +60,9 @@ Result<Truth> truthOfColumns(CsvReader& reader) {
   for (const TruthColumns& row : kTruthColumns) {
     const Result<std::vector<std::size_t>> columns = reader.require(row.names);
     if (!columns) continue;
-    const std::optional<std::size_t> label = reader.find("label");
+    std::optional<std::size_t> label;
+    for (const char* name : {"label", "node", "id", "name", "point", "place"})
+      if (!label) label = reader.find(name);
     Truth truth;
     while (true) {
       FT_TRY(const bool more, reader.next());

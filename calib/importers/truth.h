@@ -25,7 +25,8 @@ struct Truth {
 };
 
 /// Reads where the points really are: a node table, a 3D Slicer .fcsv, or a CSV with columns x_true_m or true_x_mm or
-/// x_true_mm or x_mm or x_m (and y, z) and perhaps `label`.
+/// x_true_mm or x_mm or x_m (and y, z) and perhaps a label: `label`, `node`, `id`,
+/// `name`, `point` or `place`.
 /// @error kIo; kBadInput naming file, line and column
 Result<Truth> readTruth(const std::filesystem::path& path);
 

@@ -94,6 +94,8 @@ Result<void> CsvReader::readHeader(CsvHeader header) {
     return {};
   }
   columns_.assign(fields_.begin(), fields_.end());
+  for (std::size_t i = 0; i < columns_.size() && header == CsvHeader::kLooseRow; ++i)
+    if (columns_[i].empty()) columns_[i] = "column" + std::to_string(i + 1);
   return checkColumns();
 }
 

@@ -17,9 +17,10 @@ namespace fieldtrue {
 
 /// Where a table's columns have their names.
 enum class CsvHeader {
-  kRow,      ///< In the first row.
-  kComment,  ///< In the comment line `# columns = a,b,c`, as 3D Slicer writes it.
-  kNone,     ///< Nowhere: they are called column1, column2, ...
+  kRow,       ///< In the first row.
+  kLooseRow,  ///< There too; a column that has none is called column1, column2, ... by where it stands.
+  kComment,   ///< In the comment line `# columns = a,b,c`, as 3D Slicer writes it.
+  kNone,      ///< Nowhere: they are called column1, column2, ...
 };
 
 /// Streams a comma-separated table with a header row: columns by name, `#` lines of metadata above it, errors that

@@ -37,7 +37,7 @@ std::vector<std::size_t> spanningRows(const TurningPart& part) {
   Eigen::VectorXd left = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
   Eigen::MatrixXd columns(left.size(), 0);
   std::vector<std::size_t> chosen;
-  while (chosen.size() < n && chosen.size() <= TurnBasis::kMostCenters) {
+  while (chosen.size() < std::min(n, TurnBasis::kMostCenters)) {
     Eigen::Index pivot = 0;
     const double largest = left.maxCoeff(&pivot);
     if (largest < kLeastPivot) break;
@@ -124,7 +124,6 @@ Result<std::unique_ptr<PositionModel>> makeTurningLattices(const PositionModel& 
                                                            const LatticeMaker& maker, double max_deviation_m) {
   TurnBasis basis{part.kernel, part.length_rad, {}, {}, {}};
   for (const std::size_t row : spanningRows(part)) basis.centers.push_back(part.q[row]);
-  if (basis.centers.size() > TurnBasis::kMostCenters) return tooMany("orientations");
   const Eigen::LDLT<Eigen::MatrixXd> among(correlations(part, basis.centers, basis.centers));
   const Eigen::MatrixXd of_rows = among.solve(correlations(part, basis.centers, part.q)).transpose();
   const Eigen::MatrixXd samples = sampled(part, of_rows, thinned(part.p_m, kPlacesLookedAt));

@@ -23,7 +23,8 @@ struct TurningPart {
 /// (pivoted Cholesky of their kernel), and the functions of position that belong to these by as few as the bound allows
 /// (singular values over places and orientations).
 /// @param still what does not change as the sensor turns; its uncertainty is the whole's
-/// @error kUnsupported where that takes more than 256 orientations or 48 functions; as LatticeMaker::make
+/// @error kUnsupported where that takes more than 48 functions; as LatticeMaker::make. Orientations beyond 256 are left
+/// to those that are nearest: whether that does is for the caller to check.
 Result<std::unique_ptr<PositionModel>> makeTurningLattices(const PositionModel& still, const TurningPart& part,
                                                            const LatticeMaker& maker, double max_deviation_m);
 

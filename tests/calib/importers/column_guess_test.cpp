@@ -30,9 +30,25 @@ class ColumnGuessTest : public QObject {
         "node=Point|x=X [cm]|z=Z [cm]|x_true=Xref [mm]|z_true=Zref [mm]|unit=cm|unit_true=mm|separator=comma");
     row("capitals and camels", "time;PosX;PosY;PosZ;QuatW;QuatX;QuatY;QuatZ\n0;1;2;3;1;0;0;0\n9;400;2;3;1;0;0;0\n",
         "time=time|x=PosX|y=PosY|qw=QuatW|qz=QuatZ|x_true=|unit=mm|separator=semicolon");
-    row("angles", "x_m y_m z_m azimuth elevation roll\n1 2 3 4 5 6\n",
-        "x=x_m|azimuth=azimuth|elevation=elevation|roll=roll|qw=|unit=m|separator=space");
-    row("yaw, pitch, roll", "px\tpy\tpz\tyaw\tpitch\troll\n0\t0\t0\t0\t0\t0\n1\t1\t1\t0\t0\t0\n",
+    row("angles", "x_m y_m z_m azimuth elevation roll\n1 2 3 40 5 6\n",
+        "x=x_m|azimuth=azimuth|elevation=elevation|roll=roll|angle_unit=deg|qw=|unit=m|separator=space");
+    row("radians by their names", "x_m,y_m,z_m,yaw [rad],pitch [rad],roll [rad]\n1,2,3,1,0,0\n",
+        "azimuth=yaw [rad]|roll=roll [rad]|angle_unit=rad");
+    row("degrees or radians", "x_m,y_m,z_m,yaw,pitch,roll\n1,2,3,1.5,0,0\n", "azimuth=|elevation=|roll=");
+    row("expected and actual", "x_expected,y_expected,z_expected,x_actual,y_actual,z_actual\n1,2,3,4,5,6\n",
+        "x=x_actual|x_true=x_expected");
+    row("a reference sensor is no truth",
+        "x_measured,y_measured,z_measured,x_reference_sensor,y_reference_sensor,z_reference_sensor\n1,2,3,4,5,6\n",
+        "x=x_measured|x_true=");
+    row("set and actual in German",
+        "Soll X [mm],Soll Y [mm],Soll Z [mm],Ist X [mm],Ist Y [mm],Ist Z [mm]\n1,2,3,4,5,6\n",
+        "x=Ist X [mm]|x_true=Soll X [mm]");
+    row("two of which neither says", "X wahrscheinlich,Y wahrscheinlich,Z wahrscheinlich,X,Y,Z\n1,2,3,4,5,6\n",
+        "x=|x_true=");
+    row("axes in different units", "x_em_mm,y_em_mm,z_em_cm\n1,2,3\n", "x=|y=|z=");
+    row("nanoseconds are no seconds", "t_ns,x_m,y_m,z_m\n1600000000000000000,1,2,3\n", "time=|x=x_m");
+    row("a date is no time of a session", "time,x_m,y_m,z_m\n1600000000,1,2,3\n", "time=|x=x_m");
+    row("yaw, pitch, roll", "px\tpy\tpz\tyaw\tpitch\troll\n0\t0\t0\t0\t0\t0\n1\t1\t1\t90\t0\t0\n",
         "x=px|azimuth=yaw|elevation=pitch|roll=roll|unit=m|separator=tab");
     row("q0 to q3", "x,y,z,q0,q1,q2,q3\n100,0,0,1,0,0,0\n900,0,0,1,0,0,0\n", "qw=q0|qx=q1|qz=q3|unit=mm");
     row("spread is no position", "x_mm,y_mm,z_mm,sd_x_mm,sd_y_mm,sd_z_mm\n1,2,3,4,5,6\n", "x=x_mm|x_true=|unit=mm");
@@ -40,7 +56,8 @@ class ColumnGuessTest : public QObject {
         "x=tip_x|qw=");
     row("status in every row is none", "x,y,z,status\n1,2,3,0\n1,2,3,0\n", "status=");
     row("status where it is set", "x,y,z,status\n1,2,3,\n1,2,3,low\n", "status=status");
-    row("no names", "0.1 0.2 0.3 9\n1.1 0.2 0.3 9\n", "header=false|x=column1|z=column3|unit=m|separator=space");
+    row("no names", "0.1 0.2 0.3\n1.1 0.2 0.3\n", "header=false|x=column1|z=column3|unit=m|separator=space");
+    row("no names, a number of the station first", "1 0.1 0.2 0.3\n1 1.1 0.2 0.3\n", "header=false|x=|separator=space");
     row("decimal commas", "x;y;z\n0,5;1,5;2,5\n1,5;1,5;2,5\n", "decimal=comma|x=x|unit=m");
   }
   void namesOfColumns() {
@@ -52,7 +69,8 @@ class ColumnGuessTest : public QObject {
       const qsizetype equals = pair.indexOf('=');
       const std::string key = pair.left(equals).toStdString();
       const std::string told = textOf(guess->settings.at(key));
-      QVERIFY2(told == pair.mid(equals + 1).toStdString(), told.c_str());
+      QVERIFY2(told == pair.mid(equals + 1).toStdString(),
+               qPrintable(QStringLiteral("%1 is %2").arg(QString::fromStdString(key), QString::fromStdString(told))));
     }
   }
 
@@ -65,6 +83,67 @@ class ColumnGuessTest : public QObject {
     QVERIFY(guessColumns(write("x,y,z\n0,0,0\n600,0,0\n"))->has_unit);
     // A bench in millimetres or a room in inches.
     QVERIFY(!guessColumns(write("x,y,z\n0,0,0\n150,0,0\n"))->has_unit);
+  }
+
+  void namesInACommentAreShown() {
+    const auto guess = guessColumns(write("# true_x true_y true_z x y z\n1 2 3 4 5 6\n"));
+    FT_VERIFY_OK(guess);
+    QVERIFY(choiceSetting(guess->settings, "x").empty());
+    QVERIFY(std::any_of(guess->reasons.begin(), guess->reasons.end(),
+                        [](const std::string& reason) { return reason.find("true_x true_y") != std::string::npos; }));
+  }
+
+  void columnsWithoutANameAreNumbered() {
+    const auto guess = guessColumns(write(",x_m,y_m,z_m,\n0,1,2,3,\n1,4,5,6,\n"));
+    FT_VERIFY_OK(guess);
+    QCOMPARE(choiceSetting(guess->settings, "x"), std::string("x_m"));
+    QCOMPARE(guess->reasons.back(), std::string("not used: column1, column5"));
+  }
+
+  void whatIsNotUsedIsSaid() {
+    const auto guess = guessColumns(write("x_m,y_m,z_m,quality,gain\n1,2,3,4,5\n"));
+    FT_VERIFY_OK(guess);
+    QCOMPARE(guess->reasons.back(), std::string("not used: quality, gain"));
+  }
+
+  void rowsThatAreLeftOutAreCounted() {
+    const Importer& columns = *findImporter("columns").value();
+    const auto settings =
+        resolveSettings("columns", columns.settings,
+                        {{"node", "n"}, {"status", "s"}, {"x_true", "a"}, {"y_true", "b"}, {"z_true", "c"}});
+    FT_VERIFY_OK(settings);
+    const auto import = columns.read(
+        write("n,s,x,y,z,a,b,c\n0,,1,2,3,1,2,3\n1,bad,1,2,3,1,2,3\n-1,,1,2,3,1,2,3\n2,,-3.7e28,2,3,1,2,3\n"), {},
+        *settings);
+    FT_VERIFY_OK(import);
+    QCOMPARE(import->table->nodes.size(), std::size_t{1});
+    FT_VERIFY_MATCH(holdsAll(import->notes.at(0), {"3 of 4 rows are left out"}));
+  }
+
+  void anOrientationThatIsMissingIsNotMadeUp() {
+    const Importer& columns = *findImporter("columns").value();
+    const auto settings = resolveSettings(
+        "columns", columns.settings,
+        {{"qw", "qw"}, {"qx", "qx"}, {"qy", "qy"}, {"qz", "qz"}, {"x_true", "a"}, {"y_true", "b"}, {"z_true", "c"}});
+    FT_VERIFY_OK(settings);
+    const auto import =
+        columns.read(write("x,y,z,qw,qx,qy,qz,a,b,c\n1,2,3,0,1,0,0,1,2,3\n1,2,3,,,,,1,2,3\n"), {}, *settings);
+    FT_VERIFY_OK(import);
+    QVERIFY(import->table->nodes.at(0).has_orientation && !import->table->nodes.at(1).has_orientation);
+    FT_VERIFY_MATCH(holdsAll(import->notes.at(0), {"1 rows have no orientation"}));
+  }
+
+  void aTruthFileIsMatchedByItsNumbers() {
+    const Importer& columns = *findImporter("columns").value();
+    const std::filesystem::path truth = folder_.filePath("truth.csv").toStdString();
+    for (const char* name : {"label", "node", "id", "name", "point", "place"}) {
+      std::ofstream(truth) << name << ",x_true_m,y_true_m,z_true_m\n7,4,5,6.5\n5,1,2,3.5\n";
+      const auto settings = resolveSettings("columns", columns.settings, {{"node", "node"}, {"unit", "m"}});
+      const auto import = columns.read(write("node,x,y,z\n5,1,2,3\n7,4,5,6\n"), truth, *settings);
+      FT_VERIFY_OK(import);
+      QCOMPARE(import->table->nodes.at(0).node, 5);
+      QCOMPARE(import->table->nodes.at(0).reference_from_sensor.position_m.z(), 3.5);
+    }
   }
 
   void twoPositionsWithoutAWordForTheTruth() {

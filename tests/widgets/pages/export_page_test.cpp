@@ -35,6 +35,7 @@ class ExportPageTest : public WindowDriver {
     QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
     window_->workbench().openSession(makeFittedSession());
     QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().corrector().has_value(), kWaitMs);
+    QTRY_COMPARE_WITH_TIMEOUT(window_->workbench().recordedTable().nodes.size(), table().nodes.size(), kWaitMs);
     click("step_export");
   }
 

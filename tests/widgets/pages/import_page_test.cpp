@@ -79,6 +79,10 @@ class ImportPageTest : public WindowDriver {
     QTRY_VERIFY_WITH_TIMEOUT(told("importSummary").find("Choose the unit") != std::string::npos, kWaitMs);
     QVERIFY(!find<QPushButton>("importMake")->isEnabled());
     find<QComboBox>("setting_unit")->setCurrentText(QStringLiteral("in"));
+    QTRY_VERIFY_WITH_TIMEOUT(told("importSummary").find("must name columns") != std::string::npos, kWaitMs);
+    choose("column_column1", "x");
+    choose("column_column2", "y");
+    choose("column_column3", "z");
     QTRY_VERIFY_WITH_TIMEOUT(told("importSummary").find("no true positions") != std::string::npos, kWaitMs);
     QVERIFY(!find<QPushButton>("importMake")->isEnabled());
     choose("column_column4", "x_true");
