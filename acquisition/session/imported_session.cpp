@@ -3,6 +3,7 @@
 #include <QFile>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -29,15 +30,14 @@ PlannedPlace placeOf(const Node& row, int visit) {
 Plan planOf(const CalibrationTable& table) {
   std::map<int, int> last_visit;
   for (const Node& row : table.nodes) {
-    const auto [known, is_new] = last_visit.try_emplace(row.node, row.visit);
-    known->second = std::max(known->second, row.visit);
+    int& last = last_visit.try_emplace(row.node, row.visit).first->second;
+    last = std::max(last, row.visit);
   }
-  std::map<std::pair<int, int>, bool> taken;
+  std::set<std::pair<int, int>> taken;
   Plan plan;
   for (const Node& row : table.nodes) {
-    bool& is_taken = taken[{row.node, row.visit}];
-    plan.explicit_places.push_back(placeOf(row, is_taken ? ++last_visit[row.node] : row.visit));
-    is_taken = true;
+    const bool is_free = taken.emplace(row.node, row.visit).second;
+    plan.explicit_places.push_back(placeOf(row, is_free ? row.visit : ++last_visit[row.node]));
   }
   return plan;
 }

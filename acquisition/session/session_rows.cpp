@@ -17,6 +17,22 @@ void append(QVariantList& values, const Pose& pose) {
   }
 }
 
+QVariantList takeValues(const Node& mean, double autocorrelation, double quantum_m) {
+  QVariantList values{mean.sensor};
+  Pose pose = mean.tracker_from_sensor;
+  if (!mean.has_orientation) pose.orientation.coeffs().setZero();
+  append(values, pose);
+  const Eigen::Matrix3d c = mean.covariance_m2.value_or(Eigen::Matrix3d::Zero());
+  for (const double part : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2), mean.sd_rot_rad.value_or(0.0),
+                            autocorrelation, mean.n_effective, quantum_m}) {
+    values << part;
+  }
+  const bool has_times = mean.t_start_s && mean.t_end_s;
+  values << mean.n_used << mean.n_rejected << (has_times ? *mean.t_start_s : 0.0)
+         << (has_times ? *mean.t_end_s : kNoTimes_s);
+  return values;
+}
+
 /// SQLite keeps a NaN as NULL.
 double number(const QSqlQuery& row, int column) {
   return row.isNull(column) ? std::numeric_limits<double>::quiet_NaN() : row.value(column).toDouble();
@@ -51,26 +67,6 @@ PlannedPlace readPlace(const QSqlQuery& row, int first) {
   place.role = row.value(first + 12).toString() == QLatin1String("validation") ? NodeRole::kValidation : NodeRole::kFit;
   return place;
 }
-
-namespace {
-
-QVariantList takeValues(const Node& mean, double autocorrelation, double quantum_m) {
-  QVariantList values{mean.sensor};
-  Pose pose = mean.tracker_from_sensor;
-  if (!mean.has_orientation) pose.orientation.coeffs().setZero();
-  append(values, pose);
-  const Eigen::Matrix3d c = mean.covariance_m2.value_or(Eigen::Matrix3d::Zero());
-  for (const double part : {c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2), mean.sd_rot_rad.value_or(0.0),
-                            autocorrelation, mean.n_effective, quantum_m}) {
-    values << part;
-  }
-  const bool has_times = mean.t_start_s && mean.t_end_s;
-  values << mean.n_used << mean.n_rejected << (has_times ? *mean.t_start_s : 0.0)
-         << (has_times ? *mean.t_end_s : kNoTimes_s);
-  return values;
-}
-
-}  // namespace
 
 QVariantList takeValues(const std::vector<Sample>& samples, const NodeStatistics& statistics) {
   FT_CHECK(!samples.empty());

@@ -27,7 +27,7 @@ constexpr double kSamplesAtLeast = 5.0;
 constexpr double kWidest_m = 8.0;
 constexpr double kNarrowest_m = 0.1;
 /// Angles beyond are no radians.
-constexpr double kLargestRadians = 6.5;
+constexpr double kLargest_rad = 6.5;
 /// Numbers beyond are dates, or of another unit.
 constexpr double kLongestSession_s = 1e8;
 
@@ -147,7 +147,7 @@ struct Guess {
       for (const auto& row : table.rows)
         if (const double value = number(row[i]); std::isfinite(value)) largest = std::max(largest, std::abs(value));
     }
-    return largest > kLargestRadians;
+    return largest > kLargest_rad;
   }
 
   void takeRotations(const std::vector<std::string>& parts) {

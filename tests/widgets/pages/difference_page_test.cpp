@@ -47,21 +47,12 @@ class DifferencePageTest : public WindowDriver {
 
  private slots:
   void initTestCase() {
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
-    applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
     write("before.ftcal.json", recorded(1, 0.0), "2026-03-02");
     write("after.ftcal.json", recorded(2, 0.03), "2026-09-14");
-    window_ = std::make_unique<MainWindow>();
-    window_->resize(1280, 800);
-    window_->show();
-    QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
+    showWindow();
   }
 
-  void cleanupTestCase() {
-    QThreadPool::globalInstance()->waitForDone();
-    window_.reset();
-  }
+  void cleanupTestCase() { closeWindow(); }
 
   void connectAsksWhatNoTrackerTells() {
     click("step_connect");

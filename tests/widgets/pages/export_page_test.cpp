@@ -26,23 +26,14 @@ class ExportPageTest : public WindowDriver {
 
  private slots:
   void initTestCase() {
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
-    applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
-    window_ = std::make_unique<MainWindow>();
-    window_->resize(1280, 800);
-    window_->show();
-    QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
+    showWindow();
     window_->workbench().openSession(makeFittedSession());
     QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().corrector().has_value(), kWaitMs);
     QTRY_COMPARE_WITH_TIMEOUT(window_->workbench().recordedTable().nodes.size(), table().nodes.size(), kWaitMs);
     click("step_export");
   }
 
-  void cleanupTestCase() {
-    QThreadPool::globalInstance()->waitForDone();
-    window_.reset();
-  }
+  void cleanupTestCase() { closeWindow(); }
 
   void severalFilesAreWrittenAtOnce() {
     tick({"(.nrrd)", "(.npz)", "(.nodes.csv)"});

@@ -27,20 +27,9 @@ class ImportPageTest : public WindowDriver {
   Q_OBJECT
 
  private slots:
-  void initTestCase() {
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
-    applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
-    window_ = std::make_unique<MainWindow>();
-    window_->resize(1280, 800);
-    window_->show();
-    QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
-  }
+  void initTestCase() { showWindow(); }
 
-  void cleanupTestCase() {
-    QThreadPool::globalInstance()->waitForDone();
-    window_.reset();
-  }
+  void cleanupTestCase() { closeWindow(); }
 
   void aTableOfTextIsGuessedAndBecomesASession() {
     const CalibrationTable table = recorded();

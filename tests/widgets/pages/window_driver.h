@@ -3,10 +3,12 @@
 #include <QDir>
 #include <QTemporaryDir>
 #include <QTest>
+#include <QThreadPool>
 #include <memory>
 
 #include "tests/widgets/window_test.h"
 #include "widgets/shell/main_window.h"
+#include "widgets/style/theme.h"
 
 namespace fieldtrue::testing {
 
@@ -29,6 +31,20 @@ class WindowDriver : public QObject {
     return testing::find<T>(*window_, name);
   }
   void click(const char* name) { QTest::mouseClick(find<QWidget>(name), Qt::LeftButton); }
+  /// The window, with settings and sessions in the test's own folder.
+  void showWindow() {
+    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
+    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    widgets::applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
+    window_ = std::make_unique<widgets::MainWindow>();
+    window_->resize(1280, 800);
+    window_->show();
+    QVERIFY(QTest::qWaitForWindowExposed(window_.get()));
+  }
+  void closeWindow() {
+    QThreadPool::globalInstance()->waitForDone();
+    window_.reset();
+  }
   /// Keeps a picture of the window where pictures are asked for.
   void picture(const QString& name) {
     const QString folder = qEnvironmentVariable("FIELDTRUE_ARTEFACTS");
