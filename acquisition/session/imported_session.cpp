@@ -1,6 +1,7 @@
 #include "acquisition/session/imported_session.h"
 
 #include <QFile>
+#include <QFileInfo>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -10,6 +11,7 @@
 
 #include "acquisition/plan/plan.h"
 #include "acquisition/session/session_store.h"
+#include "calib/core/file_io.h"
 
 namespace fieldtrue::acquisition {
 namespace {
@@ -81,12 +83,14 @@ Result<void> makeSession(const QString& path, const CalibrationTable& table, con
                          const std::string& source) {
   // Read as it will be when the session is opened: what a plan cannot hold is told now.
   FT_TRY(const Plan plan, planFromJson(toJson(planOf(table)), source));
-  FT_TRY(SessionStore store, SessionStore::create(path, plan, table.metadata));
-  const Result<void> filled = fill(store, table, samples, source);
-  if (filled) return {};
-  { const SessionStore closed = std::move(store); }
-  QFile::remove(path);
-  return filled;
+  if (QFileInfo::exists(path))
+    return fail(ErrorCode::kIo, path.toStdString() + ": exists already; choose another name or open it");
+  return replaceFileAtomically(path.toStdString(), [&](const std::filesystem::path& beside) -> Result<void> {
+    // An empty file stands there, and a session is never made over one.
+    QFile::remove(QString::fromStdString(beside.string()));
+    FT_TRY(SessionStore store, SessionStore::create(QString::fromStdString(beside.string()), plan, table.metadata));
+    return fill(store, table, samples, source);
+  });
 }
 
 }  // namespace fieldtrue::acquisition

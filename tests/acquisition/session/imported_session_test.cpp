@@ -1,5 +1,6 @@
 #include "acquisition/session/imported_session.h"
 
+#include <QDir>
 #include <QFileInfo>
 #include <QTemporaryDir>
 #include <QTest>
@@ -96,6 +97,12 @@ class ImportedSessionTest : public QObject {
     QVERIFY(!refused);
     FT_VERIFY_MATCH(holdsAll(refused.error().message, {"far.csv", "x_m"}));
     QVERIFY(!QFileInfo::exists(path));
+    // Nor of one whose folder is not there.
+    QVERIFY(!makeSession(folder_.filePath("absent/a.fieldtrue"), {{}, {node(0, 0, 0)}}, {}, "a.csv"));
+    FT_VERIFY_OK(makeSession(folder_.filePath("whole.fieldtrue"), {{}, {node(0, 0, 0)}}, {}, "a.csv"));
+    // One file: nothing beside it, neither the one it was written as nor the database's own.
+    QCOMPARE(QDir(folder_.path()).entryList({"whole*", "far*", "absent*"}, QDir::AllEntries | QDir::Hidden),
+             QStringList({"whole.fieldtrue"}));
   }
 
   void anotherSessionIsNotReplaced() {
