@@ -74,6 +74,7 @@ struct SimulateOptions {
   std::string plan;
   std::uint64_t seed = 1;
   int samples_per_node = 60;
+  bool exact = false;
   TablePaths out;
 };
 
@@ -85,6 +86,12 @@ Outcome runSimulate(const SimulateOptions& options, const CommonOptions& common)
   simulation::SimulationOptions simulation_options;
   simulation_options.seed = options.seed;
   simulation_options.samples_per_node = options.samples_per_node;
+  if (options.exact) {
+    const auto table =
+        simulation::simulateExactly(*scene, places(*plan), simulation_options, runControl(common, "simulating"));
+    if (!table) return notPossible(table.error());
+    return writeTables(options.out, &*table, nullptr, {});
+  }
   const auto simulation =
       simulation::simulate(*scene, places(*plan), simulation_options, runControl(common, "simulating"));
   if (!simulation) return notPossible(simulation.error());
@@ -104,8 +111,11 @@ void addSimulate(CommandLine& line) {
   command->add_option("--samples-per-node", options->samples_per_node, "Samples at each place (default 60)")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
+  auto* exact =
+      command->add_flag("--exact", options->exact, "Noise-free poses, the jig exactly where its drawing says");
   command->add_option("--nodes", options->out.nodes, "Node table to write")->type_name("FILE")->required();
-  command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
+  auto* samples = command->add_option("--samples", options->out.samples, "Sample table to write")->type_name("FILE");
+  exact->excludes(samples);
 }
 
 struct TablesOptions {

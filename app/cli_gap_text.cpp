@@ -87,10 +87,10 @@ std::string sequenceText(const gap::GapReport& report) {
 
 std::string remainingText(const gap::GapReport& report) {
   if (report.selected.empty() && report.verdict == gap::GapVerdict::kNoGap) return "";
-  std::string text = "What remains: " + millimetres(report.remaining_position_rms_mm) + " RMS, " +
-                     percent(report.remaining_fraction) + " of the start";
-  if (!report.remaining_where.empty()) {
-    std::vector<int> named = report.remaining_where;
+  std::string text = "What remains on places not seen: " + millimetres(report.remaining.position_rms_mm) +
+                     " RMS; of the " + "square above the floor " + percent(report.remaining.fraction) + " of the start";
+  if (!report.remaining.where.empty()) {
+    std::vector<int> named = report.remaining.where;
     named.resize(std::min<std::size_t>(named.size(), 8));
     text += ", most at " + report.names.list(named, 8);
   }

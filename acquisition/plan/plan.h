@@ -49,7 +49,7 @@ Result<Plan> readPlan(const std::string& text_or_path);
 
 /// Reads the keys `schema` ("fieldtrue.plan/1"), `grid` ("NXxNYxNZ@PX[xPYxPZ]"), `origin` ([x, y, z]), `order`, `seed`,
 /// `orientations`, `reseat`, `pipe_base_m` and `nodes` (list of `node, x_m, y_m, z_m` with optional
-/// `qw, qx, qy, qz, i, j, k, role, visit`); all optional, but without `grid` there must be `nodes`.
+/// `qw, qx, qy, qz, i, j, k, role, visit, t_s`); all optional, but without `grid` there must be `nodes`.
 /// @param name stands in error messages ("lab.plan.json")
 /// @error kBadInput naming the key, what was seen and what is needed; kNewerVersion
 Result<Plan> planFromJson(const nlohmann::json& json, const std::string& name);

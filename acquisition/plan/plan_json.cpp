@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::string_view kSchema = "fieldtrue.plan/";
 constexpr int kSchemaVersion = 1;
+constexpr double kLongest_s = 1e7;
 
 double coordinate_m(const JsonReader& json) {
   if (json.isNumber() && std::abs(json.number()) <= kMaxCoordinate_m) return json.number();
@@ -36,6 +37,11 @@ Eigen::Quaterniond orientationFrom(const JsonReader& node) {
   return is_unit ? given : canonical(given);
 }
 
+double timeFrom(const JsonReader& json) {
+  if (json.isNumber() && json.number() >= 0.0 && json.number() <= kLongest_s) return json.number();
+  json.refuse("seconds since the start, from 0 to 1e7");
+}
+
 int gridStep(const JsonReader& json) { return static_cast<int>(json.integer(-kMaxPlaces, kMaxPlaces)); }
 
 PlannedPlace placeFrom(const JsonReader& node, std::map<int, int>& next_visit) {
@@ -52,6 +58,7 @@ PlannedPlace placeFrom(const JsonReader& node, std::map<int, int>& next_visit) {
     place.index = {gridStep(node["i"]), gridStep(node["j"]), gridStep(node["k"])};
   if (const auto role = node.find("role"))
     place.role = role->oneOf({"fit", "validation"}) == "validation" ? NodeRole::kValidation : NodeRole::kFit;
+  if (const auto time = node.find("t_s")) place.t_s = timeFrom(*time);
   node.refuseOtherKeys();
   return place;
 }
@@ -141,6 +148,7 @@ nlohmann::json toJson(const Plan& plan) {
       node["k"] = (*place.index)[2];
     }
     if (place.role == NodeRole::kValidation) node["role"] = "validation";
+    if (place.t_s) node["t_s"] = *place.t_s;
     object["nodes"].push_back(std::move(node));
   }
   return object;

@@ -43,6 +43,7 @@ struct PlannedPlace {
   std::optional<std::array<int, 3>> index;  ///< Grid index i j k; none when scattered.
   Pose reference_from_sensor;
   NodeRole role = NodeRole::kFit;
+  std::optional<double> t_s = std::nullopt;  ///< When the visit begins; none = when the jig gets there.
 };
 
 /// One row of a node table: a sensor at a place on one visit, its true and its mean tracked pose.

@@ -1,6 +1,7 @@
 #include "calib/gap/candidates.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -168,6 +169,14 @@ double correlation2(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return norms > 0.0 ? a.dot(b) * a.dot(b) / norms : 0.0;
 }
 
+/// Sum of the squares that a model leaves, whitened.
+double whitenedSquares(const identify::GapSearch& search, const identify::GapModel& model) {
+  double sum = 0.0;
+  for (const identify::Vector6d& r : identify::whitenedResiduals(search.physics(), model, search.whitening()))
+    sum += r.squaredNorm();
+  return sum;
+}
+
 void findEquivalents(const identify::GapSearch& search, const identify::EffectSelection& selection,
                      std::vector<GapCandidate>& candidates) {
   const std::vector<identify::TriedEffect>& tried = selection.alternatives;
@@ -192,12 +201,12 @@ void findEquivalents(const identify::GapSearch& search, const identify::EffectSe
 
 /// What does not help on places it was not fitted to counts for less; where nothing was worth selecting, nothing is
 /// likelier than none.
-double evidenceOf(const GapCandidate& c, bool is_any_selected) {
+double evidenceOf(const GapCandidate& c, bool is_any_fit) {
   constexpr double kCostOfFailing = 10.0;
   constexpr double kCostOfUnselected = 12.0;
-  if (c.effect == "none") return 0.0;
+  if (isNameless(c.effect)) return c.bic_gain;
   const double evidence = c.bic_gain - (c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
-  return is_any_selected ? evidence : std::min(evidence, 0.0) - kCostOfUnselected;
+  return is_any_fit ? evidence : std::min(evidence, 0.0) - kCostOfUnselected;
 }
 
 /// Two names of one thing, as a wrong scale of the rig and of the tracker: the first carries the probability of both.
@@ -215,12 +224,12 @@ void joinExactTwins(std::vector<GapCandidate>& candidates) {
   }
 }
 
-void setProbabilities(std::vector<GapCandidate>& candidates, bool is_any_selected) {
+void setProbabilities(std::vector<GapCandidate>& candidates, bool is_any_fit) {
   double most = 0.0;
-  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_selected));
+  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_fit));
   double sum = 0.0;
   for (GapCandidate& c : candidates) {
-    c.probability = std::exp(0.5 * (evidenceOf(c, is_any_selected) - most) / kTemperature);
+    c.probability = std::exp(0.5 * (evidenceOf(c, is_any_fit) - most) / kTemperature);
     sum += c.probability;
   }
   for (GapCandidate& c : candidates) c.probability /= sum;
@@ -229,44 +238,63 @@ void setProbabilities(std::vector<GapCandidate>& candidates, bool is_any_selecte
                    [](const GapCandidate& a, const GapCandidate& b) { return a.probability > b.probability; });
 }
 
-/// From mean squares before and after, whitened.
-Shrinkage shrinkageOf(double before, double after, double low_after, double high_after, double mm_per_unit) {
-  Shrinkage shrinkage;
-  shrinkage.before_mm = mm_per_unit * std::sqrt(std::max(0.0, before));
-  shrinkage.after_mm = mm_per_unit * std::sqrt(std::max(0.0, after));
-  const auto fraction = [&](double left) { return before > 0.0 ? 1.0 - std::sqrt(std::max(0.0, left) / before) : 0.0; };
-  shrinkage.fraction = fraction(after);
-  shrinkage.low90 = fraction(high_after);
-  shrinkage.high90 = fraction(low_after);
+Shrinkage shrinkageOf(double before_m2, double after_m2, const Bounded& left) {
+  Shrinkage shrinkage{signedRoot_mm(before_m2), signedRoot_mm(after_m2), 1.0 - left.value, {}, {}};
+  if (left.high90) shrinkage.low90 = 1.0 - *left.high90;
+  if (left.low90) shrinkage.high90 = 1.0 - *left.low90;
   return shrinkage;
 }
 
 /// What an effect that was not selected would take away: by its exact fit, less what that many parameters take from
-/// noise; nothing where the places it did not see say so.
-Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::TriedEffect& tried,
-                           const HeldOutGap& held_out, double none, double count, double mm_per_unit) {
+/// noise; what the places it did not see say, where these come off worse.
+Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::TriedEffect& tried, const HowFar& far,
+                           double none) {
   double fall = tried.held_out_gain;
   if (tried.held_out_gain > 0.0 && !tried.refined.model.terms.empty()) {
     double parameters = 0.0;
     for (const identify::GapTerm& term : tried.model.terms)
       parameters += static_cast<double>(term.linear.size() + term.searched.size());
-    const double left = whitenedSquares(search, tried.model);
-    fall = std::max(fall, none - left - parameters);
+    fall = std::max(fall, none - whitenedSquares(search, tried.model) - parameters);
   }
-  const double after = held_out.before - fall / count;
-  Shrinkage shrinkage = shrinkageOf(held_out.before, after, after, after, mm_per_unit);
-  shrinkage.low90.reset();
-  shrinkage.high90.reset();
-  return shrinkage;
+  const double left = 1.0 - fall / far.whitened_excess;
+  const double before_m2 = far.excess_m2.front().value;
+  return shrinkageOf(before_m2, left * before_m2, {left, {}, {}});
+}
+
+/// The rivals without a name, weighed so that they stand against what was selected as the judgement found.
+void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, std::vector<GapCandidate>& candidates) {
+  constexpr double kClearly = 12.0;  // BIC.
+  const double before_m2 = judgement.far.excess_m2.front().value;
+  const auto add = [&](const char* id, double evidence, double left) {
+    GapCandidate nameless;
+    nameless.effect = id;
+    nameless.equivalents = {id};
+    nameless.bic_gain = evidence;
+    nameless.shrinkage = shrinkageOf(before_m2, left * before_m2, {left, {}, {}});
+    candidates.push_back(std::move(nameless));
+  };
+  double best = 0.0;
+  for (const GapCandidate& c : candidates) best = std::max(best, c.bic_gain);
+  add("none", 0.0, 1.0);
+  double smooth = -3.0 * kClearly;
+  if (!judgement.selection.ways.empty())
+    smooth = best - 2.0 * std::max(3.0, judgement.nats_over_unnamed);
+  else if (judgement.refusal != Refusal::kNone && has_gap)
+    smooth = best + std::max(0.5 * kClearly, -2.0 * judgement.nats_over_unnamed);
+  else if (has_gap)
+    smooth = std::max(kClearly, 2.0 * judgement.unnamed_nats);
+  add(kUnnamedSmooth, smooth, judgement.smooth_left);
+  add(kUnnamedScattered,
+      floor_excess > 0.0 ? std::max(best, smooth) + kClearly * (judgement.selection.ways.empty() ? 1.0 : -1.0)
+                         : -3.0 * kClearly,
+      1.0 - floor_excess);
 }
 
 }  // namespace
 
-std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search,
-                                             const identify::EffectSelection& selection, const HeldOutGap& held_out,
-                                             double mm_per_unit) {
-  const identify::GapRows& rows = search.physics().rows();
-  const double count = static_cast<double>(rows.rows.size()) * rows.channels();
+std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, const Judgement& judgement,
+                                             bool has_gap, double scattered_share) {
+  const identify::EffectSelection& selection = judgement.selection;
   const double none = whitenedSquares(search, search.none().model);
   std::vector<GapCandidate> candidates;
   for (const identify::TriedEffect& tried : selection.alternatives) {
@@ -277,28 +305,26 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search,
     widenPlaced(fittedOf(model.model.terms.back()), candidate);
     keepWithinSearch(*model.model.terms.back().fit, candidate);
     candidate.bic_gain = tried.bic_gain;
-    candidate.shrinkage = shrinkageOfTried(search, tried, held_out, none, count, mm_per_unit);
+    candidate.shrinkage = shrinkageOfTried(search, tried, judgement.far, none);
     candidates.push_back(std::move(candidate));
   }
   findEquivalents(search, selection, candidates);
-  if (selection.ways.size() == 1 && held_out.after.size() == 1) {
+  for (std::size_t t = 0; t < selection.ways.size(); ++t) {
     for (GapCandidate& c : candidates)
-      if (c.effect == search.ways()[selection.ways.front()].effect->id)
-        c.shrinkage = shrinkageOf(held_out.before, held_out.after[0], held_out.after_low90[0], held_out.after_high90[0],
-                                  mm_per_unit);
+      if (c.effect == search.ways()[selection.ways[t]].effect->id) c.shrinkage = shrinkageOfStep(judgement.far, t);
   }
-  GapCandidate nothing;
-  nothing.effect = "none";
-  nothing.equivalents = {"none"};
-  nothing.shrinkage = shrinkageOf(held_out.before, held_out.before, held_out.before, held_out.before, mm_per_unit);
-  candidates.push_back(std::move(nothing));
-  setProbabilities(candidates, !selection.ways.empty());
+  addNameless(judgement, has_gap, scattered_share, candidates);
+  setProbabilities(candidates, !selection.ways.empty() || judgement.refusal != Refusal::kNone);
   return candidates;
 }
 
-std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search,
-                                             const identify::EffectSelection& selection, const HeldOutGap& held_out,
-                                             const std::vector<GapCandidate>& candidates, double mm_per_unit) {
+Shrinkage shrinkageOfStep(const HowFar& far, std::size_t effect) {
+  return shrinkageOf(far.excess_m2[effect].value, far.excess_m2[effect + 1].value, far.left_of_before[effect + 1]);
+}
+
+std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, const Judgement& judgement,
+                                             const std::vector<GapCandidate>& candidates) {
+  const identify::EffectSelection& selection = judgement.selection;
   const std::vector<double> credit = creditShares(search, selection);
   std::vector<SelectedEffect> selected;
   for (std::size_t t = 0; t < selection.ways.size(); ++t) {
@@ -316,12 +342,40 @@ std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search,
       effect.probability = c.probability;
       effect.bic_gain = c.bic_gain;
     }
-    const double before = t == 0 ? held_out.before : held_out.after[t - 1];
-    effect.shrinkage =
-        shrinkageOf(before, held_out.after[t], held_out.after_low90[t], held_out.after_high90[t], mm_per_unit);
+    effect.shrinkage = shrinkageOfStep(judgement.far, t);
+    effect.excess2_before_mm2 = 1e6 * judgement.far.excess_m2[t].value;
+    effect.excess2_after_mm2 = 1e6 * judgement.far.excess_m2[t + 1].value;
     selected.push_back(std::move(effect));
   }
   return selected;
+}
+
+std::vector<double> creditShares(const identify::GapSearch& search, const identify::EffectSelection& selection) {
+  const std::size_t n = selection.ways.size();
+  if (n == 0) return {};
+  if (n == 1) return {1.0};
+  const identify::GapModel& full = selection.model.model;
+  std::vector<double> value(std::size_t{1} << n, 0.0);
+  for (std::size_t subset = 0; subset < value.size(); ++subset) {
+    identify::GapModel model;
+    model.alignment = full.alignment;
+    for (std::size_t t = 0; t < n; ++t)
+      if ((subset >> t & 1U) != 0) model.terms.push_back(full.terms[t]);
+    value[subset] = -whitenedSquares(search, search.refined(model).model);
+  }
+  const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1.0); };
+  std::vector<double> credit(n, 0.0);
+  for (std::size_t t = 0; t < n; ++t) {
+    for (std::size_t subset = 0; subset < value.size(); ++subset) {
+      if ((subset >> t & 1U) != 0) continue;
+      const auto size = static_cast<std::size_t>(std::popcount(subset));
+      credit[t] += factorial(size) * factorial(n - size - 1) / factorial(n) *
+                   (value[subset | std::size_t{1} << t] - value[subset]);
+    }
+  }
+  const double total = std::max(1e-12, value.back() - value.front());
+  for (double& share : credit) share /= total;
+  return credit;
 }
 
 }  // namespace fieldtrue::gap

@@ -1,24 +1,28 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
-#include "calib/gap/held_out.h"
+#include "calib/gap/judgement.h"
 #include "calib/gap/report.h"
-#include "calib/identify/search.h"
 
 namespace fieldtrue::gap {
 
-/// The candidates of a report: every effect tried in place of the leading one, and none, with probabilities, intervals
-/// and what cannot be told apart on this grid. Best first.
-/// @param mm_per_unit turns whitened amplitudes into position [mm]
-std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search,
-                                             const identify::EffectSelection& selection, const HeldOutGap& held_out,
-                                             double mm_per_unit);
+/// What each effect of the catalogue says when it is the only one, or the leading one beside the others selected, and
+/// the rivals without a name; probabilities from evidence by a common temper. Best first.
+/// @param has_gap whether anything stands out of the floor
+/// @param scattered_share how much of the gap scatters from place to place beyond the floor
+std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, const Judgement& judgement,
+                                             bool has_gap, double scattered_share);
 
-/// The selected effects in the order they were added.
-/// @param candidates of the same selection
-std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search,
-                                             const identify::EffectSelection& selection, const HeldOutGap& held_out,
-                                             const std::vector<GapCandidate>& candidates, double mm_per_unit);
+std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, const Judgement& judgement,
+                                             const std::vector<GapCandidate>& candidates);
+
+/// What a selected effect takes away where no fit saw it, the effects before it being there.
+Shrinkage shrinkageOfStep(const HowFar& far, std::size_t effect);
+
+/// Share of the explained sum of squares of each selected effect, averaged over the orders of adding.
+/// @source Shapley 1953, Contributions to the Theory of Games II 307
+std::vector<double> creditShares(const identify::GapSearch& search, const identify::EffectSelection& selection);
 
 }  // namespace fieldtrue::gap

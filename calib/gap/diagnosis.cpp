@@ -4,12 +4,13 @@
 #include <cmath>
 
 #include "calib/core/file_io.h"
+#include "calib/core/statistics.h"
 #include "calib/core/units.h"
 #include "calib/effects/registry.h"
 #include "calib/field/tracker_model.h"
 #include "calib/gap/candidates.h"
-#include "calib/gap/held_out.h"
 #include "calib/gap/isolability.h"
+#include "calib/gap/judgement.h"
 #include "calib/gap/next_measurement.h"
 #include "calib/gap/verdict.h"
 #include "calib/gap/where.h"
@@ -48,37 +49,82 @@ void takeFromScene(const simulation::Scene* scene, const TableMetadata& metadata
     rows.stated_tracker_from_reference = inverse(scene->reference_from_tracker);
 }
 
-void addSequence(const HeldOutGap& held_out, double mm_per_unit, GapReport& report) {
-  const auto mm = [&](double mean_square) { return mm_per_unit * std::sqrt(std::max(0.0, mean_square)); };
-  report.sequence.push_back({"", mm(held_out.before), mm(held_out.before_low90), mm(held_out.before_high90)});
-  for (std::size_t s = 0; s < report.selected.size(); ++s) {
-    report.sequence.push_back(
-        {report.selected[s].effect, mm(held_out.after[s]), mm(held_out.after_low90[s]), mm(held_out.after_high90[s])});
-  }
+void addSequence(const HowFar& far, GapReport& report) {
+  const auto step = [&](std::size_t s) {
+    const Bounded& excess = far.excess_m2[s];
+    GapStep added{s == 0 ? "" : report.selected[s - 1].effect, signedRoot_mm(excess.value), {}, {}};
+    if (excess.low90) added.low90_mm = signedRoot_mm(*excess.low90);
+    if (excess.high90) added.high90_mm = signedRoot_mm(*excess.high90);
+    return added;
+  };
+  for (std::size_t s = 0; s < far.excess_m2.size(); ++s) report.sequence.push_back(step(s));
 }
 
-void addRemaining(const HeldOutGap& held_out, const Evidence& evidence, GapReport& report) {
-  double sum = 0.0;
+Remaining remainingOf(const HowFar& far, const identify::GapRows& rows) {
+  Remaining remaining;
+  remaining.fraction = far.remaining().value;
+  remaining.low90 = far.remaining().low90;
+  remaining.high90 = far.remaining().high90;
+  remaining.is_of_rotation = far.by_rotation;
+  remaining.excess2_before_mm2 = 1e6 * far.excess_m2.front().value;
+  remaining.excess2_after_mm2 = 1e6 * far.excess_m2.back().value;
+  remaining.position_rms_mm = 1e3 * std::sqrt(far.excess_m2.back().value + far.floor_m2);
   std::vector<std::pair<double, int>> worst;
-  for (const GapNode& node : report.nodes) {
-    sum += node.after_m.squaredNorm();
-    worst.emplace_back(node.after_m.norm(), node.node);
-  }
-  report.remaining_position_rms_mm = 1e3 * std::sqrt(sum / static_cast<double>(report.nodes.size()));
-  report.remaining_fraction = held_out.fractionAfter(report.selected.size());
-  if (evidence.has_effect) report.remaining_fraction = std::max(report.remaining_fraction, evidence.fraction);
+  for (std::size_t i = 0; i < rows.rows.size(); ++i) worst.emplace_back(far.size_m[i], rows.rows[i].node);
+  remaining.p50_mm = 1e3 * quantile(far.size_m, 0.5);
+  remaining.p90_mm = 1e3 * quantile(far.size_m, 0.9);
+  remaining.p95_mm = 1e3 * quantile(far.size_m, 0.95);
   std::sort(worst.rbegin(), worst.rend());
+  remaining.worst_mm = 1e3 * worst.front().first;
+  remaining.worst_node = worst.front().second;
   for (const auto& [size_m, node] : worst) {
-    if (1e3 * size_m < 2.5 * report.floor_position_mm || report.remaining_where.size() >= 10) break;
-    if (std::find(report.remaining_where.begin(), report.remaining_where.end(), node) == report.remaining_where.end())
-      report.remaining_where.push_back(node);
+    if (size_m < 2.5 * std::sqrt(far.floor_m2) || remaining.where.size() >= 10) break;
+    if (std::find(remaining.where.begin(), remaining.where.end(), node) == remaining.where.end())
+      remaining.where.push_back(node);
   }
+  return remaining;
+}
+
+RivalReport rivalOf(const Judgement& judgement) {
+  RivalReport rival;
+  rival.nats_over_unnamed = judgement.nats_over_unnamed;
+  rival.unnamed_nats = judgement.unnamed_nats;
+  rival.unseen_gain = judgement.unseen_gain.value;
+  rival.unseen_gain_low90 = judgement.unseen_gain.low90;
+  rival.named_share = judgement.named_share;
+  rival.refused = judgement.refused;
+  rival.why = whyRefused(judgement);
+  return rival;
+}
+
+/// What is left beside the named effects and varies smoothly, where it is worth telling.
+void addRest(const Judgement& judgement, GapReport& report) {
+  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > 0.1 * judgement.far.excess_m2.front().value)) return;
+  report.findings.push_back({"",
+                             "Beside what is named, " + shown(signedRoot_mm(judgement.rest_m2)) +
+                                 " mm vary smoothly from place to place and have no name.",
+                             {}});
 }
 
 void addTraces(const std::vector<identify::Trace>& traces, GapReport& report) {
   for (const identify::Trace& trace : traces)
     if (trace.p_value < kSureTrace)
       report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
+}
+
+/// A tolerance that is stated too small is a finding: what scatters so is no gap.
+void addStatedTooSmall(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
+  constexpr double kTold = 1.3;
+  const auto tell = [&](double seen, double said, const std::string& unit) {
+    if (!(said > 0.0) || seen < kTold * said) return;
+    report.findings.push_back({"",
+                               "The places are less exact than stated: " + shown(seen) + " " + unit + " instead of " +
+                                   shown(said) + " " + unit + " (SD per axis). That is no gap.",
+                               {}});
+  };
+  tell(1e3 * search.placingSd_m(), 1e3 * stated.placing_sd_m.value_or(0.0), "mm");
+  if (stated.has_orientation)
+    tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * stated.placing_sd_rad.value_or(0.0), "degrees");
 }
 
 /// What scatters from place to place beyond what a person with a jig does is told, for no tolerance says so.
@@ -161,29 +207,36 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   const identify::EffectSelection selection = identify::selectEffects(search, selecting, partOf(control, 0.1, 0.7));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.7);
-  const LeftOver left = leftBy(search, selection.model.model, rows);
-  const HeldOutGap held_out = holdOut(search, selection, left.structure, partOf(control, 0.7, 0.9));
+  const Judgement judgement = judge(search, selection, partOf(control, 0.7, 0.9));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
   control.progress(0.9);
 
-  describeWhere(search, selection.model.model, report);
-  report.tracker_from_reference = selection.model.model.alignment.tracker_from_reference;
-  report.sensor_from_mount = inverse(selection.model.model.alignment.mount_from_sensor);
+  describeWhere(search, judgement.selection.model.model, report);
+  report.floor_position_mm = 1e3 * std::sqrt(judgement.far.floor_m2);
+  if (rows.has_orientation) report.floor_orientation_deg = kDegPerRad * std::sqrt(judgement.far.floor_rad2);
+  const identify::GapAlignment& alignment = judgement.selection.model.model.alignment;
+  report.tracker_from_reference = alignment.tracker_from_reference;
+  report.sensor_from_mount = inverse(alignment.mount_from_sensor);
   report.p_value = search.structureOfNone().p_value;
   report.origin = search.structureOfNone().origin;
-  const double unit_mm = search.whitenedUnit_mm();
-  report.candidates = describeCandidates(search, selection, held_out, unit_mm);
-  report.selected = describeSelected(search, selection, held_out, report.candidates, unit_mm);
-  const Evidence evidence = weigh(search, selection, held_out, left, rows, report);
-  report.verdict = verdictOf(evidence);
-  addTraces(left.traces, report);
+  const double scattered = scatteredShare(search, rows, report);
+  const bool has_gap = hasGap(search, judgement, scattered);
+  report.candidates = describeCandidates(search, judgement, has_gap, scattered);
+  report.selected = describeSelected(search, judgement, report.candidates);
+  report.verdict = verdictOf(judgement.far, !report.selected.empty(), has_gap);
+  report.rival = rivalOf(judgement);
+  if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
+    report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
+  addTraces(judgement.left.traces, report);
+  addRest(judgement, report);
+  addStatedTooSmall(search, rows, report);
   addBoundOfFloor(search, report);
-  addSequence(held_out, unit_mm, report);
-  addRemaining(held_out, evidence, report);
+  addSequence(judgement.far, report);
+  report.remaining = remainingOf(judgement.far, rows);
   report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);
   report.isolability = isolabilityOf(search, kStartsForIsolability, control);
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
-  suggestNext(search, selection, report);
+  suggestNext(search, judgement.selection, report);
   report.text = verdictText(report);
   if (!has_enough) {
     report.text += " Causes are not looked for: " + std::to_string(report.input.places) + " places are too few, " +
@@ -197,6 +250,7 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
 simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report) {
   simulation::Scene updated = scene;
   updated.reference_from_tracker = inverse(report.tracker_from_reference);
+  updated.mount_from_sensor = inverse(report.sensor_from_mount);
   for (const SelectedEffect& effect : report.selected)
     if (effect.scene_parameters.is_object()) updated.effects.push_back({effect.effect, effect.scene_parameters});
   return updated;

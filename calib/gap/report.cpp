@@ -16,4 +16,8 @@ std::string_view idOf(GapVerdict verdict) {
   return {};
 }
 
+bool isNameless(const std::string& effect) {
+  return effect == "none" || effect == kUnnamedSmooth || effect == kUnnamedScattered;
+}
+
 }  // namespace fieldtrue::gap

@@ -28,11 +28,17 @@ struct Estimate {
   std::optional<double> high90;
 };
 
-/// How far the gap shrinks, as excess over the noise floor on places the fit did not see.
+/// Rivals that stand in the ranking beside the effects and `none`.
+inline constexpr const char* kUnnamedSmooth = "unnamed_smooth";
+inline constexpr const char* kUnnamedScattered = "unnamed_scattered";
+bool isNameless(const std::string& effect);
+
+/// How far the gap shrinks on places the fit did not see. An excess is a mean square less the floor's, signed; in mm it
+/// is sign(x) sqrt|x|.
 struct Shrinkage {
   double before_mm = 0.0;
   double after_mm = 0.0;
-  double fraction = 0.0;  ///< 1 - after/before.
+  double fraction = 0.0;  ///< 1 - excess after / excess before; not a number where there is none before.
   std::optional<double> low90;
   std::optional<double> high90;
 };
@@ -55,6 +61,8 @@ struct GapCandidate {
 
 struct SelectedEffect : GapCandidate {
   double credit_fraction = 0.0;  ///< Share of the shrinkage, averaged over the orders of adding (Shapley 1953).
+  double excess2_before_mm2 = 0.0;
+  double excess2_after_mm2 = 0.0;
 };
 
 /// The gap at one row of the table, after the alignment.
@@ -125,6 +133,34 @@ struct Prediction {
   double then_sd_mm = 0.0;
 };
 
+/// What is left with all selected effects, on places the fit did not see.
+struct Remaining {
+  double position_rms_mm = 0.0;
+  double fraction = 1.0;  ///< Excess left over the excess at the start; signed, never clamped.
+  std::optional<double> low90;
+  std::optional<double> high90;
+  bool is_of_rotation = false;  ///< The fraction is of rotations: positions do not stand out of the floor.
+  double excess2_before_mm2 = 0.0;
+  double excess2_after_mm2 = 0.0;
+  double p50_mm = 0.0;
+  double p90_mm = 0.0;
+  double p95_mm = 0.0;
+  double worst_mm = 0.0;
+  int worst_node = 0;
+  std::vector<int> where;
+};
+
+/// The selected effects, or those that were refused, against a smooth field without a name.
+struct RivalReport {
+  double nats_over_unnamed = 0.0;  ///< Log evidence over a smooth field alone, every parameter counted.
+  double unnamed_nats = 0.0;       ///< Of the smooth field alone over noise alone.
+  double unseen_gain = 0.0;        ///< Better foretold in blocks not seen, in noise variances a place.
+  std::optional<double> unseen_gain_low90;
+  double named_share = 1.0;          ///< Of what effects and a smooth rest take, what the effects take.
+  std::vector<std::string> refused;  ///< Effects that fit together and are not named.
+  std::string why;                   ///< A sentence; empty where nothing was refused.
+};
+
 /// All that a diagnosis found; `*.gap.json` is this struct (design contract `fieldtrue.gap/1`).
 struct GapReport {
   struct Input {
@@ -157,9 +193,9 @@ struct GapReport {
   std::vector<GapCandidate> candidates;  ///< Best first.
   std::vector<SelectedEffect> selected;  ///< In the order they were added.
   std::vector<GapStep> sequence;         ///< Start, then after each selected effect.
-  double remaining_position_rms_mm = 0.0;
-  double remaining_fraction = 0.0;
-  std::vector<int> remaining_where;
+  Remaining remaining;
+  RivalReport rival;
+  std::optional<double> odds_over_next;  ///< Of the first candidate over the second.
   Isolability isolability;
   std::string next_measurement;
   std::vector<std::string> next_separates;

@@ -156,6 +156,8 @@ json candidateToJson(const GapCandidate& candidate) {
 json selectedToJson(const SelectedEffect& selected) {
   json to = candidateToJson(selected);
   to["credit_fraction"] = numberToJson(selected.credit_fraction);
+  to["excess2_before_mm2"] = numberToJson(selected.excess2_before_mm2);
+  to["excess2_after_mm2"] = numberToJson(selected.excess2_after_mm2);
   return to;
 }
 
@@ -164,6 +166,32 @@ json stepToJson(const GapStep& step) {
           {"excess_mm", numberToJson(step.excess_mm)},
           {"low90_mm", numberToJson(step.low90_mm)},
           {"high90_mm", numberToJson(step.high90_mm)}};
+}
+
+json remainingToJson(const Remaining& remaining) {
+  return {{"position_rms_mm", numberToJson(remaining.position_rms_mm)},
+          {"fraction_of_start", numberToJson(remaining.fraction)},
+          {"fraction_low90", numberToJson(remaining.low90)},
+          {"fraction_high90", numberToJson(remaining.high90)},
+          {"of", remaining.is_of_rotation ? "rotation" : "position"},
+          {"excess2_before_mm2", numberToJson(remaining.excess2_before_mm2)},
+          {"excess2_after_mm2", numberToJson(remaining.excess2_after_mm2)},
+          {"p50_mm", numberToJson(remaining.p50_mm)},
+          {"p90_mm", numberToJson(remaining.p90_mm)},
+          {"p95_mm", numberToJson(remaining.p95_mm)},
+          {"worst_mm", numberToJson(remaining.worst_mm)},
+          {"worst_node", remaining.worst_node},
+          {"where", remaining.where}};
+}
+
+json rivalToJson(const RivalReport& rival) {
+  return {{"nats_over_unnamed", numberToJson(rival.nats_over_unnamed)},
+          {"unnamed_nats", numberToJson(rival.unnamed_nats)},
+          {"unseen_gain", numberToJson(rival.unseen_gain)},
+          {"unseen_gain_low90", numberToJson(rival.unseen_gain_low90)},
+          {"named_share", numberToJson(rival.named_share)},
+          {"refused", rival.refused},
+          {"why", rival.why}};
 }
 
 json predictionToJson(const Prediction& prediction) {
@@ -211,10 +239,11 @@ json toJson(const GapReport& report) {
           {"candidates", listToJson(report.candidates, candidateToJson)},
           {"selected", listToJson(report.selected, selectedToJson)},
           {"sequence", listToJson(report.sequence, stepToJson)},
-          {"remaining",
-           {{"position_rms_mm", numberToJson(report.remaining_position_rms_mm)},
-            {"fraction_of_start", numberToJson(report.remaining_fraction)},
-            {"where", report.remaining_where}}},
+          {"remaining", remainingToJson(report.remaining)},
+          {"rival", rivalToJson(report.rival)},
+          {"odds_over_next", numberToJson(report.odds_over_next)},
+          {"replicates", nullptr},
+          {"against", nullptr},
           {"isolability", toJson(report.isolability)},
           {"next_measurement", {{"text", report.next_measurement}, {"separates", report.next_separates}}},
           {"predictions", listToJson(report.predictions, predictionToJson)}};

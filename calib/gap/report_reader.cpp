@@ -134,6 +134,9 @@ SelectedEffect selectedFrom(const JsonReader& reader) {
   SelectedEffect selected;
   readCandidate(reader, selected);
   selected.credit_fraction = reader["credit_fraction"].numberOrNan();
+  if (!reader.has("excess2_before_mm2")) return selected;  // Written before these were there.
+  selected.excess2_before_mm2 = reader["excess2_before_mm2"].numberOrNan();
+  selected.excess2_after_mm2 = reader["excess2_after_mm2"].numberOrNan();
   return selected;
 }
 
@@ -158,9 +161,31 @@ void readLists(const JsonReader& reader, GapReport& report) {
 }
 
 void readRemaining(const JsonReader& reader, GapReport& report) {
-  report.remaining_position_rms_mm = reader["position_rms_mm"].numberOrNan();
-  report.remaining_fraction = reader["fraction_of_start"].numberOrNan();
-  report.remaining_where = reader["where"].integers();
+  Remaining& remaining = report.remaining;
+  remaining.position_rms_mm = reader["position_rms_mm"].numberOrNan();
+  remaining.fraction = reader["fraction_of_start"].numberOrNan();
+  remaining.where = reader["where"].integers();
+  if (!reader.has("fraction_low90")) return;  // Written before these were there.
+  remaining.low90 = reader["fraction_low90"].optionalNumber();
+  remaining.high90 = reader["fraction_high90"].optionalNumber();
+  remaining.is_of_rotation = reader["of"].oneOf({"position", "rotation"}) == "rotation";
+  remaining.excess2_before_mm2 = reader["excess2_before_mm2"].numberOrNan();
+  remaining.excess2_after_mm2 = reader["excess2_after_mm2"].numberOrNan();
+  remaining.p50_mm = reader["p50_mm"].numberOrNan();
+  remaining.p90_mm = reader["p90_mm"].numberOrNan();
+  remaining.p95_mm = reader["p95_mm"].numberOrNan();
+  remaining.worst_mm = reader["worst_mm"].numberOrNan();
+  remaining.worst_node = reader["worst_node"].integer();
+}
+
+void readRival(const JsonReader& reader, RivalReport& rival) {
+  rival.nats_over_unnamed = reader["nats_over_unnamed"].numberOrNan();
+  rival.unnamed_nats = reader["unnamed_nats"].numberOrNan();
+  rival.unseen_gain = reader["unseen_gain"].numberOrNan();
+  rival.unseen_gain_low90 = reader["unseen_gain_low90"].optionalNumber();
+  rival.named_share = reader["named_share"].numberOrNan();
+  rival.refused = reader["refused"].texts();
+  rival.why = reader["why"].text();
 }
 
 Isolability isolabilityFrom(const JsonReader& reader) {
@@ -185,6 +210,8 @@ GapReport reportFrom(const JsonReader& root) {
   readWhere(root["where"], report);
   readLists(root, report);
   readRemaining(root["remaining"], report);
+  if (root.has("rival")) readRival(root["rival"], report.rival);
+  if (root.has("odds_over_next")) report.odds_over_next = root["odds_over_next"].optionalNumber();
   report.isolability = isolabilityFrom(root["isolability"]);
   report.next_measurement = root["next_measurement"]["text"].text();
   report.next_separates = root["next_measurement"]["separates"].texts();

@@ -10,24 +10,13 @@
 namespace fieldtrue::gap {
 namespace {
 
-/// How much of the gap's amplitude scatters from place to place beyond what a person with a jig does, where no
-/// tolerance is stated; 0 where it is not clearly beyond that. No effect of the catalogue explains it.
-double scatterAboveBound(const identify::GapSearch& search, const identify::GapRows& stated, const GapReport& report,
-                         double clearly) {
-  const auto share = [&](double scatter, double bound, double gap_rms) {
-    if (scatter <= clearly * bound) return 0.0;
-    const double gap_excess = gap_rms * gap_rms / 3.0 - bound * bound;  // Per axis.
-    const double left_excess = scatter * scatter - bound * bound;
-    return gap_excess > left_excess ? std::sqrt(left_excess / gap_excess) : 1.0;
-  };
-  double most = 0.0;
-  if (!stated.placing_sd_m)
-    most = share(search.placingSd_m(), identify::kWorstPlacing_m, 1e-3 * report.position_rms_mm);
-  if (!stated.placing_sd_rad && report.orientation_rms_deg) {
-    const double gap_rad = *report.orientation_rms_deg / kDegPerRad;
-    most = std::max(most, share(search.placingSd_rad(), identify::kWorstPlacing_rad, gap_rad));
-  }
-  return most;
+/// What of a scatter stands above what may be noise, over what of the gap does; squares per axis.
+double shareAbove(double scatter, double bound, double gap_rms) {
+  constexpr double kClearly = 1.2;
+  if (scatter <= kClearly * bound) return 0.0;
+  const double gap_excess = gap_rms * gap_rms / 3.0 - bound * bound;
+  const double left_excess = scatter * scatter - bound * bound;
+  return gap_excess > left_excess ? left_excess / gap_excess : 1.0;
 }
 
 std::string causesText(const GapReport& report) {
@@ -41,8 +30,6 @@ std::string causesText(const GapReport& report) {
   return text;
 }
 
-constexpr double kPoorlyPredicted = 0.5;
-
 /// The gap beside its floor: positions, and rotations too where these stand out more.
 std::string gapText(const GapReport& report) {
   std::string text =
@@ -55,69 +42,95 @@ std::string gapText(const GapReport& report) {
   return text;
 }
 
+std::string namesText(const std::vector<std::string>& effects) {
+  std::string text;
+  for (const std::string& effect : effects) text += (text.empty() ? "" : " and ") + effects::labelOf(effect);
+  return text;
+}
+
+/// "on places the fit did not see what stands above the floor falls from 12 to 1.1 mm (0.8 % of its square is left, 90
+/// % interval -1 to 4 %)".
+std::string fallText(const GapReport& report) {
+  const Remaining& remaining = report.remaining;
+  std::string text = "on places the fit did not see, ";
+  if (remaining.is_of_rotation) {
+    text +=
+        "of the square of what stands above the floor in rotation " + shown(100.0 * remaining.fraction) + " % is left";
+  } else {
+    text += "what stands above the floor goes from " + shown(signedRoot_mm(1e-6 * remaining.excess2_before_mm2)) +
+            " to " + shown(signedRoot_mm(1e-6 * remaining.excess2_after_mm2)) + " mm (of its square " +
+            shown(100.0 * remaining.fraction) + " % is left";
+  }
+  if (remaining.low90 && remaining.high90)
+    text += ", 90 % interval " + shown(100.0 * *remaining.low90) + " to " + shown(100.0 * *remaining.high90) + " %";
+  else
+    text += "; these places are too few to say how sure that is";
+  return text + (remaining.is_of_rotation ? "" : ")");
+}
+
 }  // namespace
 
-LeftOver leftBy(const identify::GapSearch& search, const identify::GapModel& model, const identify::GapRows& rows) {
-  const identify::Linearized at(search.physics(), model, search.whitening(), search.spaceBlocks());
-  return {identify::findStructure(at, rows, false), identify::findTraces(at, rows)};
+double scatteredShare(const identify::GapSearch& search, const identify::GapRows& stated, const GapReport& report) {
+  constexpr double kStatedTooSmall = 2.2;  // A stated tolerance that is at most so much too small is no gap.
+  const double bound_m = std::max(identify::kWorstPlacing_m, kStatedTooSmall * stated.placing_sd_m.value_or(0.0));
+  const double bound_rad = std::max(identify::kWorstPlacing_rad, kStatedTooSmall * stated.placing_sd_rad.value_or(0.0));
+  double share = shareAbove(search.placingSd_m(), bound_m, 1e-3 * report.position_rms_mm);
+  if (report.orientation_rms_deg)
+    share = std::max(share, shareAbove(search.placingSd_rad(), bound_rad, *report.orientation_rms_deg / kDegPerRad));
+  return share;
 }
 
-Evidence weigh(const identify::GapSearch& search, const identify::EffectSelection& selection,
-               const HeldOutGap& held_out, const LeftOver& left, const identify::GapRows& stated,
-               const GapReport& report) {
-  constexpr double kSure = 1e-4;
+bool hasGap(const identify::GapSearch& search, const Judgement& judgement, double scattered_share) {
   constexpr double kSureOfNothingNamed = 1e-6;  // F tests of many columns are a little too sure.
-  constexpr double kClearlyAbove = 1.6;         // A floor stated 20 % too low is no gap, nor is one stated by guess.
-  const bool has_trace = left.traces.front().p_value < kSureTrace;
-  Evidence evidence;
-  evidence.has_effect = !selection.ways.empty();
-  evidence.has_structure = search.structureOfNone().p_value < kSureOfNothingNamed || has_trace;
-  const double stated_m = stated.placing_sd_m.value_or(0.0);
-  evidence.is_above_floor = stated_m > 0.0 && search.placingSd_m() > kClearlyAbove * stated_m;
-  const double scattered = scatterAboveBound(search, stated, report, kClearlyAbove);
-  if (scattered > 0.0) evidence.is_above_floor = true;
-  if (!evidence.has_effect) return evidence;
-  const identify::GapRows& rows = search.physics().rows();
-  const double count = static_cast<double>(rows.rows.size()) * rows.channels();
-  double sure_left = 0.0;
-  if (left.structure.p_value < kSure) sure_left = std::max(0.0, held_out.left - 1.645 * held_out.left_sd);
-  if (has_trace) sure_left = std::max(sure_left, left.traces.front().explained / count);
-  evidence.fraction = std::max(scattered, std::sqrt(std::min(1.0, sure_left / std::max(held_out.before, 1e-12))));
-  return evidence;
+  constexpr double kSureNats = 12.0;
+  return !judgement.selection.ways.empty() || scattered_share > 0.0 ||
+         search.structureOfNone().p_value < kSureOfNothingNamed || judgement.unnamed_nats > kSureNats;
 }
 
-GapVerdict verdictOf(const Evidence& evidence) {
-  if (!evidence.has_effect)
-    return evidence.has_structure || evidence.is_above_floor ? GapVerdict::kUnexplained : GapVerdict::kNoGap;
-  if (evidence.fraction <= 0.15) return GapVerdict::kExplained;
-  return evidence.fraction <= 0.5 ? GapVerdict::kPartlyExplained : GapVerdict::kUnexplained;
+GapVerdict verdictOf(const HowFar& far, bool has_effect, bool has_gap) {
+  if (!has_effect) return has_gap ? GapVerdict::kUnexplained : GapVerdict::kNoGap;
+  const double surely_left = far.remaining().low90.value_or(0.0);
+  if (surely_left > 0.5) return GapVerdict::kUnexplained;
+  return surely_left > 0.15 ? GapVerdict::kPartlyExplained : GapVerdict::kExplained;
 }
 
 std::string shown(double value) {
-  const double scale = value >= 10.0 ? 1.0 : value >= 1.0 ? 10.0 : 100.0;
+  const double size = std::abs(value);
+  const double scale = size >= 10.0 ? 1.0 : size >= 1.0 ? 10.0 : 100.0;
   return formatNumber(std::round(value * scale) / scale);
+}
+
+std::string whyRefused(const Judgement& judgement) {
+  switch (judgement.refusal) {
+    case Refusal::kNone:
+      return "";
+    case Refusal::kForetellsNoBetter:
+      return namesText(judgement.refused) +
+             " would fit, but a smooth field without a name foretells places not seen as well, and is as likely";
+    case Refusal::kSmallShare:
+      return namesText(judgement.refused) + " would fit, but takes only " + shown(100.0 * judgement.named_share) +
+             " % of what a smooth field without a name takes beside it";
+  }
+  return "";
 }
 
 std::string verdictText(const GapReport& report) {
   const std::string gap = gapText(report);
-  const std::string percent = shown(100.0 * std::max(0.0, 1.0 - report.remaining_fraction)) + " %";
   switch (report.verdict) {
     case GapVerdict::kNoGap:
       return "No gap: the recording agrees with the simulation within its noise (" + gap + ").";
     case GapVerdict::kExplained:
-      return "The gap (" + gap + ") is explained by: " + causesText(report) +
-             "; on places the fit did not see it takes " + percent + " of it away" +
-             (report.remaining_fraction > kPoorlyPredicted
-                  ? ", because these lie where nothing else tells of it; nothing is left where it was measured."
-                  : ".");
+      return "The gap (" + gap + ") is explained by: " + causesText(report) + "; " + fallText(report) + ".";
     case GapVerdict::kPartlyExplained:
-      return "The gap (" + gap + ") is partly explained by: " + causesText(report) + "; this takes " + percent +
-             " of it away, the rest has another cause.";
+      return "The gap (" + gap + ") is partly explained by: " + causesText(report) + "; " + fallText(report) +
+             ", the rest has another cause.";
     case GapVerdict::kUnexplained:
-      return "There is a gap (" + gap + "), but no known effect explains it" +
-             (report.selected.empty()
-                  ? std::string(".")
-                  : "; the nearest, " + causesText(report) + ", takes only " + percent + " of it away.");
+      if (!report.selected.empty()) {
+        return "There is a gap (" + gap + ") that no known effect explains; the nearest is " + causesText(report) +
+               ": " + fallText(report) + ".";
+      }
+      return "There is a gap (" + gap + ") that no known effect explains" +
+             (report.rival.why.empty() ? "." : ": " + report.rival.why + ".");
   }
   return {};
 }

@@ -144,7 +144,10 @@ Deviance devianceOf(std::span<const Vector6d> whitened, bool has_orientation, co
 }
 
 std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapModel& model, const Whitening& whitening) {
-  std::vector<Vector6d> residuals = physics.residuals(model);
+  return whitened(physics.residuals(model), whitening);
+}
+
+std::vector<Vector6d> whitened(std::vector<Vector6d> residuals, const Whitening& whitening) {
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     residuals[i].head<3>() = (whitening.position[i] * residuals[i].head<3>()).eval();
     residuals[i].tail<3>() *= whitening.rotation[i];

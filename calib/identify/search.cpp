@@ -128,11 +128,17 @@ void GapSearch::settleWays() {
   }
 }
 
-double GapSearch::bicOf(const GapModel& model) const {
-  const std::vector<Vector6d> left = whitenedResiduals(physics_, model, whitening_);
+double GapSearch::bicOf(const GapModel& model, std::span<const char> used) const {
+  std::vector<Vector6d> left = whitenedResiduals(physics_, model, whitening_);
+  if (!used.empty()) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < left.size(); ++i)
+      if (used[i] != 0) left[kept++] = left[i];
+    left.resize(kept);
+  }
   double parameters = 0.0;
   for (const GapTerm& term : model.terms) parameters += parametersOf(term);
-  const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
+  const double count = static_cast<double>(left.size()) * rows_.channels();
   return devianceOf(left, rows_.has_orientation, law_).value + parameters * std::log(count) +
          priorCost(physics_, model);
 }

@@ -61,7 +61,8 @@ class GapSearch {
   double floorPlacingSd_m() const;
   double floorPlacingSd_rad() const;
 
-  double bicOf(const GapModel& model) const;
+  /// @param used per row, which rows count; empty = all
+  double bicOf(const GapModel& model, std::span<const char> used = {}) const;
   RefinedModel refined(const GapModel& start, std::span<const char> used = {}) const;
   /// All but one parameter refitted, counted as in RefinedModel::covariance.
   RefinedModel refinedWithout(const GapModel& start, Eigen::Index frozen) const;

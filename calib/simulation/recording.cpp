@@ -69,7 +69,7 @@ std::vector<Stop> drawStops(const TrackerPhysics& physics, std::span<const Plann
     stop.reference_from_sensor =
         disturbed(place.reference_from_sensor, scene.rig.tolerance_m, scene.rig.tolerance_rad, placing);
     stop.visit = visits.next();
-    now_s += options.travel_s;
+    now_s = std::max(now_s + options.travel_s, place.t_s.value_or(0.0));
     for (int i = 0; i < options.samples_per_node; ++i) {
       stop.times_s.push_back(now_s);
       stop.noise.push_back(noise.at(now_s));
@@ -143,7 +143,7 @@ TableMetadata metadataOf(const Scene& scene, std::uint64_t seed) {
   return metadata;
 }
 
-Node nodeOf(const Stop& stop, const NodeStatistics& statistics) {
+Node nodeOf(const Stop& stop) {
   const PlannedPlace& place = *stop.place;
   Node node;
   node.node = place.node;
@@ -154,7 +154,6 @@ Node nodeOf(const Stop& stop, const NodeStatistics& statistics) {
   node.role = place.role;
   node.t_start_s = stop.times_s.front();
   node.t_end_s = stop.times_s.back();
-  setStatistics(node, statistics);
   return node;
 }
 
@@ -179,12 +178,48 @@ Result<Simulation> simulate(const Scene& scene, std::span<const PlannedPlace> pl
   simulation.table.metadata = simulation.samples.metadata = metadataOf(scene, options.seed);
   for (std::size_t i = 0; i < stops.size(); ++i) {
     if (!readings[i].statistics) return tl::unexpected<Error>(noPoseError(physics, stops[i]));
-    simulation.table.nodes.push_back(nodeOf(stops[i], *readings[i].statistics));
+    simulation.table.nodes.push_back(nodeOf(stops[i]));
+    setStatistics(simulation.table.nodes.back(), *readings[i].statistics);
     for (Sample& sample : readings[i].samples) {
       simulation.samples.rows.push_back({stops[i].place->node, stops[i].place->visit, std::move(sample)});
     }
   }
   return simulation;
+}
+
+namespace {
+
+/// The scene without what a seed decides.
+Scene withoutChance(Scene scene) {
+  scene.rig.tolerance_m = scene.rig.tolerance_rad = 0.0;
+  scene.rig.alignment_tolerance_m = scene.rig.alignment_tolerance_rad = 0.0;
+  return scene;
+}
+
+}  // namespace
+
+Result<CalibrationTable> simulateExactly(const Scene& scene, std::span<const PlannedPlace> plan,
+                                         const SimulationOptions& options, const RunControl& control) {
+  FT_TRY_VOID(check(plan, options));
+  FT_TRY(const TrackerPhysics physics, TrackerPhysics::make(withoutChance(scene), options.seed));
+  SimulationOptions one_reading = options;
+  one_reading.samples_per_node = 1;
+  std::vector<Stop> stops = drawStops(physics, plan, one_reading);
+  CalibrationTable table;
+  table.metadata = metadataOf(scene, options.seed);
+  for (Stop& stop : stops) {
+    if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The simulation was stopped.");
+    stop.times_s = {stop.place->t_s.value_or(stop.times_s.front())};
+    stop.noise = {Eigen::Matrix3d::Zero()};
+    stop.visit = {};
+    constexpr bool kOnLattice = false;
+    const Sample sample = physics.read(standingAt(physics, stop), stop.visit, stop.times_s.front(), kSensor,
+                                       stop.noise.front(), kOnLattice);
+    if (!sample.status.empty()) return tl::unexpected<Error>(noPoseError(physics, stop));
+    table.nodes.push_back(nodeOf(stop));
+    table.nodes.back().tracker_from_sensor = sample.tracker_from_sensor;
+  }
+  return table;
 }
 
 }  // namespace fieldtrue::simulation

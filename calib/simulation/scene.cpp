@@ -48,7 +48,7 @@ TrackerModel trackerFrom(const JsonReader& json) {
   return tracker;
 }
 
-Pose transmitterFrom(const JsonReader& json) {
+Pose poseFrom(const JsonReader& json) {
   Pose pose;
   json.vector3("position_m", pose.position_m, kFarthest_m, "m");
   json.quaternion("orientation_wxyz", pose.orientation);
@@ -93,11 +93,13 @@ Scene sceneFrom(const JsonReader& json) {
   json.text("name", scene.name);
   const auto tracker = json.find("tracker");
   const auto transmitter = json.find("transmitter");
+  const auto mount = json.find("sensor_mount");
   const auto rig = json.find("rig");
   const auto effects = json.find("effects");
   json.refuseOtherKeys();
   if (tracker) scene.tracker = trackerFrom(*tracker);
-  if (transmitter) scene.reference_from_tracker = transmitterFrom(*transmitter);
+  if (transmitter) scene.reference_from_tracker = poseFrom(*transmitter);
+  if (mount) scene.mount_from_sensor = poseFrom(*mount);
   if (rig) scene.rig = rigFrom(*rig);
   if (!effects) return scene;
   const field::Excitation excitation = excitationOf(scene.tracker);
@@ -122,11 +124,19 @@ Result<Scene> readScene(const std::filesystem::path& path) {
   return sceneFromJson(json, name);
 }
 
+namespace {
+
+nlohmann::json poseToJson(const Pose& pose) {
+  const Eigen::Vector3d& p_m = pose.position_m;
+  const Eigen::Quaterniond q = canonical(pose.orientation);
+  return {{"position_m", {p_m.x(), p_m.y(), p_m.z()}}, {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
+}
+
+}  // namespace
+
 nlohmann::json toJson(const Scene& scene) {
   const TrackerModel& t = scene.tracker;
   const RigModel& r = scene.rig;
-  const Eigen::Vector3d& p_m = scene.reference_from_tracker.position_m;
-  const Eigen::Quaterniond q = canonical(scene.reference_from_tracker.orientation);
   nlohmann::json effects = nlohmann::json::array();
   for (const EffectInstance& effect : scene.effects) {
     effects.push_back({{"id", effect.id},
@@ -147,8 +157,8 @@ nlohmann::json toJson(const Scene& scene) {
             {"correlation", t.correlation},
             {"nearest_range_m", t.nearest_range_m},
             {"farthest_range_m", t.farthest_range_m}}},
-          {"transmitter",
-           {{"position_m", {p_m.x(), p_m.y(), p_m.z()}}, {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}}}},
+          {"transmitter", poseToJson(scene.reference_from_tracker)},
+          {"sensor_mount", poseToJson(scene.mount_from_sensor)},
           {"rig",
            {{"name", r.name},
             {"tolerance_m", r.tolerance_m},

@@ -53,13 +53,15 @@ struct Scene {
   TrackerModel tracker;
   Pose reference_from_tracker;  ///< Transmitter pose in the rig's frame.
   RigModel rig;
+  Pose mount_from_sensor;  ///< The sensor in the holder whose poses the rig states.
   std::vector<EffectInstance> effects;
 };
 
 /// Reads `*.scene.json` (`fieldtrue.scene/1`): the keys `schema`, `name`, `tracker`, `transmitter` (`position_m`,
-/// `orientation_wxyz`: its pose in the rig's frame), `rig` and `effects` (list of `id`, `parameters`). Every key is
-/// optional but an effect's id; the keys of `tracker` and `rig` are the members above, `alignment` is `known` or
-/// `unknown`. A key `comment` may stand anywhere and is ignored, and so are // comments.
+/// `orientation_wxyz`: its pose in the rig's frame), `sensor_mount` (likewise, the sensor's in its holder), `rig` and
+/// `effects` (list of `id`, `parameters`). Every key is optional but an effect's id; the keys of `tracker` and `rig`
+/// are the members above, `alignment` is `known` or `unknown`. A key `comment` may stand anywhere and is ignored, and
+/// so are // comments.
 /// @error kIo; kBadInput naming the key, what was seen and what is needed; kNewerVersion
 Result<Scene> readScene(const std::filesystem::path& path);
 /// @param name stands in error messages ("lab.scene.json")

@@ -44,7 +44,7 @@ class TrackerSimulator {
 struct SimulationOptions {
   std::uint64_t seed = 1;
   int samples_per_node = 60;
-  double travel_s = 5.0;  ///< Between two places.
+  double travel_s = 5.0;  ///< Between two places; a place whose plan states a later time waits for it.
 };
 
 struct Simulation {
@@ -58,5 +58,11 @@ struct Simulation {
 /// @error kBadInput; kUnsupported when a place gives no usable reading (named); kCancelled
 Result<Simulation> simulate(const Scene& scene, std::span<const PlannedPlace> plan, const SimulationOptions& options,
                             const RunControl& control = {});
+
+/// What the tracker would report of a plan without noise, filter, quantum and what differs from visit to visit, the jig
+/// standing exactly where its drawing says: one reading a place, no scatter stated.
+/// @error as `simulate`
+Result<CalibrationTable> simulateExactly(const Scene& scene, std::span<const PlannedPlace> plan,
+                                         const SimulationOptions& options, const RunControl& control = {});
 
 }  // namespace fieldtrue::simulation

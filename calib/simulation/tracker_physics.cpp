@@ -89,7 +89,8 @@ StandingSensor TrackerPhysics::standing(const Pose& reference_from_sensor,
                                         const std::optional<std::array<int, 3>>& index, double first_s,
                                         double last_s) const {
   StandingSensor sensor;
-  sensor.stated = {tracker_from_reference_ * reference_from_sensor, tracker_from_reference_, index, first_s};
+  sensor.stated = {tracker_from_reference_ * reference_from_sensor * scene_.mount_from_sensor, tracker_from_reference_,
+                   index, first_s};
   std::vector<field::EffectResponse> responses;
   field::EffectResponse sum;
   for (const auto& effect : effects_) {

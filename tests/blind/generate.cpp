@@ -142,6 +142,8 @@ json writeSession(const Options& options, const SessionWish& wish, const std::st
   const fs::path nodes = options.out / (name + ".nodes.csv");
   replaceFile(nodes, session.nodes_csv);
   if (!session.samples_csv.empty()) replaceFile(options.out / (name + ".samples.csv"), session.samples_csv);
+  replaceFile(options.out / "unseen" / (name + ".csv"), session.unseen_csv);
+  session.truth["unseen_sha256"] = sha256Hex(session.unseen_csv);
   session.truth["file"] = name;
   session.truth["own_classes"] = session.truth["classes"];
   if (!asks_plan_check) return session.truth;
@@ -188,7 +190,7 @@ void writeFolder(const Options& options) {
   if (fs::exists(options.out / "truth.json"))
     throw std::runtime_error(options.out.string() + " holds a sealed set already; name an empty folder");
   std::error_code trouble;
-  fs::create_directories(options.out, trouble);
+  fs::create_directories(options.out / "unseen", trouble);
   if (trouble) throw std::runtime_error("cannot make the folder " + options.out.string() + ": " + trouble.message());
   const bool asks_plan_check = ::access(options.cli.c_str(), X_OK) == 0;
   const std::vector<json> truths = writeSessions(options, asks_plan_check);

@@ -230,7 +230,8 @@ Drawn drawHysteresis(const Setup& setup, Random& random) {
   return foreign("off:hysteresis", "receiver core remembers the field before", 1e-4, 0.5,
                  [=](World& world, double size) {
                    world.signal.emplace_back([=](const Row& row, const SolvedPose&, Matrix3d& couplings) {
-                     couplings += size * kept_at.at(row.start_s);
+                     const auto after = kept_at.upper_bound(row.start_s);
+                     if (after != kept_at.begin()) couplings += size * std::prev(after)->second;
                    });
                  });
 }

@@ -260,6 +260,7 @@ std::optional<GeneratedSession> drawSession(const SessionWish& wish, Random& ran
   const World world = worldOf(placed);
   const Eigen::VectorXd gap = alignment.whitened(world);
   GeneratedSession session = recordSession(setup, world, alignment, fault, samples, random);
+  session.unseen_csv = recordUnseen(setup, world, random);
   session.truth = {{"shelf", wish.shelf},
                    {"effects", effects},
                    {"rho", placed.empty() ? 0.0 : alignment.rho(gap)},

@@ -121,7 +121,7 @@ double Alignment::oracleFraction(const Eigen::VectorXd& whitened_gap) const {
     const Eigen::MatrixXd permuted = (held_rows * fit.colsPermutation()).transpose();
     estimation += upper.transpose().solve(permuted).squaredNorm();
   }
-  return gap_left <= 0 ? 0.0 : std::max(0.0, 1 - std::sqrt(estimation / (gap_left + estimation)));
+  return gap_left <= 0 ? 0.0 : std::max(0.0, 1 - estimation / (gap_left + estimation));
 }
 
 }  // namespace blind

@@ -163,4 +163,54 @@ GeneratedSession recordSession(const Setup& setup, const World& world, const Ali
   return session;
 }
 
+namespace {
+
+/// Somewhere in the box of the places, or outside it by up to `margin_m`.
+Vector3d drawPlace(const Eigen::AlignedBox3d& box, double margin_m, Random& random) {
+  for (;;) {
+    Vector3d place_m;
+    for (int axis = 0; axis < 3; ++axis)
+      place_m[axis] = uniform(random, box.min()[axis] - margin_m, box.max()[axis] + margin_m);
+    if (margin_m == 0 || !box.contains(place_m)) return place_m;
+  }
+}
+
+}  // namespace
+
+std::string recordUnseen(const Setup& setup, const World& world, Random& random) {
+  constexpr int kInside = 150, kOutside = 50;
+  constexpr double kNearest_m = 0.4;  // Nearer, no tracker of this kind works.
+  Eigen::AlignedBox3d box;
+  for (const Row& row : setup.rows) box.extend(row.place_m);
+  const Vector3d corner_m =
+      setup.middle_m - 0.5 * setup.pitch_m * (setup.counts - Eigen::Vector3i::Ones()).cast<double>();
+  std::string table =
+      "inside,t_s,i,j,k,x_true_m,y_true_m,z_true_m,qw_true,qx_true,qy_true,qz_true,x_m,y_m,z_m,qw,qx,qy,qz\n";
+  for (int n = 0; n < kInside + kOutside;) {
+    const bool inside = n < kInside;
+    Row row;
+    row.place_m = drawPlace(box, inside ? 0 : setup.pitch_m, random);
+    const Vector3d step = (row.place_m - corner_m) / setup.pitch_m;
+    const auto nearest = [&](int axis) {
+      return std::clamp(static_cast<int>(std::lround(step[axis])), 0, setup.counts[axis] - 1);
+    };
+    row.i = nearest(0), row.j = nearest(1), row.k = nearest(2);
+    const auto other = static_cast<std::size_t>(uniformInt(random, 0, static_cast<int>(setup.rows.size()) - 1));
+    row.attitude = setup.rows[other].attitude;
+    row.start_s = row.end_s = uniform(random, setup.rows.front().start_s, setup.latest_s);
+    const SolvedPose pose = reported(setup, world, row);
+    if (setup.expected(row).position_m.norm() < kNearest_m || !pose.position_m.allFinite()) continue;
+    ++n;
+    table += inside ? "1" : "0";
+    append(table, row.start_s, 4);
+    for (int value : {row.i, row.j, row.k}) table += "," + std::to_string(value);
+    for (int c = 0; c < 3; ++c) append(table, row.place_m[c], 6);
+    append(table, row.attitude);
+    for (int c = 0; c < 3; ++c) append(table, pose.position_m[c], 7);
+    append(table, pose.orientation);
+    table += "\n";
+  }
+  return table;
+}
+
 }  // namespace blind

@@ -49,14 +49,19 @@ double GapBarChart::maximum() const {
   return most > 0.0 ? most : 1.0;
 }
 
-std::string effectLabel(const std::string& id) { return id == "none" ? "No effect" : effects::labelOf(id); }
+std::string effectLabel(const std::string& id) {
+  if (id == "none") return "No effect";
+  if (id == gap::kUnnamedSmooth) return "A smooth field without a name";
+  if (id == gap::kUnnamedScattered) return "Scatter without a name";
+  return effects::labelOf(id);
+}
 
 GapBarChart waterfallChart(const gap::GapReport& report) {
   GapBarChart chart{"waterfall", "Error above noise as each cause is added (mm, 90 % range)", {}};
   for (const gap::GapStep& step : report.sequence) {
     GapBar bar;
     bar.name = step.effect.empty() ? "As simulated now" : "+ " + effectLabel(step.effect);
-    bar.value = step.excess_mm;
+    bar.value = std::max(0.0, step.excess_mm);
     bar.low90 = step.low90_mm;
     bar.high90 = step.high90_mm;
     bar.text = millimetres(step.excess_mm, step.low90_mm, step.high90_mm);
@@ -91,7 +96,7 @@ GapBarChart shrinkageChart(const gap::GapReport& report, std::size_t most) {
   const std::size_t shown = std::min(most, report.candidates.size());
   for (std::size_t i = 0; i < shown; ++i) {
     const gap::GapCandidate& candidate = report.candidates[i];
-    if (candidate.effect == "none") continue;
+    if (candidate.effect == "none" || !std::isfinite(candidate.shrinkage.fraction)) continue;
     GapBar bar;
     bar.name = effectLabel(candidate.effect);
     bar.value = std::max(0.0, candidate.shrinkage.fraction);

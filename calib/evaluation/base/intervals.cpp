@@ -51,9 +51,13 @@ double sampleVariance(std::span<const double> values) {
   return squares / (n - 1.0);
 }
 
+}  // namespace
+
 double studentPoint95(double degrees) {
   return boost::math::quantile(boost::math::students_t(std::max(1.0, degrees)), 0.95);
 }
+
+namespace {
 
 /// How far a mean over places may be off: in SDs of the mean, to either side.
 struct Reach {

@@ -22,6 +22,9 @@ struct Interval {
   double high = 0.0;
 };
 
+/// 95 % point of Student's t, of at least one degree of freedom.
+double studentPoint95(double degrees);
+
 double rootMeanSquare(std::span<const double> values);
 
 /// 90 % interval of the RMS of places' errors; not a number for one place, which tells nothing of others.

@@ -74,7 +74,7 @@ void RoomsRankingTest::agreesWhereTheFieldIsBentStrongly_data() {
 // trilinear and local weights, which lose the field between the nodes and at the region's border.
 void RoomsRankingTest::agreesWhereTheFieldIsBentStrongly() {
   QFETCH(QString, room);
-  for (const std::uint64_t seed : {1, 2}) {
+  for (const std::uint64_t seed : {std::uint64_t{1}, std::uint64_t{2}}) {
     const std::map<std::string, double> errors = errorsIn(room.toStdString(), seed);
     for (const char* best : {"polynomial of degree 4", "multiquadric"})
       for (const char* average : {"trilinear", "local"})

@@ -31,6 +31,8 @@ SelectedEffect someMetal() {
   metal.doubt = "stands on a place";
   metal.scene_parameters = {{"center_m", {0.7, -0.2, 1.1}}, {"material", "aluminium"}};
   metal.credit_fraction = 0.95;
+  metal.excess2_before_mm2 = 156.25;
+  metal.excess2_after_mm2 = 6.25;
   return metal;
 }
 
@@ -74,9 +76,9 @@ GapReport someReport() {
   report.candidates = {someMetal(), none};
   report.selected = {someMetal()};
   report.sequence = {{"", 12.5, 10.0, 15.0}, {"compact_metal", 2.5, std::nullopt, 3.0}};
-  report.remaining_position_rms_mm = 3.25;
-  report.remaining_fraction = 0.2;
-  report.remaining_where = {17, 4};
+  report.remaining = {3.25, 0.2, 0.1, 0.3, true, 156.25, 6.25, 2.5, 4.0, 5.0, 6.5, 17, {17, 4}};
+  report.rival = {12.5, 30.0, 1.5, 0.5, 0.875, {"gain_drift"}, "A field without a name does as well."};
+  report.odds_over_next = 14.5;
   report.isolability = {{{"compact_metal", "closed_loop", 0.31}}, {"One orientation only."}};
   report.next_measurement = "Turn the sensor.";
   report.next_separates = {"compact_metal", "closed_loop"};
@@ -97,7 +99,7 @@ class GapJsonTest : public QObject {
                          << QString(
                                 "schema software input alignment verdict text smallest_detectable gap where "
                                 "findings candidates selected remaining isolability next_measurement "
-                                "sequence predictions")
+                                "sequence predictions rival odds_over_next replicates against")
                                 .split(' ');
     QTest::newRow("input") << "/input" << QString("places rows samples orientations position_only").split(' ');
     QTest::newRow("alignment") << "/alignment/tracker_from_reference" << QStringList{"t_m", "q_wxyz"};
@@ -128,12 +130,23 @@ class GapJsonTest : public QObject {
             .split(' ');
     QTest::newRow("candidate") << "/candidates/0" << candidate;
     QTest::newRow("none") << "/candidates/1" << candidate;
-    QTest::newRow("selected") << "/selected/0" << candidate + QStringList{"credit_fraction"};
+    QTest::newRow("selected") << "/selected/0"
+                              << candidate + QStringList{"credit_fraction", "excess2_before_mm2", "excess2_after_mm2"};
     QTest::newRow("parameter") << "/candidates/0/parameters/radius_m" << QString("value unit low90 high90").split(' ');
     QTest::newRow("shrinkage") << "/candidates/0/shrinkage"
                                << QString("before_mm after_mm fraction low90 high90").split(' ');
     QTest::newRow("sequence") << "/sequence/1" << QString("effect excess_mm low90_mm high90_mm").split(' ');
-    QTest::newRow("remaining") << "/remaining" << QString("position_rms_mm fraction_of_start where").split(' ');
+    QTest::newRow("remaining") << "/remaining"
+                               << QString(
+                                      "position_rms_mm fraction_of_start fraction_low90 fraction_high90 of "
+                                      "excess2_before_mm2 excess2_after_mm2 p50_mm p90_mm p95_mm worst_mm "
+                                      "worst_node where")
+                                      .split(' ');
+    QTest::newRow("rival") << "/rival"
+                           << QString(
+                                  "nats_over_unnamed unnamed_nats unseen_gain unseen_gain_low90 named_share "
+                                  "refused why")
+                                  .split(' ');
     QTest::newRow("isolability") << "/isolability" << QStringList{"pairs", "warnings"};
     QTest::newRow("pair") << "/isolability/pairs/0" << QString("a b r2").split(' ');
     QTest::newRow("next") << "/next_measurement" << QStringList{"text", "separates"};

@@ -1,0 +1,180 @@
+#include "calib/gap/judgement.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fieldtrue::gap {
+namespace {
+
+constexpr double kLeastNats = 3.0;
+constexpr double kLeastShare = 0.5;
+
+std::string idOf(const identify::GapSearch& search, const identify::EffectSelection& selection, std::size_t term) {
+  return search.ways()[selection.ways[term]].effect->id;
+}
+
+class Judge {
+ public:
+  Judge(const identify::GapSearch& search, const RunControl& control)
+      : search_(search), control_(control), rival_(search), rows_(search.physics().rows()) {
+    none_left_ = search.physics().residuals(search.none().model);
+    laws_.alone = rival_.likeliestLaws(none_left_);
+    alone_ = rival_.logEvidence(none_left_, laws_.alone);
+  }
+
+  Judgement run(identify::EffectSelection selection) {
+    Judgement judgement;
+    judgement.selection = std::move(selection);
+    judgement.unnamed_nats = alone_ - rival_.logEvidence(none_left_, {});
+    dropIdle(judgement);
+    UnseenScores scores = scored(judgement.selection, scattered_);
+    while (dropHarmful(scores, judgement)) scores = scored(judgement.selection, scattered_);
+    if (!judgement.selection.ways.empty() && !control_.stop.stop_requested()) weigh(scores, judgement);
+    if (judgement.refusal != Refusal::kNone) {
+      for (std::size_t t = 0; t < judgement.selection.ways.size(); ++t)
+        judgement.refused.push_back(idOf(search_, judgement.selection, t));
+      clear(judgement.selection);
+      scores.step.resize(1);
+      scores.both = scores.smooth;
+    }
+    judgement.left = leftBy(search_, judgement.selection.model.model);
+    judgement.far = howFar(scores, noiseLeftBy(search_, judgement.left.structure), rows_);
+    tellRest(scores, judgement);
+    return judgement;
+  }
+
+ private:
+  void tellRest(const UnseenScores& scores, Judgement& judgement) const {
+    const auto n = static_cast<double>(rows_.rows.size());
+    double smooth_m2 = 0.0;
+    for (std::size_t i = 0; i < rows_.rows.size(); ++i) {
+      smooth_m2 += (scores.smooth[i].square_m2 - scores.step.front()[i].square_m2) / n;
+      judgement.rest_m2 += (scores.step.back()[i].square_m2 - scores.both[i].square_m2) / n;
+    }
+    judgement.smooth_left = 1.0 + smooth_m2 / judgement.far.excess_m2.front().value;
+  }
+
+  UnseenScores scored(const identify::EffectSelection& selection, std::span<const int> blocks) const {
+    return scoreUnseen(search_, selection, rival_, laws_, blocks, control_);
+  }
+
+  /// Log evidence of a model with a smooth rest over a smooth field alone, every parameter of its effects paid for.
+  double natsOf(const identify::GapModel& model, identify::UnnamedLaws& laws) const {
+    const std::vector<identify::Vector6d> left = search_.physics().residuals(model);
+    laws = rival_.likeliestLaws(left);
+    double parameters = 0.0;
+    for (const identify::GapTerm& term : model.terms)
+      parameters += static_cast<double>(term.linear.size() + term.searched.size());
+    const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
+    return rival_.logEvidence(left, laws) - 0.5 * parameters * std::log(count) - alone_;
+  }
+
+  /// Takes out effects that a smooth rest does without.
+  void dropIdle(Judgement& judgement) {
+    identify::EffectSelection& selection = judgement.selection;
+    if (selection.ways.empty()) return;
+    judgement.nats_over_unnamed = natsOf(selection.model.model, laws_.beside);
+    while (selection.ways.size() > 1 && !control_.stop.stop_requested()) {
+      double least = kLeastNats;
+      std::optional<std::size_t> idle;
+      identify::RefinedModel best_rest;
+      double best_nats = 0.0;
+      identify::UnnamedLaws best_laws;
+      for (std::size_t t = 0; t < selection.ways.size(); ++t) {
+        const identify::RefinedModel rest = without(selection, t);
+        identify::UnnamedLaws laws;
+        const double nats = natsOf(rest.model, laws);
+        if (judgement.nats_over_unnamed - nats >= least) continue;
+        least = judgement.nats_over_unnamed - nats;
+        idle = t;
+        best_rest = rest;
+        best_nats = nats;
+        best_laws = laws;
+      }
+      if (!idle) return;
+      drop(*idle, best_rest, judgement);
+      judgement.nats_over_unnamed = best_nats;
+      laws_.beside = best_laws;
+    }
+  }
+
+  /// Takes out the effect with which unseen places come off worst, if they come off worse with it than without.
+  bool dropHarmful(const UnseenScores& scores, Judgement& judgement) {
+    identify::EffectSelection& selection = judgement.selection;
+    double worst = 0.0;
+    std::optional<std::size_t> harmful;
+    for (std::size_t s = 0; s + 1 < scores.step.size(); ++s) {
+      const double harm = pairedDifference(scores.step[s + 1], scores.step[s], rows_).value;
+      if (harm <= worst) continue;
+      worst = harm;
+      harmful = s;
+    }
+    if (!harmful || control_.stop.stop_requested()) return false;
+    drop(*harmful, without(selection, *harmful), judgement);
+    judgement.nats_over_unnamed = selection.ways.empty() ? 0.0 : natsOf(selection.model.model, laws_.beside);
+    return true;
+  }
+
+  identify::RefinedModel without(const identify::EffectSelection& selection, std::size_t term) const {
+    identify::GapModel model = selection.model.model;
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(term));
+    return search_.refined(model);
+  }
+
+  void drop(std::size_t term, const identify::RefinedModel& rest, Judgement& judgement) const {
+    identify::EffectSelection& selection = judgement.selection;
+    judgement.dropped.push_back(idOf(search_, selection, term));
+    selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
+    selection.model = rest;
+    if (selection.ways.size() < 2) selection.alternatives = selection.first;
+    if (selection.ways.empty()) selection.model = search_.none();
+    selection.leading = std::min(selection.leading, selection.ways.empty() ? 0 : selection.ways.size() - 1);
+  }
+
+  void clear(identify::EffectSelection& selection) const {
+    selection.ways.clear();
+    selection.model = search_.none();
+    selection.alternatives = selection.first;
+    selection.leading = 0;
+  }
+
+  void weigh(const UnseenScores& scores, Judgement& judgement) {
+    const identify::EffectSelection& selection = judgement.selection;
+    const bool in_time = search_.ways()[selection.ways.front()].needs_time;
+    const UnseenScores far = scored(selection, in_time ? search_.timeBlocksOfRows() : search_.spaceBlocks());
+    judgement.unseen_gain = pairedDifference(far.smooth, far.both, rows_);
+    const double by_effects = pairedDifference(scores.step.front(), scores.step.back(), rows_).value;
+    const double by_both = pairedDifference(scores.step.front(), scores.both, rows_).value;
+    if (by_both > 0.0) judgement.named_share = by_effects / by_both;
+    const bool foretells_better = judgement.unseen_gain.low90.value_or(-1.0) > 0.0;
+    const bool foretells_worse = judgement.unseen_gain.high90.value_or(1.0) < 0.0;
+    const bool is_likelier = judgement.nats_over_unnamed >= kLeastNats && !foretells_worse;
+    if (!foretells_better && !is_likelier)
+      judgement.refusal = Refusal::kForetellsNoBetter;
+    else if (judgement.named_share < kLeastShare)
+      judgement.refusal = Refusal::kSmallShare;
+  }
+
+  const identify::GapSearch& search_;
+  const RunControl& control_;
+  identify::UnnamedRival rival_;
+  const identify::GapRows& rows_;
+  std::vector<identify::Vector6d> none_left_;
+  RivalLaws laws_;
+  double alone_ = 0.0;
+  std::vector<int> scattered_ = scatteredBlocks(rows_);
+};
+
+}  // namespace
+
+LeftOver leftBy(const identify::GapSearch& search, const identify::GapModel& model) {
+  const identify::GapRows& rows = search.physics().rows();
+  const identify::Linearized at(search.physics(), model, search.whitening(), search.spaceBlocks());
+  return {identify::findStructure(at, rows, false), identify::findTraces(at, rows)};
+}
+
+Judgement judge(const identify::GapSearch& search, identify::EffectSelection selection, const RunControl& control) {
+  return Judge(search, control).run(std::move(selection));
+}
+
+}  // namespace fieldtrue::gap

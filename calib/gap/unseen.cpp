@@ -1,0 +1,171 @@
+#include "calib/gap/unseen.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <set>
+
+namespace fieldtrue::gap {
+namespace {
+
+constexpr std::size_t kWaysAFold = 6;  ///< Effects that a fold may choose from at each step, the selected among them.
+constexpr std::size_t kSearchedAFold = 2;  ///< Of these, how many are searched to the end.
+
+/// The ways that a fold chooses from: those selected, and the best of the others.
+std::vector<std::size_t> shortList(const identify::EffectSelection& selection) {
+  std::vector<std::size_t> ways = selection.ways;
+  for (const auto* tried : {&selection.alternatives, &selection.first}) {
+    for (const identify::TriedEffect& one : *tried) {
+      if (ways.size() >= kWaysAFold + selection.ways.size()) break;
+      if (std::find(ways.begin(), ways.end(), one.way) == ways.end()) ways.push_back(one.way);
+    }
+  }
+  return ways;
+}
+
+class FoldFitter {
+ public:
+  FoldFitter(const identify::GapSearch& search, const identify::EffectSelection& selection,
+             const identify::UnnamedRival& rival, const RivalLaws& laws, std::span<const int> blocks,
+             UnseenScores& scores)
+      : search_(search),
+        selection_(selection),
+        rival_(rival),
+        laws_(laws),
+        blocks_(blocks),
+        scores_(scores),
+        ways_(shortList(selection)) {
+    if (selection.ways.empty()) return;
+    const identify::Linearized at(search.physics(), search.none().model, search.whitening(), blocks);
+    for (const std::size_t way : ways_) first_.push_back(scanned(at, way));
+  }
+
+  void run(int block, const RunControl& control) const {
+    std::vector<char> used(blocks_.size());
+    for (std::size_t i = 0; i < used.size(); ++i) used[i] = blocks_[i] != block ? 1 : 0;
+    identify::GapModel model;
+    model.alignment = search_.none().model.alignment;
+    model = search_.refined(model, used).model;
+    std::vector<identify::Vector6d> left = search_.physics().residuals(model);
+    score(left, used, scores_.step[0]);
+    scoreBeside({&laws_.alone, 1}, left, used, scores_.smooth);
+    for (std::size_t s = 0; s < selection_.ways.size(); ++s) {
+      if (control.stop.stop_requested()) return;
+      if (addBest(block, used, s, model)) left = search_.physics().residuals(model);
+      score(left, used, scores_.step[s + 1]);
+    }
+    const std::array either = {laws_.alone, laws_.beside};
+    scoreBeside(either, left, used, scores_.both);
+  }
+
+ private:
+  identify::ScanResult scanned(const identify::Linearized& at, std::size_t way) const {
+    const identify::EffectWay& one = search_.ways()[way];
+    return identify::scan(at, *one.fit, one.fit->starts(), 1, {});
+  }
+
+  /// Adds the effect that the fold's own rows like best, if they like any.
+  bool addBest(int block, std::span<const char> used, std::size_t step, identify::GapModel& model) const {
+    const identify::Linearized& at =
+        identify::Linearized(search_.physics(), step == 0 ? search_.none().model : model, search_.whitening(), blocks_);
+    const auto held_out = static_cast<std::size_t>(block);
+    struct Start {
+      std::size_t way = 0;
+      Eigen::VectorXd searched;
+      double gain = 0.0;
+    };
+    std::vector<Start> starts;
+    const double n = channelsOf(used);
+    for (std::size_t w = 0; w < ways_.size(); ++w) {
+      const identify::EffectWay& way = search_.ways()[ways_[w]];
+      const auto is_there = [&](const identify::GapTerm& term) { return term.effect == way.effect; };
+      if (std::any_of(model.terms.begin(), model.terms.end(), is_there)) continue;
+      const identify::ScanResult scan = step == 0 ? first_[w] : scanned(at, ways_[w]);
+      if (scan.without_block.size() <= held_out) continue;
+      const identify::ScanResult::Start& start = scan.without_block[held_out];
+      const auto parameters = static_cast<double>(way.fit->searched().size());
+      starts.push_back({ways_[w], start.searched, start.gain - parameters * std::log(n)});
+    }
+    std::stable_sort(starts.begin(), starts.end(), [](const Start& a, const Start& b) { return a.gain > b.gain; });
+    starts.resize(std::min(starts.size(), kSearchedAFold));
+    const double base = search_.bicOf(model, used);
+    double best = base - (step == 0 ? identify::EffectSelectionOptions{}.least_gain_first
+                                    : identify::EffectSelectionOptions{}.least_gain_more) *
+                             n / static_cast<double>(used.size() * static_cast<std::size_t>(channels()));
+    const identify::GapModel before = model;
+    bool is_added = false;
+    for (const Start& start : starts) {
+      const identify::EffectWay& way = search_.ways()[start.way];
+      const identify::LocalFit local = identify::refineLocally(at, *way.fit, start.searched, held_out);
+      identify::GapModel tried = before;
+      tried.terms.push_back({way.effect, way.fit, local.searched, local.linear});
+      tried = search_.refined(tried, used).model;
+      const double bic = search_.bicOf(tried, used);
+      if (bic >= best) continue;
+      best = bic;
+      model = tried;
+      is_added = true;
+    }
+    return is_added;
+  }
+
+  int channels() const { return search_.physics().rows().channels(); }
+  double channelsOf(std::span<const char> used) const {
+    return static_cast<double>(std::count(used.begin(), used.end(), 1) * channels());
+  }
+
+  void score(std::span<const identify::Vector6d> left, std::span<const char> used, std::vector<UnseenRow>& rows) const {
+    const std::vector<identify::Vector6d> white = identify::whitened({left.begin(), left.end()}, search_.whitening());
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      if (used[i] != 0) continue;
+      rows[i] = {left[i].head<3>().squaredNorm(), left[i].tail<3>().squaredNorm(), white[i].squaredNorm()};
+    }
+  }
+
+  void scoreBeside(std::span<const identify::UnnamedLaws> laws, std::vector<identify::Vector6d> left,
+                   std::span<const char> used, std::vector<UnseenRow>& rows) const {
+    rival_.takeAway(laws, used, left);
+    score(left, used, rows);
+  }
+
+  const identify::GapSearch& search_;
+  const identify::EffectSelection& selection_;
+  const identify::UnnamedRival& rival_;
+  const RivalLaws& laws_;
+  std::span<const int> blocks_;
+  UnseenScores& scores_;
+  std::vector<std::size_t> ways_;
+  std::vector<identify::ScanResult> first_;  ///< Of each way, on the model without effects.
+};
+
+}  // namespace
+
+std::vector<int> scatteredBlocks(const identify::GapRows& rows) {
+  constexpr int kFolds = 10;
+  std::vector<int> of_place(rows.place_nodes.size());
+  for (std::size_t p = 0; p < of_place.size(); ++p) of_place[p] = static_cast<int>(p % kFolds);
+  std::mt19937_64 generator(7);
+  for (std::size_t n = of_place.size(); n > 1; --n) std::swap(of_place[n - 1], of_place[generator() % n]);
+  std::vector<int> blocks;
+  for (const identify::GapRow& row : rows.rows) blocks.push_back(of_place[row.place]);
+  return blocks;
+}
+
+UnseenScores scoreUnseen(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                         const identify::UnnamedRival& rival, const RivalLaws& laws, std::span<const int> blocks,
+                         const RunControl& control) {
+  UnseenScores scores;
+  const std::vector<UnseenRow> empty(blocks.size());
+  scores.step.assign(selection.ways.size() + 1, empty);
+  scores.smooth = scores.both = empty;
+  const FoldFitter fitter(search, selection, rival, laws, blocks, scores);
+  const int n_blocks = 1 + *std::max_element(blocks.begin(), blocks.end());
+  control.parallel_for(static_cast<std::size_t>(n_blocks), [&](std::size_t block) {
+    if (!control.stop.stop_requested()) fitter.run(static_cast<int>(block), control);
+  });
+  return scores;
+}
+
+}  // namespace fieldtrue::gap
