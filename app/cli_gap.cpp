@@ -35,6 +35,7 @@ struct DiagnoseOptions {
   std::string out;
   std::string html;
   std::string updated_scene;
+  int replicates = 0;
   TableArguments table;
 };
 
@@ -48,7 +49,8 @@ struct DiagnosisInput {
 
 Read<DiagnosisInput> readDiagnosisInput(const DiagnoseOptions& options) {
   DiagnosisInput input;
-  auto nodes = readRowsArgument(options.nodes, options.table, SensorRows::kOne);
+  auto nodes =
+      readRowsArgument(options.nodes, options.table, options.against.empty() ? SensorRows::kAll : SensorRows::kOne);
   if (!nodes) return tl::unexpected(nodes.error());
   input.table = std::move(nodes->table);
   input.notes = std::move(nodes->notes);
@@ -100,7 +102,9 @@ Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common)
   const SampleTable* samples = input->samples ? &*input->samples : nullptr;
   const simulation::Scene* scene = input->scene ? &*input->scene : nullptr;
   const auto report = stoppable<gap::GapReport>(runControl(common, "diagnosing"), [&](const RunControl& control) {
-    return gap::diagnose(input->table, samples, scene, {}, control);
+    gap::DiagnosisOptions diagnosis;
+    diagnosis.replicates = options.replicates;
+    return gap::diagnose(input->table, samples, scene, diagnosis, control);
   });
   if (!report) return notPossible(report.error());
   if (const auto written = gap::writeGapReport(options.out, *report); !written) return notPossible(written.error());
@@ -134,6 +138,12 @@ void addDiagnose(CommandLine& line) {
       ->add_option("--scene", options->scene,
                    "What the simulator believes (*.scene.json); default an ideal tracker in free space")
       ->type_name("FILE");
+  command
+      ->add_option("--replicates", options->replicates,
+                   "Make the recording so many times again under what is found, diagnose each, and tell how often the "
+                   "same is named (0, the default: not; 50 is a good number, at most ten minutes)")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1000));
   command->add_option("--out", options->out, "Report to write (*.gap.json)")->type_name("FILE")->required();
   command->add_option("--html", options->html, "Page to write beside it")->type_name("FILE");
   command

@@ -107,6 +107,17 @@ std::string predictionsText(const gap::GapReport& report) {
   return text;
 }
 
+/// How sure the name is: odds over the next candidate, and the replicates where they were made.
+std::string trustText(const gap::GapReport& report) {
+  std::string text;
+  if (report.odds_over_next && !report.selected.empty() && report.candidates.size() > 1)
+    text = "Odds over the next candidate, " + report.candidates[1].effect + ": " +
+           (*report.odds_over_next > 1000.0 ? std::string("more than 1000") : fixedText(*report.odds_over_next, 1)) +
+           " to 1.\n";
+  if (report.replicates) text += "Made again: " + report.replicates->text + "\n";
+  return text;
+}
+
 /// Blocks with an empty line between them; empty ones are left out.
 std::string blocks(const std::vector<std::string>& texts) {
   std::string all;
@@ -122,7 +133,7 @@ std::string gapText(const gap::GapReport& report) {
   const std::string next = report.next_measurement.empty() ? "" : "Next: " + report.next_measurement + "\n";
   return blocks({std::string(gap::idOf(report.verdict)) + ": " + report.text + "\n" + gapLine(report),
                  findingsText(report), candidatesText(report), sequenceText(report),
-                 remainingText(report) + predictionsText(report), next});
+                 remainingText(report) + predictionsText(report), next, trustText(report)});
 }
 
 std::string isolabilityText(const gap::Isolability& isolability) {

@@ -205,6 +205,7 @@ void FastrakDevice::stop() {
 TableMetadata FastrakDevice::describe() const {
   TableMetadata metadata;
   metadata.tracker = "Polhemus Fastrak";
+  metadata.transmitter_model = "dipole";
   metadata.excitation = "ac";
   metadata.setup["tracker_kind"] = "fastrak";
   if (!identity_) return metadata;

@@ -100,6 +100,7 @@ void SimulatedDevice::guideTo(const Pose& reference_from_sensor) {
 TableMetadata SimulatedDevice::describe() const {
   TableMetadata metadata = FastrakDevice::describe();
   metadata.tracker = "simulated tracker in " + scene_.name;
+  metadata.transmitter_model = "dipole";
   // How the emulated line was set up says nothing of this tracker, and names another.
   std::erase_if(metadata.other, [](const auto& entry) { return entry.first.starts_with("fastrak_"); });
   metadata.setup = {{"tracker_kind", "simulated"}, {"room", scene_.name}};

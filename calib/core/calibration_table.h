@@ -72,7 +72,8 @@ struct TableMetadata {
   std::optional<std::string> tracker;
   std::optional<std::string> rig;
   std::optional<std::string> date;
-  std::optional<std::string> excitation;  ///< `ac` or `pulsed_dc`.
+  std::optional<std::string> excitation;         ///< `ac` or `pulsed_dc`.
+  std::optional<std::string> transmitter_model;  ///< `dipole`, `planar_coils`, `optical` or `unknown`; none = dipole.
   std::optional<double> carrier_hz;
   std::optional<double> rate_hz;
   std::optional<double> quantum_m;
@@ -94,6 +95,7 @@ void forEachStatement(Visit visit) {
   visit("rig", &TableMetadata::rig);
   visit("date", &TableMetadata::date);
   visit("excitation", &TableMetadata::excitation);
+  visit("transmitter_model", &TableMetadata::transmitter_model);
   visit("carrier_hz", &TableMetadata::carrier_hz);
   visit("rate_hz", &TableMetadata::rate_hz);
   visit("quantum_m", &TableMetadata::quantum_m);

@@ -61,6 +61,7 @@ Effect correlatedSamplesEffect() {
                            .plausibly(0.0, 0.98)};
   effect.make = make;
   effect.detect = detect;
+  effect.needs_dipoles = false;
   return effect;
 }
 

@@ -27,6 +27,8 @@ struct Effect {
   /// The ways to fit it to a table of this design, simplest first; null for what only samples show. A way whose
   /// parameters the design cannot show at all (time without times, a lever arm with one orientation) is left out.
   std::vector<std::unique_ptr<EffectFit>> (*fits)(const FitDesign& design) = nullptr;
+  bool needs_dipoles =
+      true;  ///< By the physics of a transmitter of dipoles; false for what the rig does to any tracker.
   bool acts_in_time = false;  ///< What it does changes during the session: nothing to be found without times.
   /// Of what it explains, it has to win by this share: above 0 for an effect that is freer than others to fit what they
   /// leave over.

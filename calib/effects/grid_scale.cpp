@@ -56,6 +56,7 @@ Effect gridScaleEffect() {
                            .plausibly(-kPlausible, kPlausible)};
   effect.make = make;
   effect.fits = fits;
+  effect.needs_dipoles = false;
   return effect;
 }
 

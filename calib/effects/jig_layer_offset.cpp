@@ -183,6 +183,7 @@ Effect jigLayerOffsetEffect() {
           .plausibly(-kPlausible_m, kPlausible_m)};
   effect.make = make;
   effect.fits = fits;
+  effect.needs_dipoles = false;
   return effect;
 }
 

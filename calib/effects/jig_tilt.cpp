@@ -73,6 +73,7 @@ Effect jigTiltEffect() {
           .plausibly(0.0, 1.0)};
   effect.make = make;
   effect.fits = fits;
+  effect.needs_dipoles = false;
   return effect;
 }
 

@@ -112,6 +112,7 @@ Effect mainsInterferenceEffect() {
                        declare::number("phase_rad", {-100.0, 100.0, "rad"}, 0.0, "Of every line at time 0.")};
   effect.make = make;
   effect.detect = detect;
+  effect.needs_dipoles = false;
   return effect;
 }
 

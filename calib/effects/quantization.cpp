@@ -69,6 +69,7 @@ Effect quantizationEffect() {
           .plausibly(0.0, 0.02)};
   effect.make = make;
   effect.detect = detect;
+  effect.needs_dipoles = false;
   return effect;
 }
 

@@ -75,6 +75,7 @@ Effect sensorOffsetEffect() {
                            .plausibly(-kPlausible_rad, kPlausible_rad)};
   effect.make = make;
   effect.fits = fits;
+  effect.needs_dipoles = false;
   return effect;
 }
 

@@ -59,6 +59,7 @@ Effect transmitterMisalignmentEffect() {
           .plausibly(-kPlausible_rad, kPlausible_rad)};
   effect.make = make;
   effect.fits = fits;
+  effect.needs_dipoles = false;
   return effect;
 }
 

@@ -12,6 +12,7 @@
 #include "calib/gap/isolability.h"
 #include "calib/gap/judgement.h"
 #include "calib/gap/next_measurement.h"
+#include "calib/gap/replicates.h"
 #include "calib/gap/verdict.h"
 #include "calib/gap/where.h"
 #include "calib/identify/sample_findings.h"
@@ -19,6 +20,7 @@
 #include "calib/identify/traces.h"
 #include "calib/recording/cleaning.h"
 #include "calib/recording/finding.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::gap {
 namespace {
@@ -112,43 +114,73 @@ void addTraces(const std::vector<identify::Trace>& traces, GapReport& report) {
       report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
 }
 
+/// What has no name is at least placed: where it is largest, and which places stand out.
+void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) {
+  constexpr std::size_t kMostNamed = 10;
+  if (!has_gap || !report.selected.empty()) return;
+  std::vector<int> nodes;
+  for (const GapNode& node : report.nodes)
+    if (node.is_flagged && std::find(nodes.begin(), nodes.end(), node.node) == nodes.end()) nodes.push_back(node.node);
+  if (nodes.empty()) return;
+  std::string text = nodes.size() == 1 ? "One place does not fit the others: " : "Places that do not fit the others: ";
+  text += report.names.list(nodes, kMostNamed) + ".";
+  if (report.hotspot && !rows.has_dipoles && nodes.size() * 3 < rows.place_nodes.size()) {
+    const Eigen::Vector3d& at = report.hotspot->center_m;
+    text += " Something local acts within " + shown(report.hotspot->radius_m) + " m of (" + shown(at.x()) + ", " +
+            shown(at.y()) + ", " + shown(at.z()) + ") m.";
+  }
+  report.findings.push_back({"", text, nodes});
+}
+
+/// What the physics of the tracker is taken to be is said where it matters.
+void addAssumption(const TableMetadata& metadata, GapReport& report) {
+  const std::string model = metadata.transmitter_model.value_or("");
+  if (model == "dipole") return;
+  const std::string text = model.empty()
+                               ? "The table states no transmitter_model: a transmitter of dipoles is assumed."
+                               : "The transmitter is no dipole (transmitter_model: " + model +
+                                     "): only errors of the rig are named; metal and coils would need its own physics.";
+  report.findings.push_back({"", text, {}});
+}
+
 /// A tolerance that is stated too small is a finding: what scatters so is no gap.
 void addStatedTooSmall(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
   constexpr double kTold = 1.3;
-  const auto tell = [&](double seen, double said, const std::string& unit) {
-    if (!(said > 0.0) || seen < kTold * said) return;
+  const auto tell = [&](double seen, double said, double most, const std::string& unit) {
+    if (!(said > 0.0) || seen < kTold * said || seen > most) return;
     report.findings.push_back({"",
                                "The places are less exact than stated: " + shown(seen) + " " + unit + " instead of " +
                                    shown(said) + " " + unit + " (SD per axis). That is no gap.",
                                {}});
   };
-  tell(1e3 * search.placingSd_m(), 1e3 * stated.placing_sd_m.value_or(0.0), "mm");
+  tell(1e3 * search.placingSd_m(), 1e3 * stated.placing_sd_m.value_or(0.0), 1e3 * identify::worstPlacing_m(stated),
+       "mm");
   if (stated.has_orientation)
-    tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * stated.placing_sd_rad.value_or(0.0), "degrees");
+    tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * stated.placing_sd_rad.value_or(0.0),
+         kDegPerRad * identify::worstPlacing_rad(stated), "degrees");
 }
 
-/// What scatters from place to place beyond what a person with a jig does is told, for no tolerance says so.
-void addBoundOfFloor(const identify::GapSearch& search, GapReport& report) {
-  const auto tell = [&](double seen, double bound, const std::string& unit, const std::string& by_hand,
+/// What scatters from place to place beyond what can be placing is told.
+void addBoundOfFloor(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
+  const auto tell = [&](double seen, double bound, bool is_stated, const std::string& unit, const std::string& by_hand,
                         const std::string& remedy) {
-    if (!(seen > bound)) return;
+    if (!(seen > 1.001 * bound)) return;
+    const std::string why = is_stated ? "That is far more than the tolerance that is stated"
+                                      : "No tolerance is stated, and a person with a jig stays within " + shown(bound) +
+                                            " " + unit + " (" + by_hand + ")";
     report.findings.push_back({"",
                                "The places scatter by " + shown(seen) + " " + unit +
-                                   " (SD per axis) about any smooth field. No tolerance is stated, and a person with a "
-                                   "jig stays within " +
-                                   shown(bound) + " " + unit + " (" + by_hand +
-                                   "): the floor is held there, and what is above it counts as gap. " + remedy,
+                                   " (SD per axis) about any smooth field. " + why + ": the floor is held at " +
+                                   shown(bound) + " " + unit + ", and what is above it counts as gap. " + remedy,
                                {}});
   };
-  if (search.floorPlacingSd_m() < search.placingSd_m())
-    tell(1e3 * search.placingSd_m(), 1e3 * identify::kWorstPlacing_m, "mm",
-         "a foot set on its mark within a finger's breadth",
-         "Are true and tracked positions of the same places and of one sensor? Else state jig_tolerance_m.");
-  if (search.floorPlacingSd_rad() < search.placingSd_rad())
-    tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * identify::kWorstPlacing_rad, "degrees",
-         "turned and held upright by eye within ten degrees",
-         "Are the true orientations those of the places, and all rows of one sensor? Else state jig_tolerance_rad, or "
-         "leave the columns of the orientation out.");
+  tell(1e3 * search.placingSd_m(), 1e3 * search.floorPlacingSd_m(), stated.placing_sd_m.has_value(), "mm",
+       "a foot set on its mark within a finger's breadth",
+       "Are true and tracked positions of the same places and of one sensor? Else state jig_tolerance_m.");
+  tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * search.floorPlacingSd_rad(), stated.placing_sd_rad.has_value(),
+       "degrees", "turned and held upright by eye within ten degrees",
+       "Are the true orientations those of the places, and all rows of one sensor? Else state jig_tolerance_rad, or "
+       "leave the columns of the orientation out.");
 }
 
 /// Effects that single readings show stand beside those that the poses show.
@@ -163,6 +195,16 @@ void selectSignalFindings(GapReport& report) {
     effect.probability = 1.0;
     report.selected.push_back(std::move(effect));
   }
+}
+
+/// What single readings show; of several sensors, those of the first.
+void addSignalFindings(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
+                       int sensor, GapReport& report) {
+  const auto own = rowsOfSensor(table, sensor);
+  std::optional<SampleTable> own_samples;
+  if (samples != nullptr) own_samples = rowsOfSensor(*samples, sensor);
+  const auto found = identify::sampleFindings(own_samples ? &*own_samples : nullptr, own ? *own : table, scene);
+  report.findings.insert(report.findings.end(), found.begin(), found.end());
 }
 
 void describeInput(const identify::GapRows& rows, const SampleTable* samples, GapReport& report) {
@@ -195,28 +237,39 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   report.names = std::move(cleaned.names);
   describeInput(rows, samples, report);
   report.findings = std::move(cleaned.findings);
-  for (recording::GapFinding& finding : identify::sampleFindings(samples, table, scene))
-    report.findings.push_back(std::move(finding));
-  control.progress(0.03);
+  addSignalFindings(table, samples, scene, rows.sensors.front(), report);
+  control.progress(0.01);
 
+  addAssumption(table.metadata, report);
+  const bool is_mirrored = identify::isMirrored(rows);
+  if (is_mirrored)
+    report.findings.push_back(
+        {"",
+         "True and tracked positions are mirror images: an axis has the wrong sign, or two are exchanged. "
+         "Put that right first; causes are not looked for.",
+         {}});
   const identify::GapSearch search(rows, std::move(believed));
-  control.progress(0.1);
+  control.progress(0.01);
   identify::EffectSelectionOptions selecting;
   const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
-  selecting.most_effects = has_enough ? options.most_effects : 0;
-  const identify::EffectSelection selection = identify::selectEffects(search, selecting, partOf(control, 0.1, 0.7));
+  selecting.most_effects = has_enough && !is_mirrored ? options.most_effects : 0;
+  const double part = options.replicates > 0 ? 0.1 : 1.0;  // Of the progress, without replicates.
+  const identify::EffectSelection selection =
+      identify::selectEffects(search, selecting, partOf(control, 0.1 * part, 0.7 * part));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
-  control.progress(0.7);
-  const Judgement judgement = judge(search, selection, partOf(control, 0.7, 0.9));
+  control.progress(0.7 * part);
+  const Judgement judgement = judge(search, selection, partOf(control, 0.7 * part, 0.9 * part));
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
-  control.progress(0.9);
+  control.progress(0.9 * part);
 
   describeWhere(search, judgement.selection.model.model, report);
   report.floor_position_mm = 1e3 * std::sqrt(judgement.far.floor_m2);
   if (rows.has_orientation) report.floor_orientation_deg = kDegPerRad * std::sqrt(judgement.far.floor_rad2);
   const identify::GapAlignment& alignment = judgement.selection.model.model.alignment;
   report.tracker_from_reference = alignment.tracker_from_reference;
-  report.sensor_from_mount = inverse(alignment.mount_from_sensor);
+  report.sensor_from_mount = inverse(alignment.mount_from_sensor.front());
+  for (std::size_t s = 0; s < rows.sensors.size(); ++s)
+    report.sensors_from_mounts[rows.sensors[s]] = inverse(alignment.mount_from_sensor[s]);
   report.p_value = search.structureOfNone().p_value;
   report.origin = search.structureOfNone().origin;
   const double scattered = scatteredShare(search, rows, report);
@@ -227,10 +280,11 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   report.rival = rivalOf(judgement);
   if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
     report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
-  addTraces(judgement.left.traces, report);
+  if (has_gap && rows.has_dipoles) addTraces(judgement.left.traces, report);
   addRest(judgement, report);
+  addMisfits(has_gap, rows, report);
   addStatedTooSmall(search, rows, report);
-  addBoundOfFloor(search, report);
+  addBoundOfFloor(search, rows, report);
   addSequence(judgement.far, report);
   report.remaining = remainingOf(judgement.far, rows);
   report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);
@@ -243,6 +297,16 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
                    std::to_string(identify::kFewestPlacesForCauses) + " are needed.";
   }
   selectSignalFindings(report);
+  if (options.replicates > 0) {
+    ReplicateOptions replicating;
+    replicating.wanted = options.replicates;
+    replicating.seed = options.seed;
+    replicating.most_effects = selecting.most_effects;
+    const auto believedAgain = [&] { return believedEffects(scene, rows.excitation).value(); };
+    report.replicates =
+        replicate(search, judgement, report.candidates, believedAgain, replicating, partOf(control, part, 1.0));
+    if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
+  }
   control.progress(1.0);
   return report;
 }

@@ -14,7 +14,8 @@ namespace fieldtrue::gap {
 
 struct DiagnosisOptions {
   int most_effects = 4;
-  std::uint64_t seed = 1;  ///< Of the bootstrap.
+  int replicates = 0;      ///< How many recordings are made again under what was found, to tell how far to trust it.
+  std::uint64_t seed = 1;  ///< Of those.
 };
 
 /// Where a recording differs from what the scene's simulator would have recorded, which unmodelled effect causes it,

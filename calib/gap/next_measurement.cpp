@@ -1,6 +1,7 @@
 #include "calib/gap/next_measurement.h"
 
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -163,7 +164,76 @@ bool proposeSeparation(const identify::GapSearch& search, const identify::Effect
   return true;
 }
 
-/// What taking away each selected body, plane or loop would change at the worst places.
+/// What would be left of the gap were an effect taken away and the rig aligned anew: linear in what the effect does.
+class Removal {
+ public:
+  explicit Removal(const identify::GapSearch& search)
+      : search_(search),
+        at_(search.physics(), search.none().model, search.whitening(), search.spaceBlocks()),
+        solver_(at_.nuisance()) {}
+
+  /// What a change of all poses takes from the gap at one row, alignment refitted [m].
+  Eigen::Vector3d takenAt(std::size_t row, std::span<const Pose> with, std::span<const Pose> without) const {
+    const int channels = at_.channels();
+    Eigen::VectorXd change = Eigen::VectorXd::Zero(at_.size());
+    Eigen::Index place = 0;
+    for (std::size_t k = 0; k < at_.order().size(); ++k) {
+      const std::size_t i = at_.order()[k];
+      const Eigen::Index begin = static_cast<Eigen::Index>(k) * channels;
+      if (i == row) place = begin;
+      change.segment<3>(begin) = search_.whitening().position[i] * (with[i].position_m - without[i].position_m);
+      if (channels == 6) {
+        change.segment<3>(begin + 3) = search_.whitening().rotation[i] *
+                                       rotationVector_rad(with[i].orientation * without[i].orientation.conjugate());
+      }
+    }
+    const Eigen::VectorXd left = change - at_.nuisance() * solver_.solve(change);
+    return search_.whitening().position[row].triangularView<Eigen::Lower>().solve(left.segment<3>(place));
+  }
+
+ private:
+  const identify::GapSearch& search_;
+  identify::Linearized at_;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver_;
+};
+
+identify::GapModel without(const identify::GapModel& model, std::size_t term) {
+  identify::GapModel rest = model;
+  rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  return rest;
+}
+
+/// How what each parameter of one term does shows at a row, per unit of the parameter; 3 by parameter.
+Eigen::Matrix3Xd sensitivityAt(const identify::GapSearch& search, const Removal& removal,
+                               const identify::GapModel& model, std::size_t term, std::size_t row) {
+  const std::vector<Pose> as_it_is = search.physics().predictions(model);
+  const Eigen::Index linear = model.terms[term].linear.size();
+  Eigen::Matrix3Xd sensitivity(3, linear + model.terms[term].searched.size());
+  for (Eigen::Index p = 0; p < sensitivity.cols(); ++p) {
+    identify::GapModel moved = model;
+    double& value = p < linear ? moved.terms[term].linear[p] : moved.terms[term].searched[p - linear];
+    const double h = 1e-4 * std::max(1e-3, std::abs(value));
+    value += h;
+    sensitivity.col(p) = removal.takenAt(row, search.physics().predictions(moved), as_it_is) / h;
+  }
+  return sensitivity;
+}
+
+/// Variance of what an effect does at a row, by the covariance of its parameters [m^2].
+double varianceOfEffect(const identify::GapSearch& search, const Removal& removal,
+                        const identify::RefinedModel& refined, std::size_t term, std::size_t row) {
+  if (refined.covariance.size() == 0) return 0.0;
+  Eigen::Index begin = refined.n_alignment;
+  for (std::size_t t = 0; t < term; ++t)
+    begin += refined.model.terms[t].linear.size() + refined.model.terms[t].searched.size();
+  const Eigen::Matrix3Xd J = sensitivityAt(search, removal, refined.model, term, row);
+  const Eigen::MatrixXd covariance = refined.covariance.block(begin, begin, J.cols(), J.cols());
+  const double variance = (J * covariance * J.transpose()).trace();
+  return std::isfinite(variance) ? std::max(0.0, variance) : 0.0;
+}
+
+/// What taking away each selected body, plane or loop would change at the worst places, the rig aligned anew; as sure
+/// as the fit and the noise let it be.
 void predictRemoval(const identify::GapSearch& search, const identify::EffectSelection& selection, GapReport& report) {
   std::vector<std::size_t> order(report.nodes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -171,22 +241,23 @@ void predictRemoval(const identify::GapSearch& search, const identify::EffectSel
     return report.nodes[a].before_m.squaredNorm() > report.nodes[b].before_m.squaredNorm();
   });
   order.resize(std::min<std::size_t>(3, order.size()));
-  const std::vector<Pose> with = search.physics().predictions(selection.model.model);
+  const identify::GapModel& model = selection.model.model;
+  const std::vector<Pose> with = search.physics().predictions(model);
+  const Removal removal(search);
   for (std::size_t t = 0; t < selection.ways.size(); ++t) {
-    if (selection.model.model.terms[t].effect->body == nullptr) continue;
-    identify::GapModel rest = selection.model.model;
-    rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(t));
-    const std::vector<Pose> without = search.physics().predictions(rest);
+    if (model.terms[t].effect->body == nullptr) continue;
+    const std::vector<Pose> rest = search.physics().predictions(without(model, t));
     for (const std::size_t i : order) {
-      const Eigen::Vector3d effect_m = with[i].position_m - without[i].position_m;
       const identify::Matrix6d noise =
           identify::noiseOf(search.physics().rows().rows[i], search.placingSd_m(), search.placingSd_rad());
+      const double variance_m2 =
+          noise.topLeftCorner<3, 3>().trace() + varianceOfEffect(search, removal, selection.model, t, i);
       Prediction prediction;
       prediction.effect = report.selected[t].effect;
       prediction.node = report.nodes[i].node;
       prediction.now_mm = 1e3 * report.nodes[i].before_m.norm();
-      prediction.then_mm = 1e3 * (report.nodes[i].before_m - effect_m).norm();
-      prediction.then_sd_mm = 1e3 * std::sqrt(noise.topLeftCorner<3, 3>().trace());
+      prediction.then_mm = 1e3 * (report.nodes[i].before_m - removal.takenAt(i, with, rest)).norm();
+      prediction.then_sd_mm = 1e3 * std::sqrt(variance_m2);
       report.predictions.push_back(prediction);
     }
   }

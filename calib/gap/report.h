@@ -69,6 +69,7 @@ struct SelectedEffect : GapCandidate {
 struct GapNode {
   int node = 0;
   int visit = 0;
+  int sensor = 0;
   Eigen::Vector3d place_m = Eigen::Vector3d::Zero();     ///< Where the rig says the sensor was, tracker frame.
   Eigen::Vector3d before_m = Eigen::Vector3d::Zero();    ///< Tracked minus simulated by the scene as given.
   Eigen::Vector3d after_m = Eigen::Vector3d::Zero();     ///< Tracked minus simulated with the selected effects.
@@ -161,6 +162,18 @@ struct RivalReport {
   std::string why;                   ///< A sentence; empty where nothing was refused.
 };
 
+/// How often recordings made again under the diagnosis are named as this one was.
+struct Replicates {
+  int n = 0;
+  int named_right = 0;
+  std::optional<double> within_m_median;  ///< From what stands in the room to where it was found again.
+  std::string runner_up;                  ///< Likeliest other cause; "" where there is none.
+  int runner_up_n = 0;
+  int runner_up_named_right = 0;
+  int runner_up_named_as_this = 0;
+  std::string text;
+};
+
 /// All that a diagnosis found; `*.gap.json` is this struct (design contract `fieldtrue.gap/1`).
 struct GapReport {
   struct Input {
@@ -171,7 +184,8 @@ struct GapReport {
     bool position_only = false;
   } input;
   Pose tracker_from_reference;
-  Pose sensor_from_mount;
+  Pose sensor_from_mount;                   ///< Of the first sensor.
+  std::map<int, Pose> sensors_from_mounts;  ///< Of each, by its number.
   GapVerdict verdict = GapVerdict::kNoGap;
   std::string text;  ///< One sentence: what was found, how sure, what to do.
   std::vector<SmallestDetectable> smallest_detectable;
@@ -195,6 +209,7 @@ struct GapReport {
   std::vector<GapStep> sequence;         ///< Start, then after each selected effect.
   Remaining remaining;
   RivalReport rival;
+  std::optional<Replicates> replicates;
   std::optional<double> odds_over_next;  ///< Of the first candidate over the second.
   Isolability isolability;
   std::string next_measurement;

@@ -40,6 +40,15 @@ json listToJson(const Items& items, ToJson to_json) {
   return list;
 }
 
+json mountsToJson(const std::map<int, Pose>& mounts) {
+  json list = json::array();
+  for (const auto& [sensor, mount] : mounts) {
+    list.push_back(poseToJson(mount));
+    list.back()["sensor"] = sensor;
+  }
+  return list;
+}
+
 json inputToJson(const GapReport::Input& input) {
   return {{"places", input.places},
           {"rows", input.rows},
@@ -60,6 +69,7 @@ json gapToJson(const GapReport& report) {
 json nodeToJson(const GapNode& node, bool position_only) {
   json to = {{"node", node.node},
              {"visit", node.visit},
+             {"sensor", node.sensor},
              {"gap_mm", numberToJson(kMmPerM * node.before_m.norm())},
              {"gap_deg", nullptr},
              {"excess", numberToJson(node.excess)},
@@ -194,6 +204,20 @@ json rivalToJson(const RivalReport& rival) {
           {"why", rival.why}};
 }
 
+json replicatesToJson(const Replicates& replicates) {
+  json to = {{"n", replicates.n},
+             {"named_right", replicates.named_right},
+             {"within_m_median", numberToJson(replicates.within_m_median)},
+             {"runner_up", nullptr},
+             {"text", replicates.text}};
+  if (replicates.runner_up.empty()) return to;
+  to["runner_up"] = {{"effect", replicates.runner_up},
+                     {"n", replicates.runner_up_n},
+                     {"named_right", replicates.runner_up_named_right},
+                     {"named_as_this", replicates.runner_up_named_as_this}};
+  return to;
+}
+
 json predictionToJson(const Prediction& prediction) {
   return {{"effect", prediction.effect},
           {"node", prediction.node},
@@ -229,7 +253,8 @@ json toJson(const GapReport& report) {
           {"input", inputToJson(report.input)},
           {"alignment",
            {{"tracker_from_reference", poseToJson(report.tracker_from_reference)},
-            {"sensor_mount", poseToJson(report.sensor_from_mount)}}},
+            {"sensor_mount", poseToJson(report.sensor_from_mount)},
+            {"sensor_mounts", mountsToJson(report.sensors_from_mounts)}}},
           {"verdict", std::string(idOf(report.verdict))},
           {"text", report.text},
           {"smallest_detectable", listToJson(report.smallest_detectable, detectableToJson)},
@@ -242,7 +267,7 @@ json toJson(const GapReport& report) {
           {"remaining", remainingToJson(report.remaining)},
           {"rival", rivalToJson(report.rival)},
           {"odds_over_next", numberToJson(report.odds_over_next)},
-          {"replicates", nullptr},
+          {"replicates", report.replicates ? replicatesToJson(*report.replicates) : json(nullptr)},
           {"against", nullptr},
           {"isolability", toJson(report.isolability)},
           {"next_measurement", {{"text", report.next_measurement}, {"separates", report.next_separates}}},

@@ -188,6 +188,21 @@ void readRival(const JsonReader& reader, RivalReport& rival) {
   rival.why = reader["why"].text();
 }
 
+Replicates replicatesFrom(const JsonReader& reader) {
+  Replicates replicates;
+  replicates.n = reader["n"].integer();
+  replicates.named_right = reader["named_right"].integer();
+  replicates.within_m_median = reader["within_m_median"].optionalNumber();
+  replicates.text = reader["text"].text();
+  const JsonReader other = reader["runner_up"];
+  if (other.isNull()) return replicates;
+  replicates.runner_up = other["effect"].text();
+  replicates.runner_up_n = other["n"].integer();
+  replicates.runner_up_named_right = other["named_right"].integer();
+  replicates.runner_up_named_as_this = other["named_as_this"].integer();
+  return replicates;
+}
+
 Isolability isolabilityFrom(const JsonReader& reader) {
   Isolability isolability;
   isolability.pairs = reader["pairs"].list([](const JsonReader& pair) {
@@ -204,6 +219,10 @@ GapReport reportFrom(const JsonReader& root) {
   report.input = inputFrom(root["input"]);
   report.tracker_from_reference = root["alignment"]["tracker_from_reference"].pose();
   report.sensor_from_mount = root["alignment"]["sensor_mount"].pose();
+  if (const auto mounts = root["alignment"].find("sensor_mounts")) {
+    for (const JsonReader& mount : mounts->entries())
+      report.sensors_from_mounts[mount["sensor"].integer()] = mount.pose();
+  }
   report.verdict = verdictFrom(root["verdict"]);
   report.text = root["text"].text();
   readGap(root["gap"], report);
@@ -211,6 +230,8 @@ GapReport reportFrom(const JsonReader& root) {
   readLists(root, report);
   readRemaining(root["remaining"], report);
   if (root.has("rival")) readRival(root["rival"], report.rival);
+  if (const auto replicates = root.find("replicates"); replicates && !replicates->isNull())
+    report.replicates = replicatesFrom(*replicates);
   if (root.has("odds_over_next")) report.odds_over_next = root["odds_over_next"].optionalNumber();
   report.isolability = isolabilityFrom(root["isolability"]);
   report.next_measurement = root["next_measurement"]["text"].text();

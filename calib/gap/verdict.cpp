@@ -71,12 +71,10 @@ std::string fallText(const GapReport& report) {
 }  // namespace
 
 double scatteredShare(const identify::GapSearch& search, const identify::GapRows& stated, const GapReport& report) {
-  constexpr double kStatedTooSmall = 2.2;  // A stated tolerance that is at most so much too small is no gap.
-  const double bound_m = std::max(identify::kWorstPlacing_m, kStatedTooSmall * stated.placing_sd_m.value_or(0.0));
-  const double bound_rad = std::max(identify::kWorstPlacing_rad, kStatedTooSmall * stated.placing_sd_rad.value_or(0.0));
-  double share = shareAbove(search.placingSd_m(), bound_m, 1e-3 * report.position_rms_mm);
+  double share = shareAbove(search.placingSd_m(), identify::worstPlacing_m(stated), 1e-3 * report.position_rms_mm);
   if (report.orientation_rms_deg)
-    share = std::max(share, shareAbove(search.placingSd_rad(), bound_rad, *report.orientation_rms_deg / kDegPerRad));
+    share = std::max(share, shareAbove(search.placingSd_rad(), identify::worstPlacing_rad(stated),
+                                       *report.orientation_rms_deg / kDegPerRad));
   return share;
 }
 

@@ -194,6 +194,7 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
     GapNode node;
     node.node = table.rows[i].node;
     node.visit = table.rows[i].visit;
+    node.sensor = table.sensors[table.rows[i].sensor];
     node.place_m = settings[i].tracker_from_sensor.position_m;
     node.before_m = before[i].head<3>();
     node.after_m = after[i].head<3>();

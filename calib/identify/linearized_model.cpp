@@ -22,8 +22,13 @@ field::EffectResponse moved(const Eigen::Vector3d& shift_m, const Eigen::Vector3
   return response;
 }
 
-/// What the alignment's parameters do at a setting: shift 3, rotation about the centre 3, mounting 3, lever arm 3.
-std::vector<field::EffectResponse> alignmentResponses(const field::SensorSetting& setting,
+/// Whether the arm from the mount to a sensor is a parameter: of the first it moves the places as the rig's shift does,
+/// unless the sensor is turned.
+bool hasArm(const GapRows& rows, std::size_t sensor) { return sensor > 0 || rows.several_orientations; }
+
+/// What the alignment's parameters do at a setting: shift 3, rotation about the centre 3, then of each sensor its
+/// mounting 3 and its arm 3.
+std::vector<field::EffectResponse> alignmentResponses(const field::SensorSetting& setting, std::size_t sensor,
                                                       const Eigen::Vector3d& center_m, const GapRows& rows) {
   std::vector<field::EffectResponse> responses;
   if (!hasFreeAlignment(rows)) return responses;
@@ -33,10 +38,13 @@ std::vector<field::EffectResponse> alignmentResponses(const field::SensorSetting
   for (int k = 0; k < 3; ++k)
     responses.push_back(moved(Eigen::Vector3d::Unit(k).cross(arm_m), Eigen::Vector3d::Unit(k)));
   if (rows.alignment_known) return responses;
-  if (rows.has_orientation)
-    for (int k = 0; k < 3; ++k) responses.push_back(moved(Eigen::Vector3d::Zero(), R.col(k)));
-  if (rows.several_orientations)
-    for (int k = 0; k < 3; ++k) responses.push_back(moved(R.col(k), Eigen::Vector3d::Zero()));
+  for (std::size_t s = 0; s < rows.sensors.size(); ++s) {
+    const Eigen::Matrix3d own = s == sensor ? R : Eigen::Matrix3d::Zero();
+    if (rows.has_orientation)
+      for (int k = 0; k < 3; ++k) responses.push_back(moved(Eigen::Vector3d::Zero(), own.col(k)));
+    if (hasArm(rows, s))
+      for (int k = 0; k < 3; ++k) responses.push_back(moved(own.col(k), Eigen::Vector3d::Zero()));
+  }
   return responses;
 }
 
@@ -79,13 +87,17 @@ void applyAlignmentStep(const Eigen::VectorXd& step, const Eigen::Vector3d& cent
   rig.orientation = (turn * rig.orientation).normalized();
   Eigen::Index at = 6;
   if (rows.alignment_known) return;
-  if (rows.has_orientation) {
-    alignment.mount_from_sensor.orientation =
-        (alignment.mount_from_sensor.orientation * rotationFromVector(step.segment<3>(at))).normalized();
-    at += 3;
+  for (std::size_t s = 0; s < rows.sensors.size(); ++s) {
+    Pose& mount = alignment.mount_from_sensor[s];
+    if (rows.has_orientation) {
+      mount.orientation = (mount.orientation * rotationFromVector(step.segment<3>(at))).normalized();
+      at += 3;
+    }
+    if (hasArm(rows, s)) {
+      mount.position_m += mount.orientation * step.segment<3>(at);
+      at += 3;
+    }
   }
-  if (rows.several_orientations)
-    alignment.mount_from_sensor.position_m += alignment.mount_from_sensor.orientation * step.segment<3>(at);
 }
 
 Vector6d alignmentDeviation(const GapAlignment& alignment, const GapRows& rows, const Eigen::Vector3d& center_m) {
@@ -180,8 +192,9 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
 void Linearized::addAlignment(const GapRows& rows, const GapAlignment& alignment) {
   const Eigen::Vector3d center_m = alignmentCenter_m(settings_);
   std::vector<field::EffectResponse> responses;
-  for (const field::SensorSetting& setting : settings_) {
-    const std::vector<field::EffectResponse> at = alignmentResponses(setting, center_m, rows);
+  for (std::size_t k = 0; k < settings_.size(); ++k) {
+    const std::vector<field::EffectResponse> at =
+        alignmentResponses(settings_[k], rows.rows[order_[k]].sensor, center_m, rows);
     responses.insert(responses.end(), at.begin(), at.end());
   }
   n_alignment_ = static_cast<int>(responses.size() / settings_.size());

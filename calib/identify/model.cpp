@@ -9,8 +9,9 @@ std::vector<field::SensorSetting> GapPhysics::settings(const GapAlignment& align
   std::vector<field::SensorSetting> settings;
   settings.reserve(size());
   for (const GapRow& row : rows_.rows) {
-    settings.push_back({alignment.tracker_from_reference * row.reference_from_sensor * alignment.mount_from_sensor,
-                        alignment.tracker_from_reference, row.index, row.time_s});
+    settings.push_back(
+        {alignment.tracker_from_reference * row.reference_from_sensor * alignment.mount_from_sensor[row.sensor],
+         alignment.tracker_from_reference, row.index, row.time_s});
   }
   return settings;
 }
@@ -59,6 +60,7 @@ std::vector<Vector6d> GapPhysics::residuals(const GapModel& model) const {
 
 GapAlignment initialAlignment(const GapRows& table) {
   GapAlignment alignment;
+  alignment.mount_from_sensor.resize(table.sensors.size());
   alignment.tracker_from_reference = table.stated_tracker_from_reference;
   if (table.alignment_known) return alignment;
   std::vector<Eigen::Vector3d> p_true_m;
@@ -69,13 +71,14 @@ GapAlignment initialAlignment(const GapRows& table) {
   }
   if (const auto rigid = fitRigid(p_true_m, p_tracked_m)) alignment.tracker_from_reference = *rigid;
   if (!table.has_orientation) return alignment;
-  std::vector<Eigen::Quaterniond> mounting;
+  std::vector<std::vector<Eigen::Quaterniond>> mounting(table.sensors.size());
   for (const GapRow& row : table.rows) {
     const Eigen::Quaterniond tracker_from_mount =
         alignment.tracker_from_reference.orientation * row.reference_from_sensor.orientation;
-    mounting.push_back(tracker_from_mount.conjugate() * row.tracker_from_sensor.orientation);
+    mounting[row.sensor].push_back(tracker_from_mount.conjugate() * row.tracker_from_sensor.orientation);
   }
-  alignment.mount_from_sensor.orientation = meanRotation(mounting);
+  for (std::size_t s = 0; s < mounting.size(); ++s)
+    alignment.mount_from_sensor[s].orientation = meanRotation(mounting[s]);
   return alignment;
 }
 

@@ -14,7 +14,8 @@ namespace fieldtrue::identify {
 /// The rig in the tracker's frame, and the sensor in its holder: refitted inside every model, never an effect.
 struct GapAlignment {
   Pose tracker_from_reference;
-  Pose mount_from_sensor;  ///< The rig's pose times this is the sensor's.
+  /// Of each sensor: the rig's pose times this is the sensor's.
+  std::vector<Pose> mount_from_sensor;
 };
 
 /// One fitted effect in a model.

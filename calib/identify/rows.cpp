@@ -1,9 +1,11 @@
 #include "calib/identify/rows.h"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "calib/core/statistics.h"
 
@@ -47,11 +49,15 @@ Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& me
   table.has_orientation = std::all_of(nodes.begin(), nodes.end(), [](const Node& n) { return n.has_orientation; });
   table.has_times = std::all_of(nodes.begin(), nodes.end(), [](const Node& n) { return n.t_start_s.has_value(); });
   std::map<int, std::size_t> place_of;
+  std::set<int> sensors;
+  for (const Node& node : nodes) sensors.insert(node.sensor);
+  table.sensors.assign(sensors.begin(), sensors.end());
   for (const Node& node : nodes) {
     GapRow row = rowOf(node);
     const auto [found, is_new] = place_of.emplace(node.node, table.place_nodes.size());
     if (is_new) table.place_nodes.push_back(node.node);
     row.place = found->second;
+    row.sensor = static_cast<std::size_t>(std::distance(sensors.begin(), sensors.find(node.sensor)));
     table.rows.push_back(row);
   }
   if (table.place_nodes.size() < kFewestPlaces) {
@@ -67,9 +73,18 @@ Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& me
   const double quantum_m = metadata.quantum_m.value_or(0.0);
   if (metadata.jig_tolerance_m) table.placing_sd_m = std::hypot(*metadata.jig_tolerance_m, quantum_m / std::sqrt(12.0));
   if (metadata.jig_tolerance_rad) table.placing_sd_rad = *metadata.jig_tolerance_rad;
+  table.has_dipoles = metadata.transmitter_model.value_or("dipole") == "dipole";
   table.excitation.is_pulsed_dc = metadata.excitation == "pulsed_dc";
   if (metadata.carrier_hz) table.excitation.carrier_hz = *metadata.carrier_hz;
   return table;
+}
+
+double worstPlacing_m(const GapRows& rows) {
+  return std::max(kWorstPlacing_m, kStatedTooSmall * rows.placing_sd_m.value_or(0.0));
+}
+
+double worstPlacing_rad(const GapRows& rows) {
+  return std::max(kWorstPlacing_rad, kStatedTooSmall * rows.placing_sd_rad.value_or(0.0));
 }
 
 Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad) {
@@ -82,6 +97,30 @@ Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad) 
       (row.mean_rotation_variance_rad2 + placing_sd_rad * placing_sd_rad + kLeast_rad * kLeast_rad) *
       Eigen::Matrix3d::Identity();
   return noise;
+}
+
+bool isMirrored(const GapRows& table) {
+  constexpr double kFarBetter = 0.3;
+  Eigen::Vector3d middle_true_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d middle_tracked_m = Eigen::Vector3d::Zero();
+  const auto n = static_cast<double>(table.rows.size());
+  for (const GapRow& row : table.rows) {
+    middle_true_m += row.reference_from_sensor.position_m / n;
+    middle_tracked_m += row.tracker_from_sensor.position_m / n;
+  }
+  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
+  double squares = 0.0;
+  for (const GapRow& row : table.rows) {
+    const Eigen::Vector3d a = row.reference_from_sensor.position_m - middle_true_m;
+    const Eigen::Vector3d b = row.tracker_from_sensor.position_m - middle_tracked_m;
+    cross += a * b.transpose();
+    squares += a.squaredNorm() + b.squaredNorm();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross);
+  if (cross.determinant() >= 0.0) return false;
+  const double mirrored = squares - 2.0 * svd.singularValues().sum();
+  const double turned = mirrored + 4.0 * svd.singularValues()[2];
+  return mirrored < kFarBetter * kFarBetter * turned;
 }
 
 namespace {

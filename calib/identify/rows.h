@@ -17,7 +17,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 struct GapRow {
   int node = 0;
   int visit = 0;
-  std::size_t place = 0;  ///< Rows of one place share it; every hold-out removes whole places.
+  std::size_t sensor = 0;  ///< Index into GapRows::sensors.
+  std::size_t place = 0;   ///< Rows of one place share it; every hold-out removes whole places.
   Pose reference_from_sensor;
   Pose tracker_from_sensor;
   std::optional<std::array<int, 3>> index;
@@ -30,6 +31,9 @@ struct GapRow {
 struct GapRows {
   std::vector<GapRow> rows;
   std::vector<int> place_nodes;  ///< Node number of each place.
+  std::vector<int> sensors;      ///< Number of each sensor, each in a mounting of its own.
+  /// Whether the physics of a transmitter of dipoles may be claimed; else only what the rig does has a name.
+  bool has_dipoles = true;
   bool has_orientation = true;
   bool has_times = false;
   bool several_orientations = false;
@@ -54,6 +58,11 @@ constexpr std::size_t kFewestPlacesForCauses = 12;
 /// more than that is no placing, whatever it is, and stays above the floor.
 constexpr double kWorstPlacing_m = 0.010;
 constexpr double kWorstPlacing_rad = 0.087;
+/// A tolerance that is stated at most so much too small is a finding; what scatters more is no placing.
+constexpr double kStatedTooSmall = 2.2;
+/// The most that may be placing, SD per axis.
+double worstPlacing_m(const GapRows& rows);
+double worstPlacing_rad(const GapRows& rows);
 
 /// @param nodes rows that count, cleaned
 /// @error kTooFewNodes below 8 places
@@ -61,6 +70,10 @@ Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& me
 
 /// Noise covariance of one row: samples, placing and quantum; position [m^2] before rotation [rad^2].
 Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad);
+
+/// Whether tracked positions fit a mirror image of the true ones far better than any turn of them.
+/// @source Umeyama 1991, IEEE PAMI 13 376, the sign of the determinant
+bool isMirrored(const GapRows& rows);
 
 /// Eight blocks of places by the octant of their true position about the median, those of fewer than `fewest` places
 /// joined with the smallest other; for each row its block.

@@ -53,9 +53,10 @@ std::vector<recording::GapFinding> sampleFindings(const SampleTable* samples, co
                                                   const simulation::Scene* scene) {
   effects::SignalBelief belief = beliefOf(scene, table.metadata);
   const effects::SampleEvidence evidence = evidenceOf(samples, table, belief.signal.quantum_m);
+  const bool has_dipoles = table.metadata.transmitter_model.value_or("dipole") == "dipole";
   std::vector<recording::GapFinding> findings;
   for (const effects::Effect& effect : effects::effects()) {
-    if (effect.detect == nullptr) continue;
+    if (effect.detect == nullptr || (effect.needs_dipoles && !has_dipoles)) continue;
     belief.has_effect = holds(scene, effect.id);
     effect.detect(evidence, belief, findings);
   }

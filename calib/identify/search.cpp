@@ -100,13 +100,9 @@ double GapSearch::whitenedUnit_mm() const {
   return 1e3 * std::sqrt(sum_m2 / static_cast<double>(rows_.rows.size()));
 }
 
-double GapSearch::floorPlacingSd_m() const {
-  return rows_.placing_sd_m ? placing_sd_m_ : std::min(placing_sd_m_, kWorstPlacing_m);
-}
+double GapSearch::floorPlacingSd_m() const { return std::min(placing_sd_m_, worstPlacing_m(rows_)); }
 
-double GapSearch::floorPlacingSd_rad() const {
-  return rows_.placing_sd_rad ? placing_sd_rad_ : std::min(placing_sd_rad_, kWorstPlacing_rad);
-}
+double GapSearch::floorPlacingSd_rad() const { return std::min(placing_sd_rad_, worstPlacing_rad(rows_)); }
 
 void GapSearch::settleWays() {
   settings_ = physics_.settings(none_.model.alignment);
@@ -123,7 +119,7 @@ void GapSearch::settleWays() {
   design_.several_orientations = rows_.several_orientations;
   design_.excitation = rows_.excitation;
   for (const effects::Effect& effect : effects::effects()) {
-    if (effect.fits == nullptr) continue;
+    if (effect.fits == nullptr || (effect.needs_dipoles && !rows_.has_dipoles)) continue;
     for (auto& fit : effect.fits(design_)) ways_.push_back({&effect, std::move(fit), effect.acts_in_time});
   }
 }

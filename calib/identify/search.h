@@ -57,7 +57,8 @@ class GapSearch {
   double placingSd_rad() const { return placing_sd_rad_; }
   /// RMS over the rows of the noise that the whitening takes positions to have: one whitened unit [mm].
   double whitenedUnit_mm() const;
-  /// What of the placing counts as noise: where no tolerance is stated, no more than a person with a jig errs by.
+  /// What of the placing counts as noise: no more than a person with a jig errs by, or than what is stated a good deal
+  /// too small.
   double floorPlacingSd_m() const;
   double floorPlacingSd_rad() const;
 

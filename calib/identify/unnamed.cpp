@@ -85,6 +85,18 @@ double UnnamedRival::logEvidence(std::span<const Vector6d> residuals, const Unna
   return sum * static_cast<double>(points_.size()) / static_cast<double>(rows.size());
 }
 
+std::vector<Vector6d> UnnamedRival::foretold(const UnnamedLaws& laws, std::span<const Vector6d> residuals) const {
+  const std::vector<std::size_t> some = evenChoice(points_.size(), kMostRows);
+  std::vector<Vector6d> values(points_.size(), Vector6d::Zero());
+  for (const bool rotation : {false, true}) {
+    const SmoothLaw& law = rotation ? laws.rotation : laws.position;
+    if (law.isNothing() || (rotation && !rows_.has_orientation)) continue;
+    const SmoothField field(pointsOf(some), valuesOf(residuals, some, rotation), variancesOf(some, rotation), law);
+    for (std::size_t i = 0; i < points_.size(); ++i) values[i].segment<3>(rotation ? 3 : 0) = field.at(points_[i]);
+  }
+  return values;
+}
+
 void UnnamedRival::takeAway(std::span<const UnnamedLaws> laws, std::span<const char> used,
                             std::vector<Vector6d>& residuals) const {
   std::vector<std::size_t> known;

@@ -24,6 +24,8 @@ class UnnamedRival {
   UnnamedLaws likeliestLaws(std::span<const Vector6d> residuals) const;
   /// Log density of the residuals under noise and such a field; of many rows an even choice, scaled to all.
   double logEvidence(std::span<const Vector6d> residuals, const UnnamedLaws& laws) const;
+  /// What such a field is at every row, by the residuals of all.
+  std::vector<Vector6d> foretold(const UnnamedLaws& laws, std::span<const Vector6d> residuals) const;
   /// Takes away from the rows that are not used what the used ones foretell of them, by the law that these like best.
   void takeAway(std::span<const UnnamedLaws> laws, std::span<const char> used, std::vector<Vector6d>& residuals) const;
 

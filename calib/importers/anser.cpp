@@ -64,6 +64,7 @@ Result<Import> importAnser(const std::filesystem::path& path, const std::optiona
                 reader.name() + " has no condition " + wanted + "; its conditions are " + joined(found));
   }
   table.metadata.tracker = "Anser EMT";
+  table.metadata.transmitter_model = "planar_coils";
   table.metadata.rig = "LEGO Duplo board, 31.75 mm pitch";
   table.metadata.other["condition"] = wanted;
   Import import;

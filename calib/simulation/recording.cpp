@@ -126,6 +126,7 @@ TableMetadata metadataOf(const Scene& scene, std::uint64_t seed) {
   metadata.tracker = tracker.name;
   metadata.rig = rig.name;
   metadata.excitation = tracker.excitation;
+  metadata.transmitter_model = "dipole";
   metadata.rate_hz = tracker.rate_hz;
   if (tracker.excitation == "ac") metadata.carrier_hz = tracker.carrier_hz;
   if (tracker.quantum_m > 0.0) metadata.quantum_m = tracker.quantum_m;

@@ -17,9 +17,10 @@ struct WordKey {
   std::string_view key;
   std::vector<std::string_view> words;
 };
-const std::array<WordKey, 3>& wordKeys() {
-  static const std::array<WordKey, 3> keys{{{"frame", {"tracker", "jig", "room"}},
+const std::array<WordKey, 4>& wordKeys() {
+  static const std::array<WordKey, 4> keys{{{"frame", {"tracker", "jig", "room"}},
                                             {"excitation", {"ac", "pulsed_dc"}},
+                                            {"transmitter_model", {"dipole", "planar_coils", "optical", "unknown"}},
                                             {"alignment", {"known", "unknown"}}}};
   return keys;
 }

@@ -34,10 +34,12 @@ namespace {
 
 constexpr std::size_t kFewestRows = 12;
 constexpr int kGapInspectorWidth = 400;
+constexpr int kReplicates = 50;
 
 Result<gap::GapReport> diagnoseWithCalib(const CalibrationTable& table, const SampleTable* samples,
-                                         const simulation::Scene* scene, const RunControl& control) {
-  return gap::diagnose(table, samples, scene, {}, control);
+                                         const simulation::Scene* scene, const gap::DiagnosisOptions& options,
+                                         const RunControl& control) {
+  return gap::diagnose(table, samples, scene, options, control);
 }
 
 }  // namespace
@@ -120,6 +122,9 @@ QWidget* GapPage::makeButtons(QWidget* header) {
   run_ = addButton(buttons, tr("&Diagnose"), "diagnose", &GapPage::runOrStop);
   choose_ = addButton(buttons, tr("&Believed scene..."), "chooseScene", &GapPage::chooseScene);
   add_ = addButton(buttons, tr("&Add to the simulation"), "addToSimulation", &GapPage::addToSimulation);
+  trust_ = addButton(buttons, tr("How far to &trust it"), "trustGap", &GapPage::tryAgainAndAgain);
+  trust_->setToolTip(
+      tr("Makes the recording %1 times again under what was found and diagnoses each.").arg(kReplicates));
   undo_ = addButton(buttons, tr("&Undo"), "undoAdd", &GapPage::undo);
   save_report_ = addButton(buttons, tr("Save &report..."), "saveGapReport", &GapPage::chooseReportFile);
   save_scene_ = addButton(buttons, tr("Save s&cene..."), "saveGapScene", &GapPage::chooseSceneFile);
@@ -127,9 +132,9 @@ QWidget* GapPage::makeButtons(QWidget* header) {
   progress_->setObjectName(QStringLiteral("gapProgress"));
   progress_->setRange(0, 1000);
   progress_->setAccessibleName(tr("Diagnosis"));
-  QPushButton* order[] = {run_, choose_, add_, undo_, save_report_, save_scene_};
-  for (int i = 0; i < 6; ++i) grid->addWidget(order[i], i / 2, i % 2);
-  grid->addWidget(progress_, 3, 0, 1, 2);
+  QPushButton* order[] = {run_, choose_, add_, undo_, save_report_, save_scene_, trust_};
+  for (int i = 0; i < 7; ++i) grid->addWidget(order[i], i / 2, i % 2);
+  grid->addWidget(progress_, 3, 1);
   grid->addWidget(new SensorChoice(workbench_, QStringLiteral("gapSensor"), buttons), 4, 0, 1, 2);
   return buttons;
 }
@@ -195,17 +200,23 @@ void GapPage::runOrStop() {
   }
 }
 
-void GapPage::run() {
+void GapPage::tryAgainAndAgain() {
+  gap::DiagnosisOptions options;
+  options.replicates = kReplicates;
+  run(options);
+}
+
+void GapPage::run(const gap::DiagnosisOptions& options) {
   jobs_.stop();
-  if (!workbench_.mayUse(table_, Workbench::SensorRows::kOne, [page = QPointer(this)] {
-        if (page) page->run();
+  if (!workbench_.mayUse(table_, [page = QPointer(this), options] {
+        if (page) page->run(options);
       }))
     return showReport();
   progress_->setValue(0);
   jobs_.run(
-      [diagnose = diagnose_, table = table_, samples = samples_ ? samples_() : SampleTable(),
-       scene = scene_](const RunControl& control) {
-        return diagnose(table, samples.rows.empty() ? nullptr : &samples, scene ? &*scene : nullptr, control);
+      [diagnose = diagnose_, table = table_, samples = samples_ ? samples_() : SampleTable(), scene = scene_,
+       options](const RunControl& control) {
+        return diagnose(table, samples.rows.empty() ? nullptr : &samples, scene ? &*scene : nullptr, options, control);
       },
       [this](Result<gap::GapReport> result) { onResult(std::move(result)); },
       [this](double fraction) { progress_->setValue(static_cast<int>(fraction * 1000.0)); });
@@ -344,6 +355,7 @@ void GapPage::showCharts() {
     view->setChart(chart);
     charts_layout_->addWidget(view);
   }
+  if (report_->replicates) addText("gapTrust", QString::fromStdString(report_->replicates->text));
   const std::string prediction = predictionText(*report_);
   if (!prediction.empty()) addText("gapPrediction", tr("To be checked: %1").arg(QString::fromStdString(prediction)));
   for (const recording::GapFinding& finding : report_->findings)
@@ -359,6 +371,7 @@ void GapPage::showButtons() {
   setStyled(*add_, "primary", can_add);
   add_->setEnabled(can_add);
   undo_->setEnabled(!earlier_.empty());
+  trust_->setEnabled(!isDiagnosing() && report_ && !report_->replicates);
   choose_->setEnabled(!isDiagnosing());
   save_report_->setEnabled(!isDiagnosing() && report_.has_value());
   save_scene_->setEnabled(!isDiagnosing());

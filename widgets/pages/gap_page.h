@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/core/run_control.h"
+#include "calib/gap/diagnosis.h"
 #include "calib/gap/report.h"
 #include "calib/simulation/scene.h"
 #include "widgets/workbench/background.h"
@@ -28,8 +29,9 @@ class GapPage : public QWidget {
   Q_OBJECT
  public:
   /// Runs on a pool thread. A null scene is an ideal tracker in free space.
-  using Diagnose = std::function<Result<gap::GapReport>(const CalibrationTable& table, const SampleTable* samples,
-                                                        const simulation::Scene* scene, const RunControl& control)>;
+  using Diagnose = std::function<Result<gap::GapReport>(
+      const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
+      const gap::DiagnosisOptions& options, const RunControl& control)>;
   /// @param diagnose none = the diagnosis of calib/gap
   explicit GapPage(Workbench& workbench, Diagnose diagnose = {}, QWidget* parent = nullptr);
   ~GapPage() override;
@@ -59,7 +61,8 @@ class GapPage : public QWidget {
   QWidget* makeFieldSide();
   QWidget* makeInspector();
   QPushButton* addButton(QWidget* parent, const QString& words, const char* name, void (GapPage::*slot)());
-  void run();
+  void run(const gap::DiagnosisOptions& options = {});
+  void tryAgainAndAgain();
   void onResult(Result<gap::GapReport> result);
   void runOrStop();
   void addToSimulation();
@@ -94,6 +97,7 @@ class GapPage : public QWidget {
   QPushButton* run_ = nullptr;
   QPushButton* add_ = nullptr;
   QPushButton* undo_ = nullptr;
+  QPushButton* trust_ = nullptr;
   QPushButton* choose_ = nullptr;
   QPushButton* save_report_ = nullptr;
   QPushButton* save_scene_ = nullptr;

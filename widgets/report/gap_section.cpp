@@ -116,6 +116,7 @@ void writeDiagnosis(HtmlWriter& html, const gap::GapReport& report, const DrawPi
                     const CalibrationTable* table) {
   html.element("p", report.text, {{"class", "lead"}});
   if (!report.next_measurement.empty()) html.element("p", "Next measurement: " + report.next_measurement);
+  if (report.replicates) html.element("p", report.replicates->text);
   const std::string prediction = predictionText(report);
   if (!prediction.empty()) html.element("p", "To be checked: " + prediction);
   writeFields(html, report, draw, table);

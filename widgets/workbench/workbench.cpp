@@ -263,12 +263,10 @@ void Workbench::chooseSensor(std::optional<int> sensor) {
   emit tableChanged();
 }
 
-bool Workbench::mayUse(const CalibrationTable& table, SensorRows sensors, const std::function<void()>& then) {
+bool Workbench::mayUse(const CalibrationTable& table, const std::function<void()>& then) {
   refusal_.clear();
   endCondition(QStringLiteral("session/table"));
-  if (const auto rows = rowsOfSensor(table, std::nullopt); sensors == SensorRows::kOne && !rows) {
-    refuse(rows.error().message, {}, {});
-  } else if (const auto units = recording::checkUnits(table); !units && !uses_any_units_) {
+  if (const auto units = recording::checkUnits(table); !units && !uses_any_units_) {
     refuse(units.error().message, tr("Use anyway"), [this, then, path = session_path_] {
       if (path != session_path_) return;
       uses_any_units_ = true;
@@ -405,7 +403,7 @@ void Workbench::setAutomatic(bool automatic) { post(&acquisition::AcquisitionCon
 void Workbench::compare(const evaluation::ComparisonOptions& options, MethodCount count) {
   comparison_jobs_.stop();
   endCondition(QStringLiteral("session/compare"));
-  if (!mayUse(table(), SensorRows::kAll)) {
+  if (!mayUse(table())) {
     comparison_.reset();
     emit comparisonChanged();
     return;
@@ -438,7 +436,7 @@ void Workbench::stopComparing() {
 }
 
 void Workbench::fit(const calibration::CorrectorChoice& choice, calibration::AlignMode align) {
-  if (isFitting() || !mayUse(table(), SensorRows::kAll)) return;
+  if (isFitting() || !mayUse(table())) return;
   endCondition(QStringLiteral("session/fit"));
   fit_jobs_.run(
       [table = table(), choice, align](const RunControl& control) {

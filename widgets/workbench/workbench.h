@@ -52,8 +52,7 @@ class Workbench : public QObject {
   /// Whether a table may be worked on: its units can be right, and where only one sensor's rows can be used there are
   /// no others. If not, says why in a message, whose action uses the units anyway.
   /// @param then what goes on after that
-  enum class SensorRows { kAll, kOne };
-  bool mayUse(const CalibrationTable& table, SensorRows sensors, const std::function<void()>& then = {});
+  bool mayUse(const CalibrationTable& table, const std::function<void()>& then = {});
   /// Why not, as it was last said; empty when they may.
   const QString& refusal() const { return refusal_; }
   /// Every raw sample of the session; large, made on request.

@@ -31,7 +31,7 @@ namespace {
 
 /// Runs until it is stopped, as a long diagnosis would.
 Result<gap::GapReport> runUntilStopped(const CalibrationTable&, const SampleTable*, const simulation::Scene*,
-                                       const RunControl& control) {
+                                       const gap::DiagnosisOptions&, const RunControl& control) {
   while (!control.stop.stop_requested()) {
     control.progress(0.4);
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -57,6 +57,7 @@ class GapPageTest : public QObject {
   void tooFewPlacesSayWhatIsMissing();
   void showsWhatTheReportSays();
   void switchShowsWhatIsLeft();
+  void trustIsAskedFor();
   void addAndUndoChangeTheScene();
   void stopEndsTheRun();
   void otherRowsDropTheReport();
@@ -90,10 +91,17 @@ std::unique_ptr<GapPage> GapPageTest::pageThatAnswers(const gap::GapReport& repo
   runs_ = 0;
   effects_believed_.clear();
   const auto answer = [this, report](const CalibrationTable&, const SampleTable*, const simulation::Scene* scene,
+                                     const gap::DiagnosisOptions& options,
                                      const RunControl&) -> Result<gap::GapReport> {
     ++runs_;
     effects_believed_.push_back(scene ? scene->effects.size() : 0);
-    return report;
+    gap::GapReport answered = report;
+    if (options.replicates > 0) {
+      answered.replicates.emplace();
+      answered.replicates->n = options.replicates;
+      answered.replicates->text = "Named so 46 times of 50.";
+    }
+    return answered;
   };
   auto page = std::make_unique<GapPage>(*workbench_, answer);
   page->resize(1184, 740);
@@ -169,6 +177,20 @@ void GapPageTest::switchShowsWhatIsLeft() {
   FT_VERIFY_MATCH(near(field.bodies[0].region_m.colwise().norm().maxCoeff(), 2.5 * 0.02, 1e-9));
   find<QCheckBox>(*page, "showAfter")->setChecked(true);
   QVERIFY((field.arrows[1].error_m - report.nodes[1].after_m).norm() < 1e-12);
+}
+
+void GapPageTest::trustIsAskedFor() {
+  const auto page = pageThatAnswers(writtenReport());
+  auto* trust = page->findChild<QPushButton*>("trustGap");
+  QVERIFY(!trust->isEnabled());
+  QTest::mouseClick(page->findChild<QPushButton*>("diagnose"), Qt::LeftButton);
+  QTRY_VERIFY(page->report() && !page->isDiagnosing());
+  QVERIFY(trust->isEnabled());
+  QTest::mouseClick(trust, Qt::LeftButton);
+  QTRY_VERIFY(page->report() && page->report()->replicates && !page->isDiagnosing());
+  QCOMPARE(page->report()->replicates->n, 50);
+  QCOMPARE(page->findChild<QLabel*>("gapTrust")->text(), QStringLiteral("Named so 46 times of 50."));
+  QVERIFY(!trust->isEnabled());
 }
 
 void GapPageTest::addAndUndoChangeTheScene() {

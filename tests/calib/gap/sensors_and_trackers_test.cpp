@@ -1,0 +1,118 @@
+#include <QTest>
+
+#include "tests/calib/gap/diagnosis_checks.h"
+#include "tests/support/test_main.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::gap;
+using namespace fieldtrue::testing;
+
+namespace {
+
+constexpr const char* kBody = R"({"center_m": [1.3, 0.5, 0.3], "radius_m": 0.15})";
+
+Pose mountOf(int sensor) {
+  return sensor == 0 ? Pose{} : Pose{{0.08, -0.05, 0.02}, rotationFromVector({0.4, 1.1, -0.7})};
+}
+
+/// The same places recorded by two sensors on one jig, the second off the mount and turned.
+CalibrationTable recordedByTwo(simulation::Scene scene) {
+  CalibrationTable both;
+  for (const int sensor : {0, 1}) {
+    scene.mount_from_sensor = mountOf(sensor);
+    const CalibrationTable own = recordedIn(scene, gapPlan(), static_cast<std::uint64_t>(1 + sensor));
+    both.metadata = own.metadata;
+    for (Node node : own.nodes) {
+      node.sensor = sensor;
+      both.nodes.push_back(node);
+    }
+  }
+  return both;
+}
+
+bool isTold(const GapReport& report, const std::string& words) {
+  return std::any_of(report.findings.begin(), report.findings.end(),
+                     [&](const recording::GapFinding& f) { return f.text.find(words) != std::string::npos; });
+}
+
+}  // namespace
+
+class SensorsAndTrackersTest : public QObject {
+  Q_OBJECT
+ private slots:
+  /// Two sensors in one table: no gap where nothing is wrong, the body named where there is one, each mounting found.
+  void eachSensorHasItsMounting() {
+    const auto clean = diagnose(recordedByTwo(gapScene()), nullptr, nullptr);
+    FT_VERIFY_OK(clean);
+    QVERIFY2(clean->verdict == GapVerdict::kNoGap, clean->text.c_str());
+    QCOMPARE(clean->sensors_from_mounts.size(), std::size_t{2});
+    const Pose second = inverse(clean->sensors_from_mounts.at(1));
+    const Pose first = inverse(clean->sensors_from_mounts.at(0));
+    QVERIFY((second.position_m - first.position_m - mountOf(1).position_m).norm() < 0.002);
+    QVERIFY(angleBetween_rad(first.orientation.conjugate() * second.orientation, mountOf(1).orientation) < 0.005);
+    simulation::Scene scene = gapScene();
+    scene.effects.push_back({"compact_metal", nlohmann::json::parse(kBody)});
+    const auto report = diagnose(recordedByTwo(scene), nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    FT_VERIFY_MATCH(names(*report, "compact_metal"));
+    FT_VERIFY_MATCH(near(*report->selected.front().location_m, {1.3, 0.5, 0.3}, 0.08));
+    QCOMPARE(report->input.rows, 160);
+    QCOMPARE(report->input.places, 80);
+  }
+
+  /// Of a tracker whose transmitter is no dipole nothing is claimed by the physics of dipoles: the same readings have a
+  /// cause, or only a place.
+  void noDipoleNoMetal() {
+    Withheld made = withheldFrom("compact_metal", kBody);
+    for (const char* model : {"optical", "planar_coils", "unknown"}) {
+      made.table.metadata.transmitter_model = model;
+      const auto report = diagnose(made.table, nullptr, nullptr);
+      FT_VERIFY_OK(report);
+      QVERIFY2(report->verdict == GapVerdict::kUnexplained, report->text.c_str());
+      QVERIFY(report->selected.empty());
+      QCOMPARE(report->candidates.front().effect, std::string(kUnnamedSmooth));
+      QVERIFY(isTold(*report, std::string("transmitter_model: ") + model));
+    }
+    made.table.metadata.transmitter_model = "dipole";  // As the simulator states it.
+    const auto dipole = diagnose(made.table, nullptr, nullptr);
+    FT_VERIFY_MATCH(names(*dipole, "compact_metal"));
+    QVERIFY(!isTold(*dipole, "transmitter_model"));
+    made.table.metadata.transmitter_model.reset();
+    const auto assumed = diagnose(made.table, nullptr, nullptr);
+    QVERIFY(isTold(*assumed, "a transmitter of dipoles is assumed"));
+  }
+
+  /// What the rig does is named for any tracker.
+  void theRigIsNamedForAll() {
+    Withheld made = withheldFrom("grid_scale", R"({"scale": [0.03, 0.03, 0.03]})");
+    made.table.metadata.transmitter_model = "optical";
+    const auto report = diagnose(made.table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    FT_VERIFY_MATCH(names(*report, "grid_scale"));
+  }
+
+  void mirroredAxesAreAFinding_data() {
+    QTest::addColumn<bool>("turned");
+    QTest::newRow("a sign") << false;
+    QTest::newRow("two exchanged") << true;
+  }
+  void mirroredAxesAreAFinding() {
+    QFETCH(bool, turned);
+    CalibrationTable table = recordedIn(gapScene(), gapPlan());
+    for (Node& node : table.nodes) {
+      Eigen::Vector3d& p_m = node.tracker_from_sensor.position_m;
+      if (turned)
+        std::swap(p_m.x(), p_m.y());
+      else
+        p_m.z() = -p_m.z();
+    }
+    const auto report = diagnose(table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY(isTold(*report, "mirror images"));
+    QVERIFY2(report->selected.empty() && report->verdict == GapVerdict::kUnexplained, report->text.c_str());
+    QVERIFY(!isTold(*diagnose(recordedIn(gapScene(), gapPlan()), nullptr, nullptr), "mirror images"));
+  }
+};
+
+FIELDTRUE_TEST(SensorsAndTrackersTest)
+#include "sensors_and_trackers_test.moc"
