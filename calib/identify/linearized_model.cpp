@@ -72,6 +72,14 @@ Whitening makeWhitening(const GapRows& rows, double placing_sd_m, double placing
   return whitening;
 }
 
+std::vector<Vector6d> whitened(std::vector<Vector6d> residuals, const Whitening& whitening) {
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    residuals[i].head<3>() = (whitening.position[i] * residuals[i].head<3>()).eval();
+    residuals[i].tail<3>() *= whitening.rotation[i];
+  }
+  return residuals;
+}
+
 Eigen::Vector3d alignmentCenter_m(std::span<const field::SensorSetting> settings) {
   Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
   for (const field::SensorSetting& setting : settings) sum_m += setting.tracker_from_sensor.position_m;
@@ -156,6 +164,19 @@ LinearPrior priorOf(const effects::EffectFit& fit) {
   return prior;
 }
 
+namespace {
+
+/// Whether poses are bent so far that what moved them must be taken half way between the model's pose and the reported
+/// one. Nearer to the noise the columns would depend on the noise, and a flexible fit would explain it.
+bool isBentStrongly(std::span<const Vector6d> residuals, const Whitening& whitening, int channels) {
+  constexpr double kStrongly = 12.0;  // RMS, in noise.
+  double squares = 0.0;
+  for (const Vector6d& left : whitened({residuals.begin(), residuals.end()}, whitening)) squares += left.squaredNorm();
+  return squares > kStrongly * kStrongly * static_cast<double>(residuals.size()) * channels;
+}
+
+}  // namespace
+
 Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening,
                        std::span<const int> block)
     : channels_(physics.rows().channels()), order_(physics.size()) {
@@ -168,13 +189,14 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
   const GapRows& rows = physics.rows();
   n_prior_ = rows.alignment_known && hasFreeAlignment(rows) ? 6 : 0;
   residual_ = Eigen::VectorXd::Zero(n * channels_ + n_prior_);
+  const double way = isBentStrongly(residuals, whitening, channels_) ? 0.5 : 1.0;
   for (std::size_t k = 0; k < order_.size(); ++k) {
     const std::size_t i = order_[k];
     settings_.push_back(at[i]);
     white_position_.push_back(whitening.position[i]);
     white_rotation_.push_back(whitening.rotation[i]);
-    const Eigen::Vector3d solved_m = rows.rows[i].tracker_from_sensor.position_m - residuals[i].head<3>();
-    const Eigen::Matrix<double, 6, 9> by_field = field::poseByField(solved_m);
+    const Eigen::Vector3d from_m = rows.rows[i].tracker_from_sensor.position_m - way * residuals[i].head<3>();
+    const Eigen::Matrix<double, 6, 9> by_field = field::poseByField(from_m);
     white_by_field_.emplace_back();
     white_by_field_.back().topRows<3>() = white_position_.back() * by_field.topRows<3>();
     white_by_field_.back().bottomRows<3>() = white_rotation_.back() * by_field.bottomRows<3>();

@@ -18,6 +18,8 @@ struct Whitening {
   std::vector<double> rotation;           ///< [1/rad], per row.
 };
 Whitening makeWhitening(const GapRows& rows, double placing_sd_m, double placing_sd_rad);
+/// Residuals [m, rad] in units of the noise.
+std::vector<Vector6d> whitened(std::vector<Vector6d> residuals, const Whitening& whitening);
 
 /// What is believable of a fit's linear parameters before any data: those of purely linear effects are about zero, as
 /// far as is plausible; the only one of a searched effect lies within its bounds.

@@ -147,14 +147,6 @@ std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapMode
   return whitened(physics.residuals(model), whitening);
 }
 
-std::vector<Vector6d> whitened(std::vector<Vector6d> residuals, const Whitening& whitening) {
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    residuals[i].head<3>() = (whitening.position[i] * residuals[i].head<3>()).eval();
-    residuals[i].tail<3>() *= whitening.rotation[i];
-  }
-  return residuals;
-}
-
 double priorCost(const GapPhysics& physics, const GapModel& model) {
   double cost = alignmentCost(physics, model.alignment);
   for (const GapTerm& term : model.terms) cost += priorOf(*term.fit).costOf(term.linear);

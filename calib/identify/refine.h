@@ -33,9 +33,6 @@ Deviance devianceOf(std::span<const Vector6d> whitened, bool has_orientation, co
 /// Whitened residuals of a model, one per row.
 std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapModel& model, const Whitening& whitening);
 
-/// Residuals [m, rad] in units of the noise.
-std::vector<Vector6d> whitened(std::vector<Vector6d> residuals, const Whitening& whitening);
-
 /// Minus twice the log prior of a model: the rig's stated tolerances, and what is believable of linear effects.
 double priorCost(const GapPhysics& physics, const GapModel& model);
 
