@@ -165,13 +165,14 @@ void addBoundOfFloor(const identify::GapSearch& search, const identify::GapRows&
   const auto tell = [&](double seen, double bound, bool is_stated, const std::string& unit, const std::string& by_hand,
                         const std::string& remedy) {
     if (!(seen > 1.001 * bound)) return;
-    const std::string why = is_stated ? "That is far more than the tolerance that is stated"
-                                      : "No tolerance is stated, and a person with a jig stays within " + shown(bound) +
-                                            " " + unit + " (" + by_hand + ")";
+    const std::string why = is_stated
+                                ? "The tolerance that is stated is far less, and a person with a jig stays within "
+                                : "No tolerance is stated, and a person with a jig stays within ";
     report.findings.push_back({"",
                                "The places scatter by " + shown(seen) + " " + unit +
-                                   " (SD per axis) about any smooth field. " + why + ": the floor is held at " +
-                                   shown(bound) + " " + unit + ", and what is above it counts as gap. " + remedy,
+                                   " (SD per axis) about any smooth field. " + why + shown(bound) + " " + unit + " (" +
+                                   by_hand + "): the floor is held there, and what is above it counts as gap. " +
+                                   remedy,
                                {}});
   };
   tell(1e3 * search.placingSd_m(), 1e3 * search.floorPlacingSd_m(), stated.placing_sd_m.has_value(), "mm",

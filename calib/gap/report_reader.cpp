@@ -50,6 +50,7 @@ GapNode nodeFrom(const JsonReader& reader) {
   GapNode node;
   node.node = reader["node"].integer();
   node.visit = reader["visit"].integer();
+  if (const auto sensor = reader.find("sensor")) node.sensor = sensor->integer();
   node.place_m = vectorFrom(reader["place_m"]);
   node.before_m = kMPerMm * vectorFrom(reader["before_mm"]);
   node.after_m = kMPerMm * vectorFrom(reader["after_mm"]);

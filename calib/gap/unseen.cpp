@@ -38,7 +38,8 @@ class FoldFitter {
         scores_(scores),
         ways_(shortList(selection)) {
     if (selection.ways.empty()) return;
-    const identify::Linearized at(search.physics(), search.none().model, search.whitening(), blocks);
+    const identify::Linearized at(search.physics(), search.none().model, search.whitening(), blocks,
+                                  identify::ResponseAt::kHalfWayIfBent);
     for (const std::size_t way : ways_) first_.push_back(scanned(at, way));
   }
 
@@ -68,8 +69,8 @@ class FoldFitter {
 
   /// Adds the effect that the fold's own rows like best, if they like any.
   bool addBest(int block, std::span<const char> used, std::size_t step, identify::GapModel& model) const {
-    const identify::Linearized& at =
-        identify::Linearized(search_.physics(), step == 0 ? search_.none().model : model, search_.whitening(), blocks_);
+    const identify::Linearized at(search_.physics(), step == 0 ? search_.none().model : model, search_.whitening(),
+                                  blocks_, identify::ResponseAt::kHalfWayIfBent);
     const auto held_out = static_cast<std::size_t>(block);
     struct Start {
       std::size_t way = 0;

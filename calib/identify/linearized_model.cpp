@@ -166,10 +166,9 @@ LinearPrior priorOf(const effects::EffectFit& fit) {
 
 namespace {
 
-/// Whether poses are bent so far that what moved them must be taken half way between the model's pose and the reported
-/// one. Nearer to the noise the columns would depend on the noise, and a flexible fit would explain it.
+/// Whether poses are bent so far that what moved them must be taken half way along.
 bool isBentStrongly(std::span<const Vector6d> residuals, const Whitening& whitening, int channels) {
-  constexpr double kStrongly = 12.0;  // RMS, in noise.
+  constexpr double kStrongly = 5.0;  // RMS, in noise.
   double squares = 0.0;
   for (const Vector6d& left : whitened({residuals.begin(), residuals.end()}, whitening)) squares += left.squaredNorm();
   return squares > kStrongly * kStrongly * static_cast<double>(residuals.size()) * channels;
@@ -178,7 +177,7 @@ bool isBentStrongly(std::span<const Vector6d> residuals, const Whitening& whiten
 }  // namespace
 
 Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening,
-                       std::span<const int> block)
+                       std::span<const int> block, ResponseAt response)
     : channels_(physics.rows().channels()), order_(physics.size()) {
   std::iota(order_.begin(), order_.end(), std::size_t{0});
   std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) { return block[a] < block[b]; });
@@ -189,7 +188,8 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
   const GapRows& rows = physics.rows();
   n_prior_ = rows.alignment_known && hasFreeAlignment(rows) ? 6 : 0;
   residual_ = Eigen::VectorXd::Zero(n * channels_ + n_prior_);
-  const double way = isBentStrongly(residuals, whitening, channels_) ? 0.5 : 1.0;
+  const bool is_half_way = response == ResponseAt::kHalfWayIfBent && isBentStrongly(residuals, whitening, channels_);
+  const double way = is_half_way ? 0.5 : 1.0;
   for (std::size_t k = 0; k < order_.size(); ++k) {
     const std::size_t i = order_[k];
     settings_.push_back(at[i]);

@@ -38,13 +38,19 @@ struct Segment {
   Eigen::Index count = 0;
 };
 
+/// Where the tracker's response is taken: at the model's pose, or, where poses are bent by many times their noise, half
+/// way from there to the reported one. What is half way follows the noise: a flexible fit would explain the noise by
+/// it.
+enum class ResponseAt { kModel, kHalfWayIfBent };
+
 /// A model linearised about its present state: whitened residuals and what each parameter does to them. Rows are sorted
 /// by hold-out block. Behind them stand as many residuals as the alignment's stated tolerances give; they belong to no
 /// block.
 class Linearized {
  public:
   /// @param block of each row, 0..n-1
-  Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening, std::span<const int> block);
+  Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening, std::span<const int> block,
+             ResponseAt response = ResponseAt::kModel);
 
   Eigen::Index size() const { return residual_.size(); }
   const Eigen::VectorXd& residual() const { return residual_; }

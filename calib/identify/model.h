@@ -15,7 +15,7 @@ namespace fieldtrue::identify {
 struct GapAlignment {
   Pose tracker_from_reference;
   /// Of each sensor: the rig's pose times this is the sensor's.
-  std::vector<Pose> mount_from_sensor;
+  std::vector<Pose> mount_from_sensor = std::vector<Pose>(1);
 };
 
 /// One fitted effect in a model.

@@ -30,8 +30,8 @@ struct GapRow {
 /// A table as the diagnosis reads it, with what is known of its noise.
 struct GapRows {
   std::vector<GapRow> rows;
-  std::vector<int> place_nodes;  ///< Node number of each place.
-  std::vector<int> sensors;      ///< Number of each sensor, each in a mounting of its own.
+  std::vector<int> place_nodes;    ///< Node number of each place.
+  std::vector<int> sensors = {0};  ///< Number of each sensor, each in a mounting of its own.
   /// Whether the physics of a transmitter of dipoles may be claimed; else only what the rig does has a name.
   bool has_dipoles = true;
   bool has_orientation = true;

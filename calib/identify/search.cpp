@@ -248,8 +248,8 @@ void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& 
 }
 
 std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunControl& control) const {
-  const Linearized in_space(physics_, base.model, whitening_, space_blocks_);
-  const Linearized in_time(physics_, base.model, whitening_, time_blocks_);
+  const Linearized in_space(physics_, base.model, whitening_, space_blocks_, ResponseAt::kHalfWayIfBent);
+  const Linearized in_time(physics_, base.model, whitening_, time_blocks_, ResponseAt::kHalfWayIfBent);
   std::vector<TriedEffect> tried;
   for (std::size_t way = 0; way < ways_.size(); ++way) {
     if (control.stop.stop_requested()) return {};

@@ -30,8 +30,8 @@ struct Made {
   }
   std::map<std::string, std::string> files() const {
     std::map<std::string, std::string> texts;
-    for (const fs::directory_entry& entry : fs::directory_iterator(path))
-      texts[entry.path().filename().string()] = textOf(entry.path());
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path))
+      if (entry.is_regular_file()) texts[fs::relative(entry.path(), path).string()] = textOf(entry.path());
     return texts;
   }
 };
@@ -60,6 +60,7 @@ class BlindGenerateTest : public QObject {
   void otherSeedOtherSessions();
   void shelvesAndStrengthsAreCounted();
   void namesAndHeadersTellNothing();
+  void unseenPlacesAreSealed();
   void covariancesHold();
   void classesHoldEveryEffectOnce();
   void rhoIsWhatWasWished();
@@ -115,7 +116,7 @@ void BlindGenerateTest::namesAndHeadersTellNothing() {
   std::map<std::string, std::set<std::string>> headers_of;
   for (const auto& [name, text] : mixedSet().files()) {
     if (name == "truth.json" || name == "seal.json") continue;
-    QVERIFY(name.rfind("session_00", 0) == 0);
+    QVERIFY(name.rfind("session_00", 0) == 0 || name.rfind("unseen/session_00", 0) == 0);
     for (const std::string& id : catalogueIds()) QVERIFY(text.find(id) == std::string::npos);
     for (const char* word : {"off:", "single", "pairs", "signals", "rho"})
       QVERIFY(text.find(word) == std::string::npos);
@@ -133,6 +134,35 @@ void BlindGenerateTest::namesAndHeadersTellNothing() {
     QVERIFY(nodes.rows.size() <= 90);
   }
   QCOMPARE(times.size(), std::size_t(1));
+}
+
+/// Beside each session 200 places that no table holds, 150 of them in the box of its places, sealed with the truth.
+void BlindGenerateTest::unseenPlacesAreSealed() {
+  const json truth = openSealed(mixedSet().path);
+  for (const json& session : truth["sessions"]) {
+    const std::string file = session["file"];
+    const fs::path path = mixedSet().path / "unseen" / (file + ".csv");
+    QCOMPARE(sha256Hex(textOf(path)), session["unseen_sha256"].get<std::string>());
+    const SessionTable unseen = readTable(path);
+    const SessionTable nodes = readTable(mixedSet().path / (file + ".nodes.csv"));
+    QCOMPARE(unseen.rows.size(), std::size_t(200));
+    int inside = 0;
+    for (const auto& row : unseen.rows) {
+      bool is_inside = true;
+      for (const char* axis : {"x_true_m", "y_true_m", "z_true_m"}) {
+        double low = 1e9, high = -1e9;
+        for (const auto& node : nodes.rows) {
+          low = std::min(low, numberIn(node[nodes.neededColumn(axis)]));
+          high = std::max(high, numberIn(node[nodes.neededColumn(axis)]));
+        }
+        const double at = numberIn(row[unseen.neededColumn(axis)]);
+        is_inside = is_inside && at >= low - 1e-5 && at <= high + 1e-5;
+      }
+      QCOMPARE(is_inside, row[unseen.neededColumn("inside")] == "1");
+      inside += is_inside ? 1 : 0;
+    }
+    QCOMPARE(inside, 150);
+  }
 }
 
 void BlindGenerateTest::covariancesHold() {

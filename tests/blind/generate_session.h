@@ -51,9 +51,9 @@ struct StreamFault {
 GeneratedSession recordSession(const Setup& setup, const World& world, const Alignment& alignment,
                                const StreamFault& fault, bool samples, Random& random);
 
-/// Places that no table holds: 150 within the box of the grid and 50 outside, up to one pitch away, at times spread over
-/// the session, each with the pose that the tracker would report without noise or seating error, the rig's systematic
-/// error kept.
+/// Places that no table holds: 150 within the box of the grid and 50 outside, up to one pitch away, at times spread
+/// over the session, each with the pose that the tracker would report without noise or seating error, the rig's
+/// systematic error kept.
 /// @return a table with `inside` (1 or 0), t_s, i, j, k, place and attitude as the drawing has them, and the exact pose
 std::string recordUnseen(const Setup& setup, const World& world, Random& random);
 

@@ -156,6 +156,7 @@ class ReportContractTest : public QObject {
     if (report["selected"].empty() && report["verdict"] == "unexplained")
       QVERIFY2(first.starts_with("unnamed_"), first.c_str());
     if (!report["selected"].empty()) QVERIFY2(!first.starts_with("unnamed_") && first != "none", first.c_str());
+    if (report["odds_over_next"].is_null()) return;  // The next has no probability at all.
     const double odds = report["odds_over_next"];
     QVERIFY(isNear(odds, report["candidates"][0]["probability"].get<double>() /
                              report["candidates"][1]["probability"].get<double>()));
