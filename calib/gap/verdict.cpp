@@ -48,24 +48,22 @@ std::string namesText(const std::vector<std::string>& effects) {
   return text;
 }
 
-/// "on places the fit did not see what stands above the floor falls from 12 to 1.1 mm (0.8 % of its square is left, 90
-/// % interval -1 to 4 %)".
+/// "on places the fit did not see, what stands above the noise goes from 13 to 0.4 mm (0.6 mm at most, 95 % sure)".
 std::string fallText(const GapReport& report) {
   const Remaining& remaining = report.remaining;
+  const auto mm = [&](double fraction) { return signedRoot_mm(1e-6 * fraction * remaining.excess2_before_mm2); };
   std::string text = "on places the fit did not see, ";
   if (remaining.is_of_rotation) {
-    text +=
-        "of the square of what stands above the floor in rotation " + shown(100.0 * remaining.fraction) + " % is left";
+    text += shown(100.0 * remaining.fraction) + " % of the square of what stands above the noise in rotation is left (";
   } else {
-    text += "what stands above the floor goes from " + shown(signedRoot_mm(1e-6 * remaining.excess2_before_mm2)) +
-            " to " + shown(signedRoot_mm(1e-6 * remaining.excess2_after_mm2)) + " mm (of its square " +
-            shown(100.0 * remaining.fraction) + " % is left";
+    text += "what stands above the noise goes from " + shown(mm(1.0)) + " to " +
+            shown(std::max(0.0, mm(remaining.fraction))) + " mm (";
   }
-  if (remaining.low90 && remaining.high90)
-    text += ", 90 % interval " + shown(100.0 * *remaining.low90) + " to " + shown(100.0 * *remaining.high90) + " %";
-  else
-    text += "; these places are too few to say how sure that is";
-  return text + (remaining.is_of_rotation ? "" : ")");
+  if (!remaining.high90) return text + "these places cannot say how sure that is)";
+  return text +
+         (remaining.is_of_rotation ? shown(100.0 * *remaining.high90) + " %"
+                                   : shown(std::max(0.0, mm(*remaining.high90))) + " mm") +
+         " at most, 95 % sure)";
 }
 
 }  // namespace
