@@ -1,6 +1,10 @@
 #include <QTest>
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <set>
 
 #include "calib/gap/report_json.h"
 #include "tests/calib/gap/diagnosis_checks.h"

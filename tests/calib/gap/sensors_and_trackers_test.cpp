@@ -1,4 +1,5 @@
 #include <QTest>
+#include <algorithm>
 
 #include "tests/calib/gap/diagnosis_checks.h"
 #include "tests/support/test_main.h"
@@ -20,7 +21,7 @@ CalibrationTable recordedByTwo(simulation::Scene scene) {
   CalibrationTable both;
   for (const int sensor : {0, 1}) {
     scene.mount_from_sensor = mountOf(sensor);
-    const CalibrationTable own = recordedIn(scene, gapPlan(), static_cast<std::uint64_t>(1 + sensor));
+    const CalibrationTable own = recordedIn(scene, gapPlan(), 1 + static_cast<std::uint64_t>(sensor));
     both.metadata = own.metadata;
     for (Node node : own.nodes) {
       node.sensor = sensor;
