@@ -95,7 +95,7 @@ class CliRefusalsTest : public QObject {
           {"true-mm.nodes.csv", "1000, millimetres for metres", "metres", "--force"});
       row(qPrintable(name + ", both in millimetres"), with("both-mm.nodes.csv"),
           {"both-mm.nodes.csv", "30 m", "--force"});
-      if (!QStringList{"fit", "compare", "report"}.contains(name))
+      if (!QStringList{"fit", "compare", "report", "diagnose"}.contains(name))
         row(qPrintable(name + ", two sensors"), with("two.nodes.csv"),
             {"two.nodes.csv", "sensors 0 and 4", "--sensor N"});
       row(qPrintable(name + ", a sensor that is not there"), with("two.nodes.csv --sensor 1"),
@@ -162,6 +162,11 @@ class CliRefusalsTest : public QObject {
       const double median_deg = run.json().at("before").at("orientation_deg").at("median").get<double>();
       QVERIFY2(median_deg < 1.0, qPrintable(QString::number(median_deg)));
     }
+    const CliRun run = runCli({"diagnose", "--nodes", at("two.nodes.csv"), "--out", at("two.gap.json"), "--json"});
+    FT_VERIFY_STATUS(run, 0);
+    const auto mounts = run.json().at("alignment").at("sensor_mounts");
+    QCOMPARE(mounts.size(), std::size_t{2});
+    QCOMPARE(mounts.at(1).at("sensor").get<int>(), 4);
   }
 
   void aDeepButAllowedFileIsReadWhole() {
