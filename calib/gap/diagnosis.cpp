@@ -250,7 +250,6 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
          "Put that right first; causes are not looked for.",
          {}});
   const identify::GapSearch search(rows, std::move(believed));
-  control.progress(0.01);
   identify::EffectSelectionOptions selecting;
   const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
   selecting.most_effects = has_enough && !is_mirrored ? options.most_effects : 0;

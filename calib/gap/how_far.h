@@ -43,7 +43,7 @@ struct RowNoise {
   std::vector<double> whitened;
 };
 
-/// Where no tolerance is stated, no more of it is noise than a person with a jig errs by.
+/// No more of it is noise than GapSearch::floorPlacingSd_m and _rad allow.
 /// @param structure of a model's residuals
 RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structure& structure);
 

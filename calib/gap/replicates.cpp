@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <random>
-#include <set>
 
 #include "calib/core/geometry.h"
 #include "calib/core/statistics.h"

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <random>
-#include <set>
 
 namespace fieldtrue::gap {
 namespace {

@@ -49,8 +49,8 @@ class Workbench : public QObject {
   /// None: the rows of all are used.
   std::optional<int> chosenSensor() const { return chosen_sensor_; }
   void chooseSensor(std::optional<int> sensor);
-  /// Whether a table may be worked on: its units can be right, and where only one sensor's rows can be used there are
-  /// no others. If not, says why in a message, whose action uses the units anyway.
+  /// Whether a table may be worked on: its units can be right. If not, says why in a message, whose action uses them
+  /// anyway.
   /// @param then what goes on after that
   bool mayUse(const CalibrationTable& table, const std::function<void()>& then = {});
   /// Why not, as it was last said; empty when they may.
