@@ -70,12 +70,9 @@ struct TermPlace {
 
 TermPlace placeOf(const identify::RefinedModel& refined, std::size_t term) {
   TermPlace place;
-  place.begin = refined.n_alignment;
-  for (std::size_t t = 0; t <= term; ++t) {
-    place.linear = refined.model.terms[t].linear.size();
-    place.searched = refined.model.terms[t].searched.size();
-    if (t < term) place.begin += place.linear + place.searched;
-  }
+  place.begin = identify::firstParameterOf(refined, term);
+  place.linear = refined.model.terms[term].linear.size();
+  place.searched = refined.model.terms[term].searched.size();
   return place;
 }
 
@@ -181,7 +178,7 @@ void findEquivalents(const identify::GapSearch& search, const identify::EffectSe
                      std::vector<GapCandidate>& candidates) {
   const std::vector<identify::TriedEffect>& tried = selection.alternatives;
   identify::GapModel rest = selection.model.model;
-  if (!rest.terms.empty()) rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+  if (!rest.terms.empty()) rest = identify::withoutTerm(std::move(rest), selection.leading);
   const std::vector<identify::Vector6d> without =
       identify::whitenedResiduals(search.physics(), search.refined(rest).model, search.whitening());
   std::vector<Eigen::VectorXd> signals;
@@ -251,9 +248,7 @@ Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::Tr
                            double none) {
   double fall = tried.held_out_gain;
   if (tried.held_out_gain > 0.0 && !tried.refined.model.terms.empty()) {
-    double parameters = 0.0;
-    for (const identify::GapTerm& term : tried.model.terms)
-      parameters += static_cast<double>(term.linear.size() + term.searched.size());
+    const auto parameters = static_cast<double>(identify::parametersOf(tried.model));
     fall = std::max(fall, none - whitenedSquares(search, tried.model) - parameters);
   }
   const double left = 1.0 - fall / far.whitened_excess;

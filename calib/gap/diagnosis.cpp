@@ -79,8 +79,10 @@ Remaining remainingOf(const HowFar& far, const identify::GapRows& rows) {
   std::sort(worst.rbegin(), worst.rend());
   remaining.worst_mm = 1e3 * worst.front().first;
   remaining.worst_node = worst.front().second;
+  constexpr double kFarOut = 2.5;  // Floors.
+  constexpr std::size_t kMostNamed = 10;
   for (const auto& [size_m, node] : worst) {
-    if (size_m < 2.5 * std::sqrt(far.floor_m2) || remaining.where.size() >= 10) break;
+    if (size_m < kFarOut * std::sqrt(far.floor_m2) || remaining.where.size() >= kMostNamed) break;
     if (std::find(remaining.where.begin(), remaining.where.end(), node) == remaining.where.end())
       remaining.where.push_back(node);
   }
@@ -101,7 +103,9 @@ RivalReport rivalOf(const Judgement& judgement) {
 
 /// What is left beside the named effects and varies smoothly, where it is worth telling.
 void addRest(const Judgement& judgement, GapReport& report) {
-  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > 0.1 * judgement.far.excess_m2.front().value)) return;
+  constexpr double kWorthTelling = 0.1;  // Of the start's excess.
+  const double start_m2 = judgement.far.excess_m2.front().value;
+  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > kWorthTelling * start_m2)) return;
   report.findings.push_back({"",
                              "Beside what is named, " + shown(signedRoot_mm(judgement.rest_m2)) +
                                  " mm vary smoothly from place to place and have no name.",

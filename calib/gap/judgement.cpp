@@ -62,9 +62,7 @@ class Judge {
   double natsOf(const identify::GapModel& model, identify::UnnamedLaws& laws) const {
     const std::vector<identify::Vector6d> left = search_.physics().residuals(model);
     laws = rival_.likeliestLaws(left);
-    double parameters = 0.0;
-    for (const identify::GapTerm& term : model.terms)
-      parameters += static_cast<double>(term.linear.size() + term.searched.size());
+    const auto parameters = static_cast<double>(identify::parametersOf(model));
     const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
     return rival_.logEvidence(left, laws) - 0.5 * parameters * std::log(count) - alone_;
   }
@@ -116,9 +114,7 @@ class Judge {
   }
 
   identify::RefinedModel without(const identify::EffectSelection& selection, std::size_t term) const {
-    identify::GapModel model = selection.model.model;
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(term));
-    return search_.refined(model);
+    return search_.refined(identify::withoutTerm(selection.model.model, term));
   }
 
   void drop(std::size_t term, const identify::RefinedModel& rest, Judgement& judgement) const {

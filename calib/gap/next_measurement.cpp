@@ -197,12 +197,6 @@ class Removal {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver_;
 };
 
-identify::GapModel without(const identify::GapModel& model, std::size_t term) {
-  identify::GapModel rest = model;
-  rest.terms.erase(rest.terms.begin() + static_cast<std::ptrdiff_t>(term));
-  return rest;
-}
-
 /// How what each parameter of one term does shows at a row, per unit of the parameter; 3 by parameter.
 Eigen::Matrix3Xd sensitivityAt(const identify::GapSearch& search, const Removal& removal,
                                const identify::GapModel& model, std::size_t term, std::size_t row) {
@@ -223,9 +217,7 @@ Eigen::Matrix3Xd sensitivityAt(const identify::GapSearch& search, const Removal&
 double varianceOfEffect(const identify::GapSearch& search, const Removal& removal,
                         const identify::RefinedModel& refined, std::size_t term, std::size_t row) {
   if (refined.covariance.size() == 0) return 0.0;
-  Eigen::Index begin = refined.n_alignment;
-  for (std::size_t t = 0; t < term; ++t)
-    begin += refined.model.terms[t].linear.size() + refined.model.terms[t].searched.size();
+  const Eigen::Index begin = identify::firstParameterOf(refined, term);
   const Eigen::Matrix3Xd J = sensitivityAt(search, removal, refined.model, term, row);
   const Eigen::MatrixXd covariance = refined.covariance.block(begin, begin, J.cols(), J.cols());
   const double variance = (J * covariance * J.transpose()).trace();
@@ -246,7 +238,7 @@ void predictRemoval(const identify::GapSearch& search, const identify::EffectSel
   const Removal removal(search);
   for (std::size_t t = 0; t < selection.ways.size(); ++t) {
     if (model.terms[t].effect->body == nullptr) continue;
-    const std::vector<Pose> rest = search.physics().predictions(without(model, t));
+    const std::vector<Pose> rest = search.physics().predictions(identify::withoutTerm(model, t));
     for (const std::size_t i : order) {
       const identify::Matrix6d noise =
           identify::noiseOf(search.physics().rows().rows[i], search.placingSd_m(), search.placingSd_rad());

@@ -5,6 +5,18 @@
 #include "calib/field/tracker_model.h"
 
 namespace fieldtrue::identify {
+
+Eigen::Index parametersOf(const GapModel& model) {
+  Eigen::Index count = 0;
+  for (const GapTerm& term : model.terms) count += term.linear.size() + term.searched.size();
+  return count;
+}
+
+GapModel withoutTerm(GapModel model, std::size_t term) {
+  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  return model;
+}
+
 std::vector<field::SensorSetting> GapPhysics::settings(const GapAlignment& alignment) const {
   std::vector<field::SensorSetting> settings;
   settings.reserve(size());

@@ -32,6 +32,11 @@ struct GapModel {
   std::vector<GapTerm> terms;
 };
 
+/// Parameters of a model's terms, searched ones too; the alignment's do not count.
+Eigen::Index parametersOf(const GapModel& model);
+/// The model with one term fewer.
+GapModel withoutTerm(GapModel model, std::size_t term);
+
 /// What a tracker reports of rows, and how far the reports are from a model.
 class GapPhysics {
  public:

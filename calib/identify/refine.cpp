@@ -368,4 +368,11 @@ RefinedModel refineJointly(const GapPhysics& physics, const GapModel& start, con
   return JointFit(physics, whitening, options).run(start);
 }
 
+Eigen::Index firstParameterOf(const RefinedModel& refined, std::size_t term) {
+  Eigen::Index begin = refined.n_alignment;
+  for (std::size_t t = 0; t < term; ++t)
+    begin += refined.model.terms[t].linear.size() + refined.model.terms[t].searched.size();
+  return begin;
+}
+
 }  // namespace fieldtrue::identify

@@ -62,6 +62,9 @@ struct RefinedModel {
   double cost = 0.0;
 };
 
+/// Where the parameters of a term begin in a refined model's covariance.
+Eigen::Index firstParameterOf(const RefinedModel& refined, std::size_t term);
+
 /// Fits all parameters of a model together against the tracker's own nonlinear solution, by Levenberg and Marquardt
 /// with weights that follow the residual law.
 RefinedModel refineJointly(const GapPhysics& physics, const GapModel& start, const Whitening& whitening,

@@ -27,8 +27,6 @@ double pitchOf_m(std::span<const field::SensorSetting> settings) {
   return nearest_m.empty() ? 0.1 : median(std::move(nearest_m));
 }
 
-int parametersOf(const GapTerm& term) { return static_cast<int>(term.linear.size() + term.searched.size()); }
-
 }  // namespace
 
 GapSearch::GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed, NoiseFrom noise)
@@ -132,8 +130,7 @@ double GapSearch::bicOf(const GapModel& model, std::span<const char> used) const
       if (used[i] != 0) left[kept++] = left[i];
     left.resize(kept);
   }
-  double parameters = 0.0;
-  for (const GapTerm& term : model.terms) parameters += parametersOf(term);
+  const auto parameters = static_cast<double>(parametersOf(model));
   const double count = static_cast<double>(left.size()) * rows_.channels();
   return devianceOf(left, rows_.has_orientation, law_).value + parameters * std::log(count) +
          priorCost(physics_, model);
@@ -184,7 +181,7 @@ void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Line
   const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
   const double sum = at.residual().squaredNorm();
   const double left = std::max(1e-9 * sum, sum - best->gain);
-  const double gain = count * std::log(sum / left) - parametersOf(term) * std::log(count);
+  const double gain = count * std::log(sum / left) - static_cast<double>(parametersOf({{}, {term}})) * std::log(count);
   if (gain <= tried.bic_gain) return;
   tried.bic_gain = gain;
   tried.model = base.model;
@@ -356,9 +353,7 @@ class Selector {
   }
 
   RefinedModel without(const EffectSelection& selection, std::size_t term) const {
-    GapModel model = selection.model.model;
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(term));
-    return search_.refined(model);
+    return search_.refined(withoutTerm(selection.model.model, term));
   }
 
   /// Replaces earlier effects by others where these are better now that the last one is there.
