@@ -2,6 +2,7 @@
 
 #include <QCoreApplication>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -17,7 +18,6 @@
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/report_json.h"
-#include "calib/recording/recording_change.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/report/gap_section.h"
 
@@ -42,6 +42,7 @@ struct DiagnoseOptions {
 /// All that a diagnosis starts from.
 struct DiagnosisInput {
   CalibrationTable table;
+  std::shared_ptr<const CalibrationTable> against;
   std::optional<SampleTable> samples;
   std::optional<simulation::Scene> scene;
   std::vector<std::string> notes;
@@ -49,17 +50,15 @@ struct DiagnosisInput {
 
 Read<DiagnosisInput> readDiagnosisInput(const DiagnoseOptions& options) {
   DiagnosisInput input;
-  auto nodes =
-      readRowsArgument(options.nodes, options.table, options.against.empty() ? SensorRows::kAll : SensorRows::kOne);
+  auto nodes = readRowsArgument(options.nodes, options.table, SensorRows::kAll);
   if (!nodes) return tl::unexpected(nodes.error());
   input.table = std::move(nodes->table);
   input.notes = std::move(nodes->notes);
   if (!options.against.empty()) {
-    auto before = readRowsArgument(options.against, options.table, SensorRows::kOne);
+    if (!options.samples.empty()) return wrongUsage("--samples tells nothing of what changed --against; leave one out");
+    auto before = readRowsArgument(options.against, options.table, SensorRows::kAll);
     if (!before) return tl::unexpected(before.error());
-    auto change = recording::changeSince(before->table, input.table);
-    if (!change) return notPossible(change.error());
-    input.table = *std::move(change);
+    input.against = std::make_shared<CalibrationTable>(std::move(before->table));
   }
   if (!options.samples.empty()) {
     auto samples = readSampleTable(std::filesystem::path(options.samples));
@@ -104,6 +103,7 @@ Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common)
   const auto report = stoppable<gap::GapReport>(runControl(common, "diagnosing"), [&](const RunControl& control) {
     gap::DiagnosisOptions diagnosis;
     diagnosis.replicates = options.replicates;
+    diagnosis.against = input->against;
     return gap::diagnose(input->table, samples, scene, diagnosis, control);
   });
   if (!report) return notPossible(report.error());
@@ -129,8 +129,9 @@ void addDiagnose(CommandLine& line) {
   command->add_option("--nodes", options->nodes, "Node table")->type_name("FILE")->required();
   addTableOptions(*command, options->table);
   command
-      ->add_option("--against", options->against,
-                   "Node table of the same places recorded before: find what changed since, whatever the rig says")
+      ->add_option(
+          "--against", options->against,
+          "Node table recorded before, of these or other places: find what changed since, whatever the rig says")
       ->type_name("FILE");
   command->add_option("--samples", options->samples, "Its sample table: mains, filter and lattice show only there")
       ->type_name("FILE");

@@ -9,6 +9,7 @@
 #include "calib/effects/registry.h"
 #include "calib/field/tracker_model.h"
 #include "calib/gap/candidates.h"
+#include "calib/gap/change.h"
 #include "calib/gap/isolability.h"
 #include "calib/gap/judgement.h"
 #include "calib/gap/next_measurement.h"
@@ -230,54 +231,26 @@ RunControl partOf(const RunControl& control, double from, double to) {
   return part;
 }
 
-}  // namespace
-
-Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
-                           const DiagnosisOptions& options, const RunControl& control) {
-  GapReport report;
-  recording::Cleaned cleaned = recording::cleanRows(table);
-  FT_TRY(auto rows, identify::makeGapRows(cleaned.nodes, table.metadata));
-  takeFromScene(scene, table.metadata, rows);
-  FT_TRY(auto believed, believedEffects(scene, rows.excitation));
-  report.names = std::move(cleaned.names);
-  describeInput(rows, samples, report);
-  report.findings = std::move(cleaned.findings);
-  addSignalFindings(table, samples, scene, rows.sensors.front(), report);
-  control.progress(0.01);
-
-  addAssumption(table.metadata, report);
-  const bool is_mirrored = identify::isMirrored(rows);
-  if (is_mirrored)
-    report.findings.push_back(
-        {"",
-         "True and tracked positions are mirror images: an axis has the wrong sign, or two are exchanged. "
-         "Put that right first; causes are not looked for.",
-         {}});
-  const identify::GapSearch search(rows, std::move(believed));
-  identify::EffectSelectionOptions selecting;
-  const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
-  selecting.most_effects = has_enough && !is_mirrored ? options.most_effects : 0;
-  const double part = options.replicates > 0 ? 0.1 : 1.0;  // Of the progress, without replicates.
-  const identify::EffectSelection selection =
-      identify::selectEffects(search, selecting, partOf(control, 0.1 * part, 0.7 * part));
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
-  control.progress(0.7 * part);
-  const Judgement judgement = judge(search, selection, partOf(control, 0.7 * part, 0.9 * part));
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
-  control.progress(0.9 * part);
-
-  describeWhere(search, judgement.selection.model.model, report);
-  report.floor_position_mm = 1e3 * std::sqrt(judgement.far.floor_m2);
-  if (rows.has_orientation) report.floor_orientation_deg = kDegPerRad * std::sqrt(judgement.far.floor_rad2);
-  const identify::GapAlignment& alignment = judgement.selection.model.model.alignment;
+void describeAlignment(const identify::GapAlignment& alignment, const identify::GapRows& rows, GapReport& report) {
   report.tracker_from_reference = alignment.tracker_from_reference;
   report.sensor_from_mount = inverse(alignment.mount_from_sensor.front());
   for (std::size_t s = 0; s < rows.sensors.size(); ++s)
     report.sensors_from_mounts[rows.sensors[s]] = inverse(alignment.mount_from_sensor[s]);
+}
+
+/// Everything that follows from what was judged.
+/// @param known_gap whether there is a gap, where that is known already
+void describeJudgement(const identify::GapSearch& search, const Judgement& judgement, std::optional<bool> known_gap,
+                       GapReport& report) {
+  const identify::GapRows& rows = search.physics().rows();
+  describeWhere(search, judgement.selection.model.model, report);
+  describeAlignment(judgement.selection.model.model.alignment, rows, report);
+  report.floor_position_mm = 1e3 * std::sqrt(judgement.far.floor_m2);
+  if (rows.has_orientation) report.floor_orientation_deg = kDegPerRad * std::sqrt(judgement.far.floor_rad2);
   report.p_value = search.structureOfNone().p_value;
   report.origin = search.structureOfNone().origin;
   const double scattered = scatteredShare(search, rows, report);
-  const bool has_gap = hasGap(search, judgement, scattered);
+  const bool has_gap = known_gap.value_or(hasGap(search, judgement, scattered));
   report.candidates = describeCandidates(search, judgement, has_gap, scattered);
   report.selected = describeSelected(search, judgement, report.candidates);
   report.verdict = verdictOf(judgement.far, !report.selected.empty(), has_gap);
@@ -291,9 +264,63 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   addBoundOfFloor(search, rows, report);
   addSequence(judgement.far, report);
   report.remaining = remainingOf(judgement.far, rows);
+}
+
+/// Makes the recording again and again under what was found.
+void addReplicates(const identify::GapSearch& search, const Judgement& judgement, const simulation::Scene* scene,
+                   const DiagnosisOptions& options, int most_effects, const RunControl& control, GapReport& report) {
+  ReplicateOptions replicating;
+  replicating.wanted = options.replicates;
+  replicating.seed = options.seed;
+  replicating.most_effects = most_effects;
+  const field::Excitation& excitation = search.physics().rows().excitation;
+  const auto believedAgain = [&] { return believedEffects(scene, excitation).value(); };
+  report.replicates = replicate(search, judgement, report.candidates, believedAgain, replicating, control);
+}
+
+void addMirrored(GapReport& report) {
+  report.findings.push_back({"",
+                             "True and tracked positions are mirror images: an axis has the wrong sign, or two are "
+                             "exchanged. Put that right first; causes are not looked for.",
+                             {}});
+}
+
+/// @param known_gap whether there is a gap, where that is known already; causes are looked for only if it may be
+Result<GapReport> diagnoseRows(const CalibrationTable& table, const SampleTable* samples,
+                               const simulation::Scene* scene, const DiagnosisOptions& options,
+                               std::optional<bool> known_gap, const RunControl& control) {
+  const auto stopped = [&] { return fail(ErrorCode::kCancelled, "The diagnosis was stopped."); };
+  GapReport report;
+  recording::Cleaned cleaned = recording::cleanRows(table);
+  FT_TRY(auto rows, identify::makeGapRows(cleaned.nodes, table.metadata));
+  takeFromScene(scene, table.metadata, rows);
+  FT_TRY(auto believed, believedEffects(scene, rows.excitation));
+  report.names = std::move(cleaned.names);
+  describeInput(rows, samples, report);
+  report.findings = std::move(cleaned.findings);
+  if (!known_gap) addSignalFindings(table, samples, scene, rows.sensors.front(), report);
+  control.progress(0.01);
+
+  addAssumption(table.metadata, report);
+  const bool is_mirrored = identify::isMirrored(rows);
+  if (is_mirrored) addMirrored(report);
+  const identify::GapSearch search(rows, std::move(believed));
+  identify::EffectSelectionOptions selecting;
+  const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
+  selecting.most_effects = has_enough && !is_mirrored && known_gap.value_or(true) ? options.most_effects : 0;
+  const double part = options.replicates > 0 ? 0.1 : 1.0;  // Of the progress, without replicates.
+  const identify::EffectSelection selection =
+      identify::selectEffects(search, selecting, partOf(control, 0.1 * part, 0.7 * part));
+  if (control.stop.stop_requested()) return stopped();
+  control.progress(0.7 * part);
+  const Judgement judgement = judge(search, selection, partOf(control, 0.7 * part, 0.9 * part));
+  if (control.stop.stop_requested()) return stopped();
+  control.progress(0.9 * part);
+
+  describeJudgement(search, judgement, known_gap, report);
   report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);
   report.isolability = isolabilityOf(search, kStartsForIsolability, control);
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
+  if (control.stop.stop_requested()) return stopped();
   suggestNext(search, judgement.selection, report);
   report.text = verdictText(report);
   if (!has_enough) {
@@ -302,17 +329,34 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   }
   selectSignalFindings(report);
   if (options.replicates > 0) {
-    ReplicateOptions replicating;
-    replicating.wanted = options.replicates;
-    replicating.seed = options.seed;
-    replicating.most_effects = selecting.most_effects;
-    const auto believedAgain = [&] { return believedEffects(scene, rows.excitation).value(); };
-    report.replicates =
-        replicate(search, judgement, report.candidates, believedAgain, replicating, partOf(control, part, 1.0));
-    if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The diagnosis was stopped.");
+    addReplicates(search, judgement, scene, options, selecting.most_effects, partOf(control, part, 1.0), report);
+    if (control.stop.stop_requested()) return stopped();
   }
   control.progress(1.0);
   return report;
+}
+
+/// What changed since an earlier recording: nothing, or the change diagnosed as a gap is.
+Result<GapReport> diagnoseChange(const CalibrationTable& table, const simulation::Scene* scene,
+                                 const DiagnosisOptions& options, const RunControl& control) {
+  FT_TRY(const auto change, changeSince(*options.against, table, control));
+  std::optional<simulation::Scene> tracker;  // What was wrong then is believed already.
+  if (scene != nullptr) {
+    tracker = *scene;
+    tracker->effects.clear();
+  }
+  FT_TRY(auto report, diagnoseRows(change.table, nullptr, tracker ? &*tracker : nullptr, options, change.changed,
+                                   partOf(control, 0.2, 1.0)));
+  describeChange(change, report);
+  return report;
+}
+
+}  // namespace
+
+Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
+                           const DiagnosisOptions& options, const RunControl& control) {
+  if (options.against == nullptr) return diagnoseRows(table, samples, scene, options, {}, control);
+  return diagnoseChange(table, scene, options, control);
 }
 
 simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report) {

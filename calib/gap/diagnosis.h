@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -13,6 +14,9 @@
 namespace fieldtrue::gap {
 
 struct DiagnosisOptions {
+  /// An earlier recording of the same room, whatever its places: what changed since is diagnosed, whatever was wrong
+  /// then, and whatever the rig says. Null = none.
+  std::shared_ptr<const CalibrationTable> against;
   int most_effects = 4;
   int replicates = 0;      ///< How many recordings are made again under what was found, to tell how far to trust it.
   std::uint64_t seed = 1;  ///< Of those.
@@ -23,7 +27,7 @@ struct DiagnosisOptions {
 /// @param samples the raw readings of the table's rows; null = none
 /// @param scene what the simulator believes; null = an ideal tracker in free space
 /// @error kTooFewNodes below 8 usable places (causes are looked for from 12 on), those with a value that is not finite
-/// left out and named; kCancelled
+/// left out and named, or where an earlier recording tells the field at fewer; kCancelled
 Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
                            const DiagnosisOptions& options = {}, const RunControl& control = {});
 

@@ -174,6 +174,15 @@ struct Replicates {
   std::string text;
 };
 
+/// What changed since an earlier recording.
+struct Against {
+  bool changed = false;
+  double p_value = 1.0;                       ///< At most so often two recordings of one field differ as much.
+  double rms_mm = 0.0;                        ///< Of the change of positions.
+  std::optional<Eigen::Vector3d> location_m;  ///< Of what is named, else where positions changed most; tracker frame.
+  std::string effect;                         ///< "" where nothing is named.
+};
+
 /// All that a diagnosis found; `*.gap.json` is this struct (design contract `fieldtrue.gap/1`).
 struct GapReport {
   struct Input {
@@ -210,6 +219,7 @@ struct GapReport {
   Remaining remaining;
   RivalReport rival;
   std::optional<Replicates> replicates;
+  std::optional<Against> against;
   std::optional<double> odds_over_next;  ///< Of the first candidate over the second.
   Isolability isolability;
   std::string next_measurement;

@@ -218,6 +218,14 @@ json replicatesToJson(const Replicates& replicates) {
   return to;
 }
 
+json againstToJson(const Against& against) {
+  return {{"changed", against.changed},
+          {"p_value", numberToJson(against.p_value)},
+          {"rms_mm", numberToJson(against.rms_mm)},
+          {"location_m", against.location_m ? vectorToJson(*against.location_m) : json(nullptr)},
+          {"effect", against.effect.empty() ? json(nullptr) : json(against.effect)}};
+}
+
 json predictionToJson(const Prediction& prediction) {
   return {{"effect", prediction.effect},
           {"node", prediction.node},
@@ -268,7 +276,7 @@ json toJson(const GapReport& report) {
           {"rival", rivalToJson(report.rival)},
           {"odds_over_next", numberToJson(report.odds_over_next)},
           {"replicates", report.replicates ? replicatesToJson(*report.replicates) : json(nullptr)},
-          {"against", nullptr},
+          {"against", report.against ? againstToJson(*report.against) : json(nullptr)},
           {"isolability", toJson(report.isolability)},
           {"next_measurement", {{"text", report.next_measurement}, {"separates", report.next_separates}}},
           {"predictions", listToJson(report.predictions, predictionToJson)}};

@@ -204,6 +204,16 @@ Replicates replicatesFrom(const JsonReader& reader) {
   return replicates;
 }
 
+Against againstFrom(const JsonReader& reader) {
+  Against against;
+  against.changed = reader["changed"].flag();
+  against.p_value = reader["p_value"].number();
+  against.rms_mm = reader["rms_mm"].number();
+  if (const JsonReader location = reader["location_m"]; !location.isNull()) against.location_m = location.vector3();
+  if (!reader["effect"].isNull()) against.effect = reader["effect"].text();
+  return against;
+}
+
 Isolability isolabilityFrom(const JsonReader& reader) {
   Isolability isolability;
   isolability.pairs = reader["pairs"].list([](const JsonReader& pair) {
@@ -233,6 +243,7 @@ GapReport reportFrom(const JsonReader& root) {
   if (root.has("rival")) readRival(root["rival"], report.rival);
   if (const auto replicates = root.find("replicates"); replicates && !replicates->isNull())
     report.replicates = replicatesFrom(*replicates);
+  if (const auto against = root.find("against"); against && !against->isNull()) report.against = againstFrom(*against);
   if (root.has("odds_over_next")) report.odds_over_next = root["odds_over_next"].optionalNumber();
   report.isolability = isolabilityFrom(root["isolability"]);
   report.next_measurement = root["next_measurement"]["text"].text();

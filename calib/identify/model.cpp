@@ -70,6 +70,18 @@ std::vector<Vector6d> GapPhysics::residuals(const GapModel& model) const {
   return residuals;
 }
 
+std::vector<Eigen::Quaterniond> meanMountings(const GapRows& table, const Pose& tracker_from_reference) {
+  std::vector<std::vector<Eigen::Quaterniond>> seen(table.sensors.size());
+  for (const GapRow& row : table.rows) {
+    const Eigen::Quaterniond tracker_from_mount =
+        tracker_from_reference.orientation * row.reference_from_sensor.orientation;
+    seen[row.sensor].push_back(tracker_from_mount.conjugate() * row.tracker_from_sensor.orientation);
+  }
+  std::vector<Eigen::Quaterniond> mean;
+  for (const std::vector<Eigen::Quaterniond>& of_sensor : seen) mean.push_back(meanRotation(of_sensor));
+  return mean;
+}
+
 GapAlignment initialAlignment(const GapRows& table) {
   GapAlignment alignment;
   alignment.mount_from_sensor.resize(table.sensors.size());
@@ -83,14 +95,8 @@ GapAlignment initialAlignment(const GapRows& table) {
   }
   if (const auto rigid = fitRigid(p_true_m, p_tracked_m)) alignment.tracker_from_reference = *rigid;
   if (!table.has_orientation) return alignment;
-  std::vector<std::vector<Eigen::Quaterniond>> mounting(table.sensors.size());
-  for (const GapRow& row : table.rows) {
-    const Eigen::Quaterniond tracker_from_mount =
-        alignment.tracker_from_reference.orientation * row.reference_from_sensor.orientation;
-    mounting[row.sensor].push_back(tracker_from_mount.conjugate() * row.tracker_from_sensor.orientation);
-  }
-  for (std::size_t s = 0; s < mounting.size(); ++s)
-    alignment.mount_from_sensor[s].orientation = meanRotation(mounting[s]);
+  const std::vector<Eigen::Quaterniond> mountings = meanMountings(table, alignment.tracker_from_reference);
+  for (std::size_t s = 0; s < mountings.size(); ++s) alignment.mount_from_sensor[s].orientation = mountings[s];
   return alignment;
 }
 

@@ -60,6 +60,9 @@ class GapPhysics {
   std::vector<std::unique_ptr<field::PhysicalEffect>> believed_;
 };
 
+/// Mean orientation of each sensor in its holder, an alignment of the rig given.
+std::vector<Eigen::Quaterniond> meanMountings(const GapRows& rows, const Pose& tracker_from_reference);
+
 /// The start of every search: rigid alignment of positions and the mean mounting.
 GapAlignment initialAlignment(const GapRows& rows);
 

@@ -23,20 +23,6 @@ double sameTurn(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return std::exp(-2.0 * (1.0 - cosine_half * cosine_half) / kWidth2);
 }
 
-double covariance(const SmoothLaw& law, const FieldPoint& a, const FieldPoint& b) {
-  double sum = 0.0;
-  if (law.by_place > 0.0 || law.by_turn > 0.0) {
-    const double near = matern52((a.place_m - b.place_m).norm() / law.length_m);
-    sum += law.by_place * law.by_place * near;
-    if (law.by_turn > 0.0) sum += law.by_turn * law.by_turn * near * sameTurn(a.turned, b.turned);
-  }
-  if (law.by_time > 0.0) {
-    sum += law.by_time * law.by_time * matern52(std::abs(a.time_s - b.time_s) / law.time_s) *
-           matern52((a.place_m - b.place_m).norm() / law.far_m);
-  }
-  return sum;
-}
-
 double logDensity(const Eigen::LLT<Eigen::MatrixXd>& factor, const Eigen::MatrixX3d& values,
                   const Eigen::MatrixX3d& weights) {
   const double log_determinant = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
@@ -169,6 +155,20 @@ class LawSearch {
 };
 
 }  // namespace
+
+double covariance(const SmoothLaw& law, const FieldPoint& a, const FieldPoint& b) {
+  double sum = 0.0;
+  if (law.by_place > 0.0 || law.by_turn > 0.0) {
+    const double near = matern52((a.place_m - b.place_m).norm() / law.length_m);
+    sum += law.by_place * law.by_place * near;
+    if (law.by_turn > 0.0) sum += law.by_turn * law.by_turn * near * sameTurn(a.turned, b.turned);
+  }
+  if (law.by_time > 0.0) {
+    sum += law.by_time * law.by_time * matern52(std::abs(a.time_s - b.time_s) / law.time_s) *
+           matern52((a.place_m - b.place_m).norm() / law.far_m);
+  }
+  return sum;
+}
 
 SmoothField::SmoothField(std::vector<FieldPoint> points, const Eigen::MatrixX3d& values,
                          const Eigen::VectorXd& variances, const SmoothLaw& law)

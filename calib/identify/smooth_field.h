@@ -27,6 +27,9 @@ struct SmoothLaw {
   bool isNothing() const { return by_place == 0.0 && by_turn == 0.0 && by_time == 0.0; }
 };
 
+/// Of each component of such a field at two points.
+double covariance(const SmoothLaw& law, const FieldPoint& a, const FieldPoint& b);
+
 /// What a field may depend on in one recording.
 struct SmoothParts {
   bool turn = false;  ///< The sensor was turned in more than one way.

@@ -23,23 +23,35 @@ double inflation(const Eigen::Vector3d& left, const ResidualLaw& law) {
 
 }  // namespace
 
-UnnamedRival::UnnamedRival(const GapSearch& search)
-    : rows_(search.physics().rows()), parts_{rows_.several_orientations, rows_.has_times} {
-  const std::vector<field::SensorSetting> settings = search.physics().settings(search.none().model.alignment);
-  const std::vector<Vector6d>& left = search.structureOfNone().left;
-  const auto n = static_cast<Eigen::Index>(settings.size());
-  variance_m2_.resize(n);
-  variance_rad2_.resize(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const GapRow& row = rows_.rows[static_cast<std::size_t>(i)];
-    points_.push_back({settings[static_cast<std::size_t>(i)].tracker_from_sensor.position_m,
-                       row.reference_from_sensor.orientation, row.time_s});
-    const Matrix6d noise = noiseOf(row, search.placingSd_m(), search.placingSd_rad());
-    const Vector6d& out = left[static_cast<std::size_t>(i)];
-    variance_m2_[i] = noise.topLeftCorner<3, 3>().trace() / 3.0 * inflation(out.head<3>(), search.law());
-    variance_rad2_[i] = noise.bottomRightCorner<3, 3>().trace() / 3.0 * inflation(out.tail<3>(), search.law());
-  }
+std::vector<FieldPoint> fieldPoints(const GapSearch& search, const GapAlignment& alignment) {
+  const GapRows& rows = search.physics().rows();
+  const std::vector<field::SensorSetting> settings = search.physics().settings(alignment);
+  std::vector<FieldPoint> points;
+  for (std::size_t i = 0; i < settings.size(); ++i)
+    points.push_back(
+        {settings[i].tracker_from_sensor.position_m, settings[i].tracker_from_sensor.orientation, rows.rows[i].time_s});
+  return points;
 }
+
+Eigen::VectorXd noiseVariances(const GapSearch& search, bool rotation) {
+  const GapRows& rows = search.physics().rows();
+  const std::vector<Vector6d>& left = search.structureOfNone().left;
+  const int first = rotation ? 3 : 0;
+  Eigen::VectorXd variances(static_cast<Eigen::Index>(rows.rows.size()));
+  for (Eigen::Index i = 0; i < variances.size(); ++i) {
+    const auto row = static_cast<std::size_t>(i);
+    const Matrix6d noise = noiseOf(rows.rows[row], search.placingSd_m(), search.placingSd_rad());
+    variances[i] = noise.block<3, 3>(first, first).trace() / 3.0 * inflation(left[row].segment<3>(first), search.law());
+  }
+  return variances;
+}
+
+UnnamedRival::UnnamedRival(const GapSearch& search)
+    : rows_(search.physics().rows()),
+      points_(fieldPoints(search, search.none().model.alignment)),
+      variance_m2_(noiseVariances(search, false)),
+      variance_rad2_(noiseVariances(search, true)),
+      parts_{rows_.several_orientations, rows_.has_times} {}
 
 Eigen::MatrixX3d UnnamedRival::valuesOf(std::span<const Vector6d> residuals, std::span<const std::size_t> rows,
                                         bool rotation) const {

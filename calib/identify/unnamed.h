@@ -14,6 +14,12 @@ struct UnnamedLaws {
   SmoothLaw rotation;
 };
 
+/// Where, how turned and when each row was taken, tracker frame.
+std::vector<FieldPoint> fieldPoints(const GapSearch& search, const GapAlignment& alignment);
+/// Of the noise and the placing of each row's components, m^2 or rad^2; more where a row stands far out of what the
+/// flexible fit leaves.
+Eigen::VectorXd noiseVariances(const GapSearch& search, bool rotation);
+
 /// The smooth rival of all causes on one recording: it needs no physics, only that neighbours err alike.
 class UnnamedRival {
  public:

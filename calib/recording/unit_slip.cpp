@@ -24,7 +24,7 @@ constexpr double kNarrowest_m = 1e-3;
 constexpr std::size_t kFewestPlaces = 4;
 constexpr double kLargestRatio = 2.0;
 /// Rows whose distances are taken; all their pairs are, so this bounds the work.
-constexpr std::size_t kMostRows = 300;
+constexpr std::size_t kMostNodes = 300;
 constexpr double kEnlargement = 3.0;
 /// Fewer readings near the region may lie outside it by chance.
 constexpr std::size_t kFewestReadings = 10;
@@ -36,12 +36,12 @@ bool isUsable(const Node& node) {
 
 /// Rows that stand for all: drawn, so that no layer or column of a grid is favoured, and the same ones every time.
 std::vector<Node> representatives(std::vector<Node> nodes) {
-  if (nodes.size() <= kMostRows) return nodes;
+  if (nodes.size() <= kMostNodes) return nodes;
   std::mt19937_64 generator(1);
-  for (std::size_t i = 0; i < kMostRows; ++i) {
+  for (std::size_t i = 0; i < kMostNodes; ++i) {
     std::swap(nodes[i], nodes[i + static_cast<std::size_t>(generator() % (nodes.size() - i))]);
   }
-  nodes.resize(kMostRows);
+  nodes.resize(kMostNodes);
   return nodes;
 }
 

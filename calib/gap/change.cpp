@@ -1,0 +1,272 @@
+#include "calib/gap/change.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/core/units.h"
+#include "calib/gap/two_recordings.h"
+#include "calib/gap/verdict.h"
+#include "calib/identify/field_comparison.h"
+
+namespace fieldtrue::gap {
+namespace {
+
+constexpr std::size_t kRowsForField = 500;  ///< Of the earlier one, to foretell what it would have read.
+constexpr std::size_t kFewestPlaces = 8;
+
+/// What would have been read at one row, metres or radians beside the alignment, and the variance of each component.
+struct Foretold {
+  Eigen::Vector3d value;
+  double variance = 0.0;
+};
+
+/// Positions or rotations of both recordings: whether they changed, and what the earlier one foretells of the later.
+class Channel {
+ public:
+  Channel(const Recording& before, const Recording& now, const Alignments& alignments, std::span<const int> places,
+          bool rotation)
+      : earlier_(identify::readingsOf(*before.search, alignments.before, rotation)
+                     .only(evenlyPlaced(before.rows, kRowsForField))),
+        later_(identify::readingsOf(*now.search, alignments.now, rotation)),
+        both_(someOfBoth(before, now, alignments, places, rotation)),
+        places_(places.begin(), places.end()),
+        pitch_m_(std::max(before.search->design().pitch_m, now.search->design().pitch_m)) {
+    parts_.turn = before.rows.several_orientations || now.rows.several_orientations;
+    earlier_.free.clear();  // The alignment is settled: what it leaves is of the field.
+  }
+
+  void run(const RunControl& control) {
+    found_ = identify::compareFields(both_, parts_, pitch_m_, control);
+    const identify::SharedField field(earlier_, found_.earlier);
+    for (std::size_t i = 0; i < later_.size(); ++i)
+      foretold_.push_back(
+          {field.sharedAt(later_.points[i], places_[i]), field.sharedVarianceAt(later_.points[i], places_[i])});
+  }
+  const identify::FieldComparison& found() const { return found_; }
+  /// What the earlier recording would have read at the later one's rows.
+  const std::vector<Foretold>& foretold() const { return foretold_; }
+
+  std::vector<Eigen::Vector3d> change() const {
+    const identify::SharedField field(both_, found_.earlier, found_.change);
+    std::vector<Eigen::Vector3d> change;
+    for (const identify::FieldPoint& point : later_.points) change.push_back(field.changeAt(point));
+    return change;
+  }
+
+  /// A reading counts where what is foretold is no less sure than itself, or at least far surer than without any.
+  bool knows(std::size_t row) const {
+    constexpr double kFarSurer = 0.25;
+    const identify::SmoothLaw& law = found_.earlier.field;
+    const double unknown = law.by_place * law.by_place + law.by_turn * law.by_turn;
+    return foretold_[row].variance <= std::max(later_.variances[static_cast<Eigen::Index>(row)], kFarSurer * unknown) &&
+           nearestBefore_m(row) <= 2.0 * pitch_m_;
+  }
+
+ private:
+  double nearestBefore_m(std::size_t row) const {
+    double nearest_m = std::numeric_limits<double>::infinity();
+    for (const identify::FieldPoint& point : earlier_.points)
+      nearest_m = std::min(nearest_m, (point.place_m - later_.points[row].place_m).norm());
+    return nearest_m;
+  }
+
+  identify::FieldReadings earlier_;
+  identify::FieldReadings later_;
+  identify::FieldReadings both_;
+  std::vector<int> places_;
+  double pitch_m_;
+  identify::SmoothParts parts_;
+  identify::FieldComparison found_;
+  std::vector<Foretold> foretold_;
+};
+
+/// Positions changed, rotations did, or both: each as likely beforehand.
+double jointLogOdds(double of_positions, const std::optional<double>& of_rotations) {
+  if (!of_rotations) return of_positions;
+  const double both = of_positions + *of_rotations;
+  const double most = std::max({of_positions, *of_rotations, both});
+  return most +
+         std::log((std::exp(of_positions - most) + std::exp(*of_rotations - most) + std::exp(both - most)) / 3.0);
+}
+
+/// The middle of where the change is at least half its largest, weighed by its square.
+Eigen::Vector3d hottest(const std::vector<Eigen::Vector3d>& change, const std::vector<field::SensorSetting>& settings,
+                        const std::vector<char>& known) {
+  double most = 0.0;
+  for (std::size_t i = 0; i < change.size(); ++i)
+    if (known[i] != 0) most = std::max(most, change[i].norm());
+  Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
+  double weights = 0.0;
+  for (std::size_t i = 0; i < change.size(); ++i) {
+    if (known[i] == 0 || change[i].norm() < 0.5 * most) continue;
+    sum_m += change[i].squaredNorm() * settings[i].tracker_from_sensor.position_m;
+    weights += change[i].squaredNorm();
+  }
+  return sum_m / weights;
+}
+
+/// Where most places are the same: how far the whole rig stands from where it stood.
+void describeRig(const Recording& before, const Recording& now, const Alignments& alignments,
+                 std::span<const int> places, RecordingChange& change) {
+  const auto is_old = [&](int place) { return static_cast<std::size_t>(place) < before.rows.place_nodes.size(); };
+  if (2 * std::count_if(places.begin(), places.end(), is_old) < static_cast<std::ptrdiff_t>(places.size())) return;
+  const Pose& was = alignments.before.tracker_from_reference;
+  const Pose& is = alignments.now.tracker_from_reference;
+  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
+  for (const identify::GapRow& row : now.rows.rows)
+    middle_m += row.reference_from_sensor.position_m / static_cast<double>(now.rows.rows.size());
+  change.rig_moved_mm = 1e3 * (is * middle_m - was * middle_m).norm();
+  change.rig_turned_deg = kDegPerRad * angleBetween_rad(was.orientation, is.orientation);
+}
+
+/// The later rows where the earlier recording tells the field, each held to stand where that would have reported it.
+CalibrationTable tableOfChange(const Recording& now, const TableMetadata& metadata, const Alignments& alignments,
+                               const std::vector<Channel>& channels, const std::vector<char>& known) {
+  const bool has_rotation = channels.size() > 1;
+  const auto own_share = [](const Channel& channel) { return std::sqrt(1.0 - channel.found().earlier.rig_share); };
+  CalibrationTable change;
+  change.metadata = metadata;
+  change.metadata.alignment_known = false;
+  if (auto& tolerance = change.metadata.jig_tolerance_m) *tolerance *= own_share(channels[0]);
+  if (auto& tolerance = change.metadata.jig_tolerance_rad; tolerance && has_rotation)
+    *tolerance *= own_share(channels[1]);
+  const std::vector<field::SensorSetting> settings = now.search->physics().settings(alignments.now);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (known[i] == 0) continue;
+    Node node = now.nodes[i];
+    const double n = std::max(1.0, node.n_effective);
+    const Foretold& place = channels[0].foretold()[i];
+    node.reference_from_sensor = settings[i].tracker_from_sensor;
+    node.reference_from_sensor.position_m += place.value;
+    node.covariance_m2 =
+        node.covariance_m2.value_or(Eigen::Matrix3d::Zero()) + n * place.variance * Eigen::Matrix3d::Identity();
+    node.has_orientation = node.has_orientation && has_rotation;
+    if (has_rotation) {
+      const Foretold& turn = channels[1].foretold()[i];
+      node.reference_from_sensor.orientation = rotationFromVector(turn.value) * node.reference_from_sensor.orientation;
+      node.sd_rot_rad = std::sqrt(std::pow(node.sd_rot_rad.value_or(0.0), 2) + 3.0 * n * turn.variance);
+    }
+    change.nodes.push_back(node);
+  }
+  return change;
+}
+
+/// How large the likeliest change is where the earlier recording tells the field, and where it is largest.
+void describeSize(const Recording& now, const Alignments& alignments, const Channel& positions,
+                  const std::vector<char>& known, double log_odds, RecordingChange& change) {
+  const std::vector<Eigen::Vector3d> changed_m = positions.change();
+  double squares = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (known[i] == 0) continue;
+    squares += changed_m[i].squaredNorm();
+    count += 1.0;
+  }
+  const double probability = 1.0 / (1.0 + std::exp(-log_odds));
+  change.rms_mm = 1e3 * probability * std::sqrt(squares / count);
+  if (change.changed) change.hottest_m = hottest(changed_m, now.search->physics().settings(alignments.now), known);
+}
+
+}  // namespace
+
+Result<RecordingChange> changeSince(const CalibrationTable& before_table, const CalibrationTable& now_table,
+                                    const RunControl& control) {
+  FT_TRY(auto before, recordingOf(before_table));
+  FT_TRY(auto now, recordingOf(now_table));
+  const std::vector<int> places = placesBefore(*before, *now);
+  const Alignments alignments = alignedTogether(*before, *now, places);
+  std::vector<Channel> channels;
+  for (const bool rotation : {false, true}) {
+    if (rotation && !(before->rows.has_orientation && now->rows.has_orientation)) break;
+    channels.emplace_back(*before, *now, alignments, places, rotation).run(control);
+    if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped.");
+  }
+
+  std::vector<char> known;
+  std::vector<char> place_known(now->rows.place_nodes.size(), 0);
+  for (std::size_t i = 0; i < now->rows.rows.size(); ++i) {
+    known.push_back(channels[0].knows(i) ? 1 : 0);
+    if (known[i] != 0) place_known[now->rows.rows[i].place] = 1;
+  }
+  RecordingChange change;
+  change.places = static_cast<int>(std::count(place_known.begin(), place_known.end(), char{1}));
+  change.places_left_out = static_cast<int>(place_known.size()) - change.places;
+  if (static_cast<std::size_t>(change.places) < kFewestPlaces) {
+    return fail(ErrorCode::kTooFewNodes, "The earlier recording tells the field at " + std::to_string(change.places) +
+                                             " places of this one; at least " + std::to_string(kFewestPlaces) +
+                                             " are needed to compare them.");
+  }
+  const double log_odds = jointLogOdds(
+      channels[0].found().log_odds, channels.size() > 1 ? std::optional(channels[1].found().log_odds) : std::nullopt);
+  change.p_value = std::min(1.0, std::exp(-log_odds));
+  change.changed = log_odds > identify::kSureOfChange;
+  change.least_shown_mm = 1e3 * std::sqrt(3.0) * channels[0].found().least_shown;
+  describeSize(*now, alignments, channels[0], known, log_odds, change);
+  describeRig(*before, *now, alignments, places, change);
+  change.tracker_from_reference = alignments.now.tracker_from_reference;
+  change.sensor_from_mount = inverse(alignments.now.mount_from_sensor.front());
+  change.table = tableOfChange(*now, now_table.metadata, alignments, channels, known);
+  return change;
+}
+
+namespace {
+
+std::string howSure(double p_value) { return p_value < 1e-3 ? "p < 0.001" : "p < " + shown(std::min(1.0, p_value)); }
+
+std::string nothingText(const RecordingChange& change) {
+  return "Nothing changed since the earlier recording that these two would show; they would show a change of about " +
+         shown(change.least_shown_mm) + " mm (RMS).";
+}
+
+std::string changedText(const RecordingChange& change, const GapReport& report) {
+  std::string text = "The field changed since the earlier recording by " + shown(change.rms_mm) + " mm (RMS, " +
+                     howSure(change.p_value) + ")";
+  if (change.hottest_m)
+    text += ", most near (" + shown(change.hottest_m->x()) + ", " + shown(change.hottest_m->y()) + ", " +
+            shown(change.hottest_m->z()) + ") m";
+  return text + ". " + report.text;
+}
+
+void addRigMoved(const RecordingChange& change, GapReport& report) {
+  constexpr double kTold_mm = 5.0;
+  constexpr double kTold_deg = 0.5;
+  if (!change.rig_moved_mm || (*change.rig_moved_mm < kTold_mm && *change.rig_turned_deg < kTold_deg)) return;
+  report.findings.push_back({"",
+                             "The whole rig stands " + shown(*change.rig_moved_mm) + " mm and " +
+                                 shown(*change.rig_turned_deg) +
+                                 " degrees from where the tracker saw it before: it was set down anew, or the "
+                                 "transmitter moved. That is no change of the field.",
+                             {}});
+}
+
+}  // namespace
+
+void describeChange(const RecordingChange& change, GapReport& report) {
+  report.tracker_from_reference = change.tracker_from_reference;
+  report.sensor_from_mount = change.sensor_from_mount;
+  Against against;
+  against.changed = change.changed;
+  against.p_value = change.p_value;
+  against.rms_mm = change.rms_mm;
+  against.location_m = change.hottest_m;
+  if (!change.changed) {
+    report.verdict = GapVerdict::kNoGap;
+    report.text = nothingText(change);
+  } else {
+    if (!report.selected.empty()) {
+      against.effect = report.selected.front().effect;
+      if (report.selected.front().location_m) against.location_m = report.selected.front().location_m;
+    }
+    report.text = changedText(change, report);
+  }
+  addRigMoved(change, report);
+  if (change.places_left_out > 0) {
+    report.findings.push_back({"",
+                               std::to_string(change.places_left_out) +
+                                   " places are left out: the earlier recording does not tell the field there.",
+                               {}});
+  }
+  report.against = std::move(against);
+}
+
+}  // namespace fieldtrue::gap
