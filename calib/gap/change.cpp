@@ -43,6 +43,11 @@ class Channel {
           {field.sharedAt(later_.points[i], places_[i]), field.sharedVarianceAt(later_.points[i], places_[i])});
   }
   const identify::FieldComparison& found() const { return found_; }
+  /// SD of each component about any smooth field, of the earlier or of the later recording.
+  double scatter(bool of_later) const {
+    const identify::FieldReadings& own = of_later ? later_ : earlier_;
+    return found_.law.noise_factor[of_later ? 1 : 0] * std::sqrt(own.variances.mean());
+  }
   /// What the earlier recording would have read at the later one's rows.
   const std::vector<Foretold>& foretold() const { return foretold_; }
 
@@ -200,6 +205,8 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
       channels[0].found().log_odds, channels.size() > 1 ? std::optional(channels[1].found().log_odds) : std::nullopt);
   change.p_value = std::min(1.0, std::exp(-log_odds));
   change.changed = log_odds > identify::kSureOfChange;
+  change.scatter_before_mm = 1e3 * channels[0].scatter(false);
+  change.scatter_now_mm = 1e3 * channels[0].scatter(true);
   change.least_shown_mm = 1e3 * std::sqrt(3.0) * channels[0].found().least_shown;
   describeSize(*now, alignments, channels[0], known, log_odds, change);
   describeRig(*before, *now, alignments, places, change);
@@ -239,6 +246,19 @@ void addRigMoved(const RecordingChange& change, GapReport& report) {
                              {}});
 }
 
+/// Noise that grew is no field, and yet something to look for.
+void addScatter(const RecordingChange& change, GapReport& report) {
+  constexpr double kClearly = 1.7;
+  const double ratio = change.scatter_now_mm / change.scatter_before_mm;
+  if (ratio < kClearly && ratio > 1.0 / kClearly) return;
+  report.findings.push_back({"",
+                             "About any smooth field the places scatter by " + shown(change.scatter_now_mm) +
+                                 " mm now and by " + shown(change.scatter_before_mm) +
+                                 " mm before (SD per axis): placing, noise, or a change from place to place that no "
+                                 "smooth field is.",
+                             {}});
+}
+
 }  // namespace
 
 void describeChange(const RecordingChange& change, GapReport& report) {
@@ -260,6 +280,7 @@ void describeChange(const RecordingChange& change, GapReport& report) {
     report.text = changedText(change, report);
   }
   addRigMoved(change, report);
+  addScatter(change, report);
   if (change.places_left_out > 0) {
     report.findings.push_back({"",
                                std::to_string(change.places_left_out) +

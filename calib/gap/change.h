@@ -16,7 +16,9 @@ struct RecordingChange {
   double rms_mm = 0.0;   ///< Of the likeliest change of positions over the places where both recordings know something.
   double least_shown_mm = 0.0;               ///< RMS of a change that these two would show.
   std::optional<Eigen::Vector3d> hottest_m;  ///< Where positions changed most, tracker frame.
-  int places = 0;                            ///< Of the later recording, where the earlier one knows the field.
+  double scatter_before_mm = 0.0;            ///< SD per axis about any smooth field.
+  double scatter_now_mm = 0.0;
+  int places = 0;  ///< Of the later recording, where the earlier one knows the field.
   int places_left_out = 0;
   std::optional<double> rig_moved_mm;  ///< Where the places are the same: how far they stand from where they stood.
   std::optional<double> rig_turned_deg;

@@ -144,15 +144,16 @@ std::string gapHeadline(const gap::GapReport& report) {
   std::string names;
   for (const gap::SelectedEffect& effect : report.selected)
     names += (names.empty() ? ": " : ", ") + effectLabel(effect.effect);
+  const bool is_change = report.against.has_value();
   switch (report.verdict) {
     case gap::GapVerdict::kNoGap:
-      return "The simulation matches the recording";
+      return is_change ? "Nothing changed since the earlier recording" : "The simulation matches the recording";
     case gap::GapVerdict::kExplained:
-      return "Explained" + names;
+      return (is_change ? "Changed, and explained" : "Explained") + names;
     case gap::GapVerdict::kPartlyExplained:
-      return "Partly explained" + names;
+      return (is_change ? "Changed, and partly explained" : "Partly explained") + names;
     case gap::GapVerdict::kUnexplained:
-      return "Not explained by any known effect";
+      return is_change ? "Changed, by no known effect" : "Not explained by any known effect";
   }
   return {};
 }

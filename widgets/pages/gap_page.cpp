@@ -2,6 +2,7 @@
 
 #include <QCheckBox>
 #include <QFileDialog>
+#include <QFileInfo>
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QPointer>
@@ -18,6 +19,7 @@
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/report_json.h"
 #include "calib/recording/finding.h"
+#include "calib/tables/table_io.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/figures/field_scale.h"
 #include "widgets/figures/gap_field.h"
@@ -125,6 +127,8 @@ QWidget* GapPage::makeButtons(QWidget* header) {
   trust_ = addButton(buttons, tr("How far to &trust it"), "trustGap", &GapPage::tryAgainAndAgain);
   trust_->setToolTip(
       tr("Makes the recording %1 times again under what was found and diagnoses each.").arg(kReplicates));
+  since_ = addButton(buttons, tr("Changed si&nce..."), "gapAgainst", &GapPage::chooseEarlier);
+  since_->setToolTip(tr("What changed since an earlier recording of this room, of the same or of other places?"));
   undo_ = addButton(buttons, tr("&Undo"), "undoAdd", &GapPage::undo);
   save_report_ = addButton(buttons, tr("Save &report..."), "saveGapReport", &GapPage::chooseReportFile);
   save_scene_ = addButton(buttons, tr("Save s&cene..."), "saveGapScene", &GapPage::chooseSceneFile);
@@ -132,10 +136,10 @@ QWidget* GapPage::makeButtons(QWidget* header) {
   progress_->setObjectName(QStringLiteral("gapProgress"));
   progress_->setRange(0, 1000);
   progress_->setAccessibleName(tr("Diagnosis"));
-  QPushButton* order[] = {run_, choose_, add_, undo_, save_report_, save_scene_, trust_};
-  for (int i = 0; i < 7; ++i) grid->addWidget(order[i], i / 2, i % 2);
-  grid->addWidget(progress_, 3, 1);
-  grid->addWidget(new SensorChoice(workbench_, QStringLiteral("gapSensor"), buttons), 4, 0, 1, 2);
+  QPushButton* order[] = {run_, choose_, add_, undo_, save_report_, save_scene_, trust_, since_};
+  for (int i = 0; i < 8; ++i) grid->addWidget(order[i], i / 2, i % 2);
+  grid->addWidget(progress_, 4, 0, 1, 2);
+  grid->addWidget(new SensorChoice(workbench_, QStringLiteral("gapSensor"), buttons), 5, 0, 1, 2);
   return buttons;
 }
 
@@ -176,6 +180,7 @@ void GapPage::setRecording(const CalibrationTable& table, std::function<SampleTa
   table_ = table;
   samples_ = std::move(samples);
   report_.reset();
+  against_.reset();
   for (Earlier& earlier : earlier_) earlier.report.reset();
   const auto usable = std::count_if(table_.nodes.begin(), table_.nodes.end(),
                                     [](const Node& node) { return node.role != NodeRole::kSkipped; });
@@ -188,6 +193,7 @@ void GapPage::setScene(const std::optional<simulation::Scene>& scene) {
   scene_ = scene;
   earlier_.clear();
   report_.reset();
+  against_.reset();
   showReport();
 }
 
@@ -203,6 +209,25 @@ void GapPage::runOrStop() {
 void GapPage::tryAgainAndAgain() {
   gap::DiagnosisOptions options;
   options.replicates = kReplicates;
+  options.against = against_;
+  run(options);
+}
+
+void GapPage::chooseEarlier() {
+  const QString path =
+      QFileDialog::getOpenFileName(this, tr("Earlier recording of this room"), {}, tr("Node tables (*.csv)"));
+  if (!path.isEmpty()) diagnoseSince(path);
+}
+
+void GapPage::diagnoseSince(const QString& path) {
+  auto earlier = readNodeTable(path.toStdString());
+  if (!earlier) {
+    workbench_.showMessage({QString::fromStdString(earlier.error().message), Severity::kAttention, {}, {}});
+    return;
+  }
+  gap::DiagnosisOptions options;
+  options.against = std::make_shared<const CalibrationTable>(std::move(earlier->table));
+  against_name_ = QFileInfo(path).fileName();
   run(options);
 }
 
@@ -212,6 +237,7 @@ void GapPage::run(const gap::DiagnosisOptions& options) {
         if (page) page->run(options);
       }))
     return showReport();
+  against_ = options.against;
   progress_->setValue(0);
   jobs_.run(
       [diagnose = diagnose_, table = table_, samples = samples_ ? samples_() : SampleTable(), scene = scene_,
@@ -301,7 +327,8 @@ void GapPage::showReport() {
 }
 
 void GapPage::showWords() {
-  believed_->setText(scene_
+  believed_->setText(against_ ? tr("Held against %1, whatever was wrong then.").arg(against_name_)
+                     : scene_
                          ? tr("The simulation holds %n effect(s).", nullptr, static_cast<int>(scene_->effects.size()))
                          : tr("The simulation is an ideal tracker in free space."));
   const bool matches =
@@ -367,12 +394,13 @@ void GapPage::showCharts() {
 void GapPage::showButtons() {
   run_->setText(isDiagnosing() ? tr("&Stop") : report_ ? tr("&Diagnose again") : tr("&Diagnose"));
   setStyled(*run_, "primary", !report_);
-  const bool can_add = !isDiagnosing() && report_ && !report_->selected.empty();
+  const bool can_add = !isDiagnosing() && report_ && !report_->selected.empty() && !report_->against;
   setStyled(*add_, "primary", can_add);
   add_->setEnabled(can_add);
   undo_->setEnabled(!earlier_.empty());
   trust_->setEnabled(!isDiagnosing() && report_ && !report_->replicates);
   choose_->setEnabled(!isDiagnosing());
+  since_->setEnabled(!isDiagnosing());
   save_report_->setEnabled(!isDiagnosing() && report_.has_value());
   save_scene_->setEnabled(!isDiagnosing());
   after_->setEnabled(report_.has_value());

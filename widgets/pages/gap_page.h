@@ -44,6 +44,8 @@ class GapPage : public QWidget {
   const std::optional<simulation::Scene>& scene() const { return scene_; }
   const std::optional<gap::GapReport>& report() const { return report_; }
   bool isDiagnosing() const { return jobs_.busy(); }
+  /// Diagnoses what changed since an earlier recording, a node table.
+  void diagnoseSince(const QString& path);
   /// Writes PATH and, beside it, the same as a page: PATH with `.html`. @error kIo
   Result<void> saveReport(const QString& path) const;
   /// @error kIo
@@ -63,6 +65,7 @@ class GapPage : public QWidget {
   QPushButton* addButton(QWidget* parent, const QString& words, const char* name, void (GapPage::*slot)());
   void run(const gap::DiagnosisOptions& options = {});
   void tryAgainAndAgain();
+  void chooseEarlier();
   void onResult(Result<gap::GapReport> result);
   void runOrStop();
   void addToSimulation();
@@ -85,6 +88,8 @@ class GapPage : public QWidget {
   std::optional<simulation::Scene> scene_;
   std::vector<Earlier> earlier_;
   std::optional<gap::GapReport> report_;
+  std::shared_ptr<const CalibrationTable> against_;  ///< Of the last diagnosis.
+  QString against_name_;
   BackgroundJobs jobs_{this};
 
   QStackedWidget* stack_;
@@ -98,6 +103,7 @@ class GapPage : public QWidget {
   QPushButton* add_ = nullptr;
   QPushButton* undo_ = nullptr;
   QPushButton* trust_ = nullptr;
+  QPushButton* since_ = nullptr;
   QPushButton* choose_ = nullptr;
   QPushButton* save_report_ = nullptr;
   QPushButton* save_scene_ = nullptr;

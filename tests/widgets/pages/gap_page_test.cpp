@@ -14,6 +14,7 @@
 #include <atomic>
 #include <thread>
 
+#include "calib/tables/table_writer.h"
 #include "tests/support/matchers.h"
 #include "tests/widgets/gap_fixture.h"
 #include "tests/widgets/pages/window_driver.h"
@@ -58,6 +59,7 @@ class GapPageTest : public QObject {
   void showsWhatTheReportSays();
   void switchShowsWhatIsLeft();
   void trustIsAskedFor();
+  void changeSinceIsAskedFor();
   void addAndUndoChangeTheScene();
   void stopEndsTheRun();
   void otherRowsDropTheReport();
@@ -188,6 +190,28 @@ void GapPageTest::trustIsAskedFor() {
   QCOMPARE(page->report()->replicates->n, 50);
   QCOMPARE(page->findChild<QLabel*>("gapTrust")->text(), QStringLiteral("Named so 46 times of 50."));
   QVERIFY(!trust->isEnabled());
+}
+
+/// The known room held against itself recorded before, through a file: nothing changed, and the page says so.
+void GapPageTest::changeSinceIsAskedFor() {
+  GapPage page(*workbench_);
+  page.resize(1184, 740);
+  page.setRecording(room_.table, {});
+  page.diagnoseSince(folder_.filePath("none.csv"));
+  QVERIFY(!page.isDiagnosing());
+  const QString path = folder_.filePath("yesterday.nodes.csv");
+  QVERIFY(writeNodeTable(path.toStdString(), room_.table).has_value());
+  page.diagnoseSince(path);
+  QVERIFY(page.isDiagnosing());
+  QVERIFY(!find<QPushButton>(page, "gapAgainst")->isEnabled());
+  QTRY_VERIFY_WITH_TIMEOUT(page.report().has_value(), kWaitMs);
+  QVERIFY(page.report()->against && !page.report()->against->changed);
+  QCOMPARE(find<QLabel>(page, "headline")->text(), QStringLiteral("Nothing changed since the earlier recording"));
+  QVERIFY(find<QLabel>(page, "gapBelieved")->text().contains("yesterday.nodes.csv"));
+  QVERIFY(!find<QPushButton>(page, "addToSimulation")->isEnabled());
+  find<QPushButton>(page, "diagnose")->click();
+  QTRY_VERIFY_WITH_TIMEOUT(page.report().has_value() && !page.isDiagnosing(), kWaitMs);
+  QVERIFY(!page.report()->against);
 }
 
 void GapPageTest::addAndUndoChangeTheScene() {
