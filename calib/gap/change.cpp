@@ -46,7 +46,7 @@ class Channel {
   /// SD of each component about any smooth field, of the earlier or of the later recording.
   double scatter(bool of_later) const {
     const identify::FieldReadings& own = of_later ? later_ : earlier_;
-    return found_.law.noise_factor[of_later ? 1 : 0] * std::sqrt(own.variances.mean());
+    return found_.law.noiseFactor(of_later) * std::sqrt(own.variances.mean());
   }
   /// What the earlier recording would have read at the later one's rows.
   const std::vector<Foretold>& foretold() const { return foretold_; }

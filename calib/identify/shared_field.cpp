@@ -127,7 +127,9 @@ FieldReadings joined(const FieldReadings& earlier, const FieldReadings& later, s
 SharedField::SharedField(const FieldReadings& readings, const SharedLaw& law, const std::optional<ChangeLaw>& change)
     : readings_(readings), law_(law), change_(change) {
   const auto n = static_cast<Eigen::Index>(readings.size());
-  const auto factor = [&](Eigen::Index i) { return law.noise_factor[readings.is_later[static_cast<std::size_t>(i)]]; };
+  const auto factor = [&](Eigen::Index i) {
+    return law.noiseFactor(readings.is_later[static_cast<std::size_t>(i)] != 0);
+  };
   Eigen::MatrixXd K(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto a = static_cast<std::size_t>(i);
@@ -184,7 +186,7 @@ Eigen::VectorXd SharedField::sharedWith(const FieldPoint& point, int place) cons
     with[row] = covariance(law_.field, readings_.points[i], point);
     if (readings_.places[i] == place)
       with[row] +=
-          law_.rig_share * std::pow(law_.noise_factor[readings_.is_later[i]], 2) * readings_.rig_variances[row];
+          law_.rig_share * std::pow(law_.noiseFactor(readings_.is_later[i] != 0), 2) * readings_.rig_variances[row];
   }
   return with;
 }

@@ -39,6 +39,8 @@ struct SharedLaw {
   SmoothLaw field;
   double rig_share = 0.0;                           ///< Of the placing's variance: the same at each visit of a place.
   std::array<double, 2> noise_factor = {1.0, 1.0};  ///< On the SD stated, of the earlier and of the later recording.
+
+  double noiseFactor(bool of_later) const { return noise_factor[of_later ? 1 : 0]; }
 };
 
 /// What only the later recording sees: a smooth field, of a place and its surroundings alone where it has a reach.
