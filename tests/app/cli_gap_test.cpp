@@ -88,6 +88,23 @@ class CliGapTest : public QObject {
     QVERIFY(run.json() == json::parse(one.toStdString()));
   }
 
+  /// Metal carried in between two recordings of other places: told, and in the document as the contract has it.
+  void whatChangedIsTold() {
+    const QString other = "grid:4x4x4@0.33:origin=0.55,-0.45,-0.5";
+    FT_VERIFY_STATUS(simulated("clean.scene.json", "before", 1), 0);
+    FT_VERIFY_STATUS(runCli({"simulate", "--scene", at("metal.scene.json"), "--plan", other, "--seed", "2", "--nodes",
+                             at("after.nodes.csv")}),
+                     0);
+    const CliRun run = runCli({"diagnose", "--nodes", at("after.nodes.csv"), "--against", at("before.nodes.csv"),
+                               "--out", at("change.gap.json")});
+    FT_VERIFY_STATUS(run, 0);
+    const json against = json::parse(readWhole(at("change.gap.json")).toStdString())["against"];
+    QVERIFY2(against["changed"] == true && against["p_value"] < 0.01, against.dump().c_str());
+    QVERIFY(against["rms_mm"].get<double>() > 0.0 && against["location_m"].size() == 3);
+    QCOMPARE(against["effect"].get<std::string>(), std::string("compact_metal"));
+    QVERIFY(run.out.contains("The field changed since the earlier recording"));
+  }
+
   void badInputIsOneSentence_data() {
     QTest::addColumn<QStringList>("arguments");
     QTest::addColumn<int>("status");
@@ -98,6 +115,10 @@ class CliGapTest : public QObject {
     QTest::newRow("too few places") << QStringList{"diagnose", "--nodes", at("few.nodes.csv"), "--out",
                                                    at("x.gap.json")}
                                     << 1 << QByteArray("8 places");
+    const QString few = at("few.nodes.csv");
+    QTest::newRow("samples of what changed")
+        << QStringList{"diagnose", "--nodes", few, "--against", few, "--samples", few, "--out", at("x.gap.json")} << 2
+        << QByteArray("--samples tells nothing");
     QTest::newRow("no plan") << QStringList{"plan-check"} << 2 << QByteArray("--plan");
     QTest::newRow("bad plan") << QStringList{"plan-check", "--plan", "grid:5x5"} << 2 << QByteArray("5x5");
   }

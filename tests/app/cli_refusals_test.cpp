@@ -104,9 +104,6 @@ class CliRefusalsTest : public QObject {
     row("earlier recording in millimetres",
         "diagnose --nodes @/good.nodes.csv --against @/true-mm.nodes.csv --out @/o.json",
         {"true-mm.nodes.csv", "--force"});
-    row("samples of what changed",
-        "diagnose --nodes @/good.nodes.csv --samples @/s.csv --against @/good.nodes.csv --out @/o.json",
-        {"--samples", "--against"});
     row("millimetres to apply to", "apply --calibration @/good.ftcal.json --in @/mm.csv --out @/o.csv",
         {"mm.csv", "48", "divided by 1000", "millimetres", "--force"});
   }
