@@ -48,21 +48,21 @@ std::string namesText(const std::vector<std::string>& effects) {
   return text;
 }
 
-/// "on places the fit did not see, what stands above the noise goes from 13 to 0.4 mm (0.6 mm at most, 95 % sure)".
+/// "on places the fit did not see, what stands above the noise goes from 13 mm to 0.4 mm (0.6 mm at most, 95 % sure)".
 std::string fallText(const GapReport& report) {
   const Remaining& remaining = report.remaining;
-  const auto mm = [&](double fraction) { return signedRoot_mm(1e-6 * fraction * remaining.excess2_before_mm2); };
+  const auto mm = [&](double fraction) {
+    const double excess_mm = signedRoot_mm(1e-6 * fraction * remaining.excess2_before_mm2);
+    return excess_mm > 0.0 ? shown(excess_mm) + " mm" : std::string("nothing");
+  };
   std::string text = "on places the fit did not see, ";
   if (remaining.is_of_rotation) {
     text += shown(100.0 * remaining.fraction) + " % of the square of what stands above the noise in rotation is left (";
   } else {
-    text += "what stands above the noise goes from " + shown(mm(1.0)) + " to " +
-            shown(std::max(0.0, mm(remaining.fraction))) + " mm (";
+    text += "what stands above the noise goes from " + mm(1.0) + " to " + mm(remaining.fraction) + " (";
   }
   if (!remaining.high90) return text + "these places cannot say how sure that is)";
-  return text +
-         (remaining.is_of_rotation ? shown(100.0 * *remaining.high90) + " %"
-                                   : shown(std::max(0.0, mm(*remaining.high90))) + " mm") +
+  return text + (remaining.is_of_rotation ? shown(100.0 * *remaining.high90) + " %" : mm(*remaining.high90)) +
          " at most, 95 % sure)";
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include "calib/core/statistics.h"
@@ -217,13 +218,70 @@ double parabolaAcross(const std::vector<double>& power, int bin) {
   return std::exp(parabolaAtZero(distances, logs));
 }
 
+/// Autocovariances of all parts together, lags 0 to `most`.
+std::vector<double> pooledAutocovariance(const std::vector<Part>& parts, Eigen::Index most) {
+  std::vector<double> sums(static_cast<std::size_t>(most) + 1, 0.0);
+  double count = 0.0;
+  for (const Part& part : parts) {
+    const Eigen::Index n = part.values.rows();
+    count += static_cast<double>(part.values.size());
+    for (Eigen::Index lag = 0; lag <= std::min(most, n - 1); ++lag)
+      sums[static_cast<std::size_t>(lag)] +=
+          (part.values.topRows(n - lag).array() * part.values.bottomRows(n - lag).array()).sum();
+  }
+  for (double& sum : sums) sum /= count;
+  return sums;
+}
+
+/// Noise that follows its own past: x_k = a_1 x_(k-1) + a_2 x_(k-2) + ... + e_k.
+struct Autoregression {
+  std::vector<double> coefficients;
+  double variance = 1.0;  ///< Of e.
+
+  double powerAt(double frequency_hz, double rate_hz) const {
+    std::complex<double> transfer = 1.0;
+    for (std::size_t k = 0; k < coefficients.size(); ++k)
+      transfer -= coefficients[k] * std::polar(1.0, -kTwoPi * frequency_hz / rate_hz * static_cast<double>(k + 1));
+    return variance / std::norm(transfer);
+  }
+};
+
+/// Of the order that is likeliest for its number of coefficients.
+/// @source Durbin 1960 for the recursion; Schwarz 1978 for the order
+Autoregression fittedAutoregression(const std::vector<Part>& parts, double n_values) {
+  constexpr Eigen::Index kHighestOrder = 12;
+  const std::vector<double> r = pooledAutocovariance(parts, kHighestOrder);
+  Autoregression at{{}, r[0]};
+  Autoregression best = at;
+  double least = n_values * std::log(at.variance);
+  for (std::size_t order = 1; order < r.size(); ++order) {
+    double sum = r[order];
+    for (std::size_t k = 0; k < at.coefficients.size(); ++k) sum -= at.coefficients[k] * r[order - 1 - k];
+    const double reflection = sum / at.variance;
+    std::vector<double> next = at.coefficients;
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] -= reflection * at.coefficients[next.size() - 1 - k];
+    next.push_back(reflection);
+    at = {std::move(next), at.variance * (1.0 - reflection * reflection)};
+    const double cost = n_values * std::log(at.variance) + static_cast<double>(order) * std::log(n_values);
+    if (cost >= least) continue;
+    least = cost;
+    best = at;
+  }
+  return best;
+}
+
 /// What the neighbourhood of each frequency, itself left out, says of the noise there at most: neither a slope nor the
-/// top of a filter's lobe is a line.
-std::vector<double> backgroundOf(const std::vector<double>& power) {
+/// top of a filter's lobe is a line. The lowest frequencies have no neighbours below: there red noise rises as a line
+/// would, and what the readings' own autoregression says counts too.
+std::vector<double> backgroundOf(const std::vector<double>& power, const std::vector<double>& frequencies_hz,
+                                 const Autoregression& noise, double rate_hz) {
   std::vector<double> background;
   for (int bin = 0; bin < static_cast<int>(power.size()); ++bin) {
     background.push_back(std::max({medianBetween(power, bin - kFarthest, bin - kNearest),
                                    medianBetween(power, bin + kNearest, bin + kFarthest), parabolaAcross(power, bin)}));
+    if (bin < kFarthest)
+      background.back() =
+          std::max(background.back(), noise.powerAt(frequencies_hz[static_cast<std::size_t>(bin)], rate_hz));
   }
   return background;
 }
@@ -332,7 +390,9 @@ std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& vis
   const double rho = pooledCorrelation(parts);
   const std::vector<Part> white = prewhitened(parts, rho);
   spectrum.power = pooledPower(white, spectrum.frequencies_hz);
-  spectrum.background = backgroundOf(spectrum.power);
+  const double n_white = spectrum.series * static_cast<double>(medianLength(white));
+  spectrum.background =
+      backgroundOf(spectrum.power, spectrum.frequencies_hz, fittedAutoregression(white, n_white), *rate_hz);
   while (spectrum.lines.size() < kMostLines) {
     const std::optional<SpectralLine> line = strongestLine(spectrum, white, rho);
     if (!line || (!spectrum.lines.empty() && line->amplitude_sd < 0.3 * spectrum.lines.front().amplitude_sd)) break;

@@ -24,9 +24,25 @@ struct Recording {
   double line_sd = 0.0;      ///< Amplitude in SDs.
   double correlation = 0.0;  ///< First order.
   int box = 1;               ///< Readings averaged by the tracker's filter.
+  double sway_hz = 0.0;      ///< About which a hand sways: a broad resonance beside as much white noise.
   int every = 1;             ///< Only every so many readings are kept: some are lost when it is above 1.
   std::uint64_t seed = 1;
 };
+
+/// An autoregression of second order, its poles at the sway's frequency, of SD 1.4 or so.
+void addSway(const Recording& recording, field::GaussianStream& stream, std::vector<Eigen::Vector3d>& raw) {
+  constexpr double kRadius = 0.93;
+  const double turn = 2.0 * std::numbers::pi * recording.sway_hz / recording.rate_hz;
+  Eigen::Vector3d now = Eigen::Vector3d::Zero();
+  Eigen::Vector3d before = now;
+  for (int i = -200; i < static_cast<int>(raw.size()); ++i) {
+    const Eigen::Vector3d next =
+        2.0 * kRadius * std::cos(turn) * now - kRadius * kRadius * before + 0.05 * stream.nextVector();
+    before = now;
+    now = next;
+    if (i >= 0) raw[static_cast<std::size_t>(i)] += now;
+  }
+}
 
 /// Position noise with what is asked for; phases of the line are random by stop, for the stops are far apart.
 std::vector<SampleVisit> record(const Recording& recording) {
@@ -43,6 +59,7 @@ std::vector<SampleVisit> record(const Recording& recording) {
       last = kept * last + std::sqrt(1.0 - kept * kept) * stream.nextVector();
       raw.push_back(last);
     }
+    if (recording.sway_hz > 0.0) addSway(recording, stream, raw);
     std::vector<Eigen::Vector3d> values;
     for (int i = 0; i < recording.readings; ++i) {
       if (recording.every > 1 && i % recording.every == 1) continue;
@@ -93,6 +110,17 @@ class SampleSpectrumTest : public QObject {
     const auto sources = lineSources(seen_hz, rate_hz, 0.01);
     QVERIFY(std::any_of(sources.begin(), sources.end(),
                         [&](const LineSource& source) { return source.frequency_hz == source_hz; }));
+  }
+
+  /// A hand that sways slowly makes a hump at the low end of the spectrum, and no line.
+  void aSwayingHandIsNoLine() {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      Recording recording{.stops = 8, .readings = 89, .rate_hz = 15.0, .seed = seed};
+      recording.sway_hz = 0.3;
+      const auto spectrum = sampleSpectrum(record(recording), {});
+      QVERIFY(spectrum.has_value());
+      QVERIFY2(spectrum->lines.empty(), std::to_string(seed).c_str());
+    }
   }
 
   void monitorsAreTheirOwnRange() {
