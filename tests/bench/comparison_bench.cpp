@@ -1,13 +1,12 @@
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <thread>
 #include <vector>
 
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
 #include "calib/evaluation/comparison.h"
+#include "tests/bench/two_threads.h"
 
 /// How long it takes to score every method with leave-one-out on 567 nodes, on two threads: seconds a method and in
 /// all, the slow network apart. Exits with 1 when all of them take more than 20 s.
@@ -46,23 +45,6 @@ CalibrationTable roomTable() {
     table.nodes.push_back(node);
   }
   return table;
-}
-
-RunControl twoThreads() {
-  RunControl control;
-  control.parallel_for = [](std::size_t count, const std::function<void(std::size_t)>& body) {
-    thread_local bool inside = false;
-    if (inside) return serialFor(count, body);
-    std::atomic<std::size_t> next{0};
-    const auto work = [&] {
-      inside = true;
-      for (std::size_t i = next++; i < count; i = next++) body(i);
-      inside = false;
-    };
-    std::jthread helper(work);
-    work();
-  };
-  return control;
 }
 
 /// Seconds that a comparison of these methods takes.
