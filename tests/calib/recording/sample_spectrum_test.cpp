@@ -64,7 +64,8 @@ std::vector<SampleVisit> record(const Recording& recording) {
     for (int i = 0; i < recording.readings; ++i) {
       if (recording.every > 1 && i % recording.every == 1) continue;
       Eigen::Vector3d value = Eigen::Vector3d::Zero();
-      for (int k = 0; k < recording.box; ++k) value += raw[static_cast<std::size_t>(i + k)] / std::sqrt(recording.box);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(recording.box); ++k)
+        value += raw[static_cast<std::size_t>(i) + k] / std::sqrt(recording.box);
       const double t_s = 5.0 * stop + i / recording.rate_hz;
       value += recording.line_sd * std::sin(2.0 * std::numbers::pi * recording.line_hz * t_s + phase) *
                Eigen::Vector3d::Ones();
