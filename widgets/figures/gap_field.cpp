@@ -14,7 +14,9 @@ ErrorField gapField(const gap::GapReport& report, bool after, const CalibrationT
       places_m.emplace(std::pair(row.node, row.visit), row.reference_from_sensor.position_m);
   const Pose reference_from_tracker = inverse(report.tracker_from_reference);
   ErrorField field;
-  field.title = after ? QStringLiteral("Gap with the causes added") : QStringLiteral("Gap as simulated now");
+  field.title = after            ? QStringLiteral("Gap with the causes added")
+                : report.against ? QStringLiteral("What changed since the earlier recording")
+                                 : QStringLiteral("Gap as simulated now");
   field.reference_from_tracker = reference_from_tracker;
   field.bodies = believedBodies(report);
   for (const gap::GapNode& node : report.nodes) {

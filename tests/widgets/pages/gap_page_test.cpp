@@ -19,6 +19,7 @@
 #include "tests/widgets/gap_fixture.h"
 #include "tests/widgets/pages/window_driver.h"
 #include "tests/widgets/window_test.h"
+#include "widgets/figures/gap_field.h"
 #include "widgets/shell/main_window.h"
 #include "widgets/style/theme.h"
 #include "widgets/views/charts/gap_bar_view.h"
@@ -209,6 +210,7 @@ void GapPageTest::changeSinceIsAskedFor() {
   QCOMPARE(find<QLabel>(page, "headline")->text(), QStringLiteral("Nothing changed since the earlier recording"));
   QVERIFY(find<QLabel>(page, "gapBelieved")->text().contains("yesterday.nodes.csv"));
   QVERIFY(!find<QPushButton>(page, "addToSimulation")->isEnabled());
+  QCOMPARE(gapField(*page.report(), false).title, QStringLiteral("What changed since the earlier recording"));
   find<QPushButton>(page, "diagnose")->click();
   QTRY_VERIFY_WITH_TIMEOUT(page.report().has_value() && !page.isDiagnosing(), kWaitMs);
   QVERIFY(!page.report()->against);
