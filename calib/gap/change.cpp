@@ -124,21 +124,24 @@ void describeRig(const Recording& before, const Recording& now, const Alignments
   change.rig_turned_deg = kDegPerRad * angleBetween_rad(was.orientation, is.orientation);
 }
 
-/// The later rows where the earlier recording tells the field, each held to stand where that would have reported it.
-CalibrationTable tableOfChange(const Recording& now, const TableMetadata& metadata, const Alignments& alignments,
-                               const std::vector<Channel>& channels, const std::vector<char>& known) {
-  const bool has_rotation = channels.size() > 1;
+/// What the later table states, where what both recordings share of the rig's errors is no placing any more.
+TableMetadata metadataOfChange(TableMetadata metadata, const std::vector<Channel>& channels) {
+  metadata.alignment_known = false;
   const auto own_share = [](const Channel& channel) { return std::sqrt(1.0 - channel.found().earlier.rig_share); };
-  CalibrationTable change;
-  change.metadata = metadata;
-  change.metadata.alignment_known = false;
-  if (auto& tolerance = change.metadata.jig_tolerance_m) *tolerance *= own_share(channels[0]);
-  if (auto& tolerance = change.metadata.jig_tolerance_rad; tolerance && has_rotation)
-    *tolerance *= own_share(channels[1]);
+  if (metadata.jig_tolerance_m) *metadata.jig_tolerance_m *= own_share(channels[0]);
+  if (metadata.jig_tolerance_rad && channels.size() > 1) *metadata.jig_tolerance_rad *= own_share(channels[1]);
+  return metadata;
+}
+
+/// The later rows where the earlier recording tells the field, each held to stand where that would have reported it.
+recording::Cleaned rowsOfChange(const Recording& now, const Alignments& alignments,
+                                const std::vector<Channel>& channels, const std::vector<char>& known) {
+  const bool has_rotation = channels.size() > 1;
+  recording::Cleaned change{{}, now.cleaned.findings, now.cleaned.names};
   const std::vector<field::SensorSetting> settings = now.search->physics().settings(alignments.now);
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (known[i] == 0) continue;
-    Node node = now.nodes[i];
+    Node node = now.cleaned.nodes[i];
     const double n = std::max(1.0, node.n_effective);
     const Foretold& place = channels[0].foretold()[i];
     node.reference_from_sensor = settings[i].tracker_from_sensor;
@@ -211,8 +214,10 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
   describeSize(*now, alignments, channels[0], known, log_odds, change);
   describeRig(*before, *now, alignments, places, change);
   change.tracker_from_reference = alignments.now.tracker_from_reference;
-  change.sensor_from_mount = inverse(alignments.now.mount_from_sensor.front());
-  change.table = tableOfChange(*now, now_table.metadata, alignments, channels, known);
+  for (std::size_t s = 0; s < now->rows.sensors.size(); ++s)
+    change.sensors_from_mounts[now->rows.sensors[s]] = inverse(alignments.now.mount_from_sensor[s]);
+  change.metadata = metadataOfChange(now_table.metadata, channels);
+  change.rows = rowsOfChange(*now, alignments, channels, known);
   return change;
 }
 
@@ -263,7 +268,8 @@ void addScatter(const RecordingChange& change, GapReport& report) {
 
 void describeChange(const RecordingChange& change, GapReport& report) {
   report.tracker_from_reference = change.tracker_from_reference;
-  report.sensor_from_mount = change.sensor_from_mount;
+  report.sensors_from_mounts = change.sensors_from_mounts;
+  report.sensor_from_mount = change.sensors_from_mounts.begin()->second;
   Against against;
   against.changed = change.changed;
   against.p_value = change.p_value;

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <map>
 #include <optional>
 
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
 #include "calib/gap/report.h"
+#include "calib/recording/cleaning.h"
 
 namespace fieldtrue::gap {
 
@@ -22,11 +24,12 @@ struct RecordingChange {
   int places_left_out = 0;
   std::optional<double> rig_moved_mm;  ///< Where the places are the same: how far they stand from where they stood.
   std::optional<double> rig_turned_deg;
-  Pose tracker_from_reference;  ///< Of the later recording.
-  Pose sensor_from_mount;       ///< Of its first sensor.
+  Pose tracker_from_reference;              ///< Of the later recording.
+  std::map<int, Pose> sensors_from_mounts;  ///< Of each of its sensors, by its number.
   /// The later rows, each taken to stand where the earlier recording would have reported it, with the uncertainty of
   /// that: a diagnosis of it names what changed.
-  CalibrationTable table;
+  recording::Cleaned rows;
+  TableMetadata metadata;
 };
 
 /// Tells a report that was made of the change's table what it is of: the part `against`, verdict and sentence.

@@ -205,12 +205,15 @@ void selectSignalFindings(GapReport& report) {
 
 /// What single readings show; of several sensors, those of the first.
 void addSignalFindings(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
-                       int sensor, GapReport& report) {
+                       recording::Cleaned& cleaned) {
+  if (cleaned.nodes.empty()) return;
+  const auto by_sensor = [](const Node& a, const Node& b) { return a.sensor < b.sensor; };
+  const int sensor = std::min_element(cleaned.nodes.begin(), cleaned.nodes.end(), by_sensor)->sensor;
   const auto own = rowsOfSensor(table, sensor);
   std::optional<SampleTable> own_samples;
   if (samples != nullptr) own_samples = rowsOfSensor(*samples, sensor);
   const auto found = identify::sampleFindings(own_samples ? &*own_samples : nullptr, own ? *own : table, scene);
-  report.findings.insert(report.findings.end(), found.begin(), found.end());
+  cleaned.findings.insert(cleaned.findings.end(), found.begin(), found.end());
 }
 
 void describeInput(const identify::GapRows& rows, const SampleTable* samples, GapReport& report) {
@@ -286,22 +289,20 @@ void addMirrored(GapReport& report) {
 }
 
 /// @param known_gap whether there is a gap, where that is known already; causes are looked for only if it may be
-Result<GapReport> diagnoseRows(const CalibrationTable& table, const SampleTable* samples,
+Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& metadata, const SampleTable* samples,
                                const simulation::Scene* scene, const DiagnosisOptions& options,
                                std::optional<bool> known_gap, const RunControl& control) {
   const auto stopped = [&] { return fail(ErrorCode::kCancelled, "The diagnosis was stopped."); };
   GapReport report;
-  recording::Cleaned cleaned = recording::cleanRows(table);
-  FT_TRY(auto rows, identify::makeGapRows(cleaned.nodes, table.metadata));
-  takeFromScene(scene, table.metadata, rows);
+  FT_TRY(auto rows, identify::makeGapRows(cleaned.nodes, metadata));
+  takeFromScene(scene, metadata, rows);
   FT_TRY(auto believed, believedEffects(scene, rows.excitation));
   report.names = std::move(cleaned.names);
   describeInput(rows, samples, report);
   report.findings = std::move(cleaned.findings);
-  if (!known_gap) addSignalFindings(table, samples, scene, rows.sensors.front(), report);
   control.progress(0.01);
 
-  addAssumption(table.metadata, report);
+  addAssumption(metadata, report);
   const bool is_mirrored = identify::isMirrored(rows);
   if (is_mirrored) addMirrored(report);
   const identify::GapSearch search(rows, std::move(believed));
@@ -339,14 +340,14 @@ Result<GapReport> diagnoseRows(const CalibrationTable& table, const SampleTable*
 /// What changed since an earlier recording: nothing, or the change diagnosed as a gap is.
 Result<GapReport> diagnoseChange(const CalibrationTable& table, const simulation::Scene* scene,
                                  const DiagnosisOptions& options, const RunControl& control) {
-  FT_TRY(const auto change, changeSince(*options.against, table, control));
+  FT_TRY(auto change, changeSince(*options.against, table, control));
   std::optional<simulation::Scene> tracker;  // What was wrong then is believed already.
   if (scene != nullptr) {
     tracker = *scene;
     tracker->effects.clear();
   }
-  FT_TRY(auto report, diagnoseRows(change.table, nullptr, tracker ? &*tracker : nullptr, options, change.changed,
-                                   partOf(control, 0.2, 1.0)));
+  FT_TRY(auto report, diagnoseRows(std::move(change.rows), change.metadata, nullptr, tracker ? &*tracker : nullptr,
+                                   options, change.changed, partOf(control, 0.2, 1.0)));
   describeChange(change, report);
   return report;
 }
@@ -355,8 +356,10 @@ Result<GapReport> diagnoseChange(const CalibrationTable& table, const simulation
 
 Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
                            const DiagnosisOptions& options, const RunControl& control) {
-  if (options.against == nullptr) return diagnoseRows(table, samples, scene, options, {}, control);
-  return diagnoseChange(table, scene, options, control);
+  if (options.against != nullptr) return diagnoseChange(table, scene, options, control);
+  recording::Cleaned cleaned = recording::cleanRows(table);
+  addSignalFindings(table, samples, scene, cleaned);
+  return diagnoseRows(std::move(cleaned), table.metadata, samples, scene, options, {}, control);
 }
 
 simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report) {

@@ -7,14 +7,13 @@
 #include <tuple>
 
 #include "calib/identify/field_comparison.h"
-#include "calib/recording/cleaning.h"
 
 namespace fieldtrue::gap {
 
 Result<std::unique_ptr<Recording>> recordingOf(const CalibrationTable& table) {
   auto recording = std::make_unique<Recording>();
-  recording->nodes = recording::cleanRows(table).nodes;
-  FT_TRY(recording->rows, identify::makeGapRows(recording->nodes, table.metadata));
+  recording->cleaned = recording::cleanRows(table);
+  FT_TRY(recording->rows, identify::makeGapRows(recording->cleaned.nodes, table.metadata));
   recording->search =
       std::make_unique<identify::GapSearch>(recording->rows, std::vector<std::unique_ptr<field::PhysicalEffect>>{});
   return recording;

@@ -7,12 +7,13 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/identify/shared_field.h"
+#include "calib/recording/cleaning.h"
 
 namespace fieldtrue::gap {
 
 /// A recording with what is known of its noise.
 struct Recording {
-  std::vector<Node> nodes;  ///< As the rows.
+  recording::Cleaned cleaned;  ///< Its nodes are the rows.
   identify::GapRows rows;
   std::unique_ptr<identify::GapSearch> search;
 };

@@ -19,6 +19,7 @@
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/report_json.h"
 #include "calib/recording/finding.h"
+#include "calib/recording/unit_slip.h"
 #include "calib/tables/table_io.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/figures/field_scale.h"
@@ -225,10 +226,20 @@ void GapPage::diagnoseSince(const QString& path) {
     workbench_.showMessage({QString::fromStdString(earlier.error().message), Severity::kAttention, {}, {}});
     return;
   }
-  gap::DiagnosisOptions options;
-  options.against = std::make_shared<const CalibrationTable>(std::move(earlier->table));
-  against_name_ = QFileInfo(path).fileName();
-  run(options);
+  const auto table = std::make_shared<const CalibrationTable>(std::move(earlier->table));
+  const auto hold = [page = QPointer(this), table, name = QFileInfo(path).fileName()] {
+    if (!page) return;
+    page->against_name_ = name;
+    gap::DiagnosisOptions options;
+    options.against = table;
+    page->run(options);
+  };
+  if (const auto units = recording::checkUnits(*table); !units) {
+    workbench_.showMessage(
+        {QString::fromStdString(units.error().message) + '.', Severity::kAttention, tr("Use anyway"), hold});
+    return;
+  }
+  hold();
 }
 
 void GapPage::run(const gap::DiagnosisOptions& options) {
@@ -275,6 +286,7 @@ void GapPage::undo() {
   scene_ = std::move(earlier_.back().scene);
   report_ = std::move(earlier_.back().report);
   earlier_.pop_back();
+  against_.reset();
   showReport();
 }
 
