@@ -10,6 +10,7 @@
 #include "calib/field/tracker_model.h"
 #include "calib/gap/candidates.h"
 #include "calib/gap/change.h"
+#include "calib/gap/findings.h"
 #include "calib/gap/isolability.h"
 #include "calib/gap/judgement.h"
 #include "calib/gap/next_measurement.h"
@@ -17,8 +18,7 @@
 #include "calib/gap/verdict.h"
 #include "calib/gap/where.h"
 #include "calib/identify/sample_findings.h"
-#include "calib/identify/search.h"
-#include "calib/identify/traces.h"
+#include "calib/identify/selection.h"
 #include "calib/recording/cleaning.h"
 #include "calib/recording/finding.h"
 #include "calib/tables/table_sensors.h"
@@ -102,93 +102,6 @@ RivalReport rivalOf(const Judgement& judgement) {
   return rival;
 }
 
-/// What is left beside the named effects and varies smoothly, where it is worth telling.
-void addRest(const Judgement& judgement, GapReport& report) {
-  constexpr double kWorthTelling = 0.1;  // Of the start's excess.
-  const double start_m2 = judgement.far.excess_m2.front().value;
-  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > kWorthTelling * start_m2)) return;
-  report.findings.push_back({"",
-                             "Beside what is named, " + shown(signedRoot_mm(judgement.rest_m2)) +
-                                 " mm vary smoothly from place to place and have no name.",
-                             {}});
-}
-
-void addTraces(const std::vector<identify::Trace>& traces, GapReport& report) {
-  for (const identify::Trace& trace : traces)
-    if (trace.p_value < kSureTrace)
-      report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
-}
-
-/// What has no name is at least placed: where it is largest, and which places stand out.
-void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) {
-  constexpr std::size_t kMostNamed = 10;
-  if (!has_gap || !report.selected.empty()) return;
-  std::vector<int> nodes;
-  for (const GapNode& node : report.nodes)
-    if (node.is_flagged && std::find(nodes.begin(), nodes.end(), node.node) == nodes.end()) nodes.push_back(node.node);
-  if (nodes.empty()) return;
-  std::string text = nodes.size() == 1 ? "One place does not fit the others: " : "Places that do not fit the others: ";
-  text += report.names.list(nodes, kMostNamed) + ".";
-  if (report.hotspot && !rows.has_dipoles && nodes.size() * 3 < rows.place_nodes.size()) {
-    const Eigen::Vector3d& at = report.hotspot->center_m;
-    text += " Something local acts within " + shown(report.hotspot->radius_m) + " m of (" + shown(at.x()) + ", " +
-            shown(at.y()) + ", " + shown(at.z()) + ") m.";
-  }
-  report.findings.push_back({"", text, nodes});
-}
-
-/// What the physics of the tracker is taken to be is said where it matters.
-void addAssumption(const TableMetadata& metadata, GapReport& report) {
-  const std::string model = metadata.transmitter_model.value_or("");
-  if (model == "dipole") return;
-  const std::string text = model.empty()
-                               ? "The table states no transmitter_model: a transmitter of dipoles is assumed."
-                               : "The transmitter is no dipole (transmitter_model: " + model +
-                                     "): only errors of the rig are named; metal and coils would need its own physics.";
-  report.findings.push_back({"", text, {}});
-}
-
-/// A tolerance that is stated too small is a finding: what scatters so is no gap.
-void addStatedTooSmall(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
-  constexpr double kTold = 1.3;
-  const auto tell = [&](double seen, double said, double most, const std::string& unit) {
-    if (!(said > 0.0) || seen < kTold * said || seen > most) return;
-    report.findings.push_back({"",
-                               "The places are less exact than stated: " + shown(seen) + " " + unit + " instead of " +
-                                   shown(said) + " " + unit + " (SD per axis). That is no gap.",
-                               {}});
-  };
-  tell(1e3 * search.placingSd_m(), 1e3 * stated.placing_sd_m.value_or(0.0), 1e3 * identify::worstPlacing_m(stated),
-       "mm");
-  if (stated.has_orientation)
-    tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * stated.placing_sd_rad.value_or(0.0),
-         kDegPerRad * identify::worstPlacing_rad(stated), "degrees");
-}
-
-/// What scatters from place to place beyond what can be placing is told.
-void addBoundOfFloor(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
-  const auto tell = [&](double seen, double bound, bool is_stated, const std::string& unit, const std::string& by_hand,
-                        const std::string& remedy) {
-    if (!(seen > 1.001 * bound)) return;
-    const std::string why = is_stated
-                                ? "The tolerance that is stated is far less, and a person with a jig stays within "
-                                : "No tolerance is stated, and a person with a jig stays within ";
-    report.findings.push_back({"",
-                               "The places scatter by " + shown(seen) + " " + unit +
-                                   " (SD per axis) about any smooth field. " + why + shown(bound) + " " + unit + " (" +
-                                   by_hand + "): the floor is held there, and what is above it counts as gap. " +
-                                   remedy,
-                               {}});
-  };
-  tell(1e3 * search.placingSd_m(), 1e3 * search.floorPlacingSd_m(), stated.placing_sd_m.has_value(), "mm",
-       "a foot set on its mark within a finger's breadth",
-       "Are true and tracked positions of the same places and of one sensor? Else state jig_tolerance_m.");
-  tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * search.floorPlacingSd_rad(), stated.placing_sd_rad.has_value(),
-       "degrees", "turned and held upright by eye within ten degrees",
-       "Are the true orientations those of the places, and all rows of one sensor? Else state jig_tolerance_rad, or "
-       "leave the columns of the orientation out.");
-}
-
 /// Effects that single readings show stand beside those that the poses show.
 void selectSignalFindings(GapReport& report) {
   for (const recording::GapFinding& finding : report.findings) {
@@ -260,11 +173,7 @@ void describeJudgement(const identify::GapSearch& search, const Judgement& judge
   report.rival = rivalOf(judgement);
   if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
     report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
-  if (has_gap && rows.has_dipoles) addTraces(judgement.left.traces, report);
-  addRest(judgement, report);
-  addMisfits(has_gap, rows, report);
-  addStatedTooSmall(search, rows, report);
-  addBoundOfFloor(search, rows, report);
+  addFindings(search, rows, judgement, has_gap, report);
   addSequence(judgement.far, report);
   report.remaining = remainingOf(judgement.far, rows);
 }
@@ -281,13 +190,6 @@ void addReplicates(const identify::GapSearch& search, const Judgement& judgement
   report.replicates = replicate(search, judgement, report.candidates, believedAgain, replicating, control);
 }
 
-void addMirrored(GapReport& report) {
-  report.findings.push_back({"",
-                             "True and tracked positions are mirror images: an axis has the wrong sign, or two are "
-                             "exchanged. Put that right first; causes are not looked for.",
-                             {}});
-}
-
 /// @param known_gap whether there is a gap, where that is known already; causes are looked for only if it may be
 Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& metadata, const SampleTable* samples,
                                const simulation::Scene* scene, const DiagnosisOptions& options,
@@ -302,9 +204,8 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   report.findings = std::move(cleaned.findings);
   control.progress(0.01);
 
-  addAssumption(metadata, report);
   const bool is_mirrored = identify::isMirrored(rows);
-  if (is_mirrored) addMirrored(report);
+  addInputFindings(metadata, is_mirrored, report);
   const identify::GapSearch search(rows, std::move(believed));
   identify::EffectSelectionOptions selecting;
   const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
@@ -323,7 +224,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   report.isolability = isolabilityOf(search, kStartsForIsolability, control);
   if (control.stop.stop_requested()) return stopped();
   suggestNext(search, judgement.selection, report);
-  report.text = verdictText(report);
+  report.text = verdictText(report, known_gap ? "change" : "gap");
   if (!has_enough) {
     report.text += " Causes are not looked for: " + std::to_string(report.input.places) + " places are too few, " +
                    std::to_string(identify::kFewestPlacesForCauses) + " are needed.";

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calib/gap/how_far.h"
+#include "calib/identify/selection.h"
 #include "calib/identify/traces.h"
 
 namespace fieldtrue::gap {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "calib/gap/report.h"
-#include "calib/identify/search.h"
+#include "calib/identify/selection.h"
 
 namespace fieldtrue::gap {
 

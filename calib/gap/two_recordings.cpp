@@ -145,8 +145,7 @@ class CommonAlignment {
     const Eigen::VectorXd all = identify::SharedField(both, law).refitted();
     const Eigen::VectorXd by = all - so_far;
     so_far = all;
-    const auto first =
-        static_cast<Eigen::Index>(identify::readingsOf(*before_.search, found_.before, rotation).free.size());
+    const auto first = static_cast<Eigen::Index>(both.free_of_earlier);
     return {by.head(first), by.tail(by.size() - first)};
   }
 

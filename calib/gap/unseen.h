@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calib/core/run_control.h"
-#include "calib/identify/search.h"
+#include "calib/identify/selection.h"
 #include "calib/identify/unnamed.h"
 
 namespace fieldtrue::gap {

@@ -110,22 +110,22 @@ std::string whyRefused(const Judgement& judgement) {
   return "";
 }
 
-std::string verdictText(const GapReport& report) {
+std::string verdictText(const GapReport& report, const std::string& thing) {
   const std::string gap = gapText(report);
   switch (report.verdict) {
     case GapVerdict::kNoGap:
-      return "No gap: the recording agrees with the simulation within its noise (" + gap + ").";
+      return "No " + thing + ": the recording agrees with the simulation within its noise (" + gap + ").";
     case GapVerdict::kExplained:
-      return "The gap (" + gap + ") is explained by: " + causesText(report) + "; " + fallText(report) + ".";
+      return "The " + thing + " (" + gap + ") is explained by: " + causesText(report) + "; " + fallText(report) + ".";
     case GapVerdict::kPartlyExplained:
-      return "The gap (" + gap + ") is partly explained by: " + causesText(report) + "; " + fallText(report) +
+      return "The " + thing + " (" + gap + ") is partly explained by: " + causesText(report) + "; " + fallText(report) +
              ", the rest has another cause.";
     case GapVerdict::kUnexplained:
       if (!report.selected.empty()) {
-        return "There is a gap (" + gap + ") that no known effect explains; the nearest is " + causesText(report) +
-               ": " + fallText(report) + ".";
+        return "There is a " + thing + " (" + gap + ") that no known effect explains; the nearest is " +
+               causesText(report) + ": " + fallText(report) + ".";
       }
-      return "There is a gap (" + gap + ") that no known effect explains" +
+      return "There is a " + thing + " (" + gap + ") that no known effect explains" +
              (report.rival.why.empty() ? "." : ": " + report.rival.why + ".");
   }
   return {};

@@ -29,6 +29,7 @@ std::string shown(double value);
 std::string whyRefused(const Judgement& judgement);
 
 /// One sentence: what was found, how sure, what to do.
-std::string verdictText(const GapReport& report);
+/// @param thing what it is that is or is not explained
+std::string verdictText(const GapReport& report, const std::string& thing = "gap");
 
 }  // namespace fieldtrue::gap

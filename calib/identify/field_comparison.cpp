@@ -37,6 +37,7 @@ class LawClimb {
 
   SharedLaw run() {
     constexpr int kRounds = 4;
+    constexpr double kWorthARound = 0.1;  // Nats.
     SharedLaw best;
     best.field.length_m = 0.5 * extent_m_;
     best.field.by_place = unit_;
@@ -60,7 +61,7 @@ class LawClimb {
       ladder(kNoise, [&](SharedLaw& law, double step) { law.noise_factor[0] = step; });
       if (has_later_) ladder(kNoise, [&](SharedLaw& law, double step) { law.noise_factor[1] = step; });
       if (repeats_) ladder(kShares, [&](SharedLaw& law, double step) { law.rig_share = step; });
-      if (most - before < 0.1) break;
+      if (most - before < kWorthARound) break;
     }
     return best;
   }
@@ -129,14 +130,6 @@ double leastShown(const SharedField& unchanged, double length_m, double noise, d
   return size;
 }
 
-}  // namespace
-
-SharedLaw likeliestSharedLaw(const FieldReadings& readings, const SmoothParts& parts) {
-  return LawClimb(readings, parts).run();
-}
-
-namespace {
-
 /// The same readings, each dealt anew to those that see a change and those that do not; of two readings of one place
 /// one each, as it was. A field that no law here fits well looks changed however it is dealt.
 FieldReadings dealt(const FieldReadings& readings, std::mt19937& draw) {
@@ -170,6 +163,10 @@ std::vector<double> oddsOf(const FieldReadings& readings, std::span<const Shared
 }
 
 }  // namespace
+
+SharedLaw likeliestSharedLaw(const FieldReadings& readings, const SmoothParts& parts) {
+  return LawClimb(readings, parts).run();
+}
 
 FieldComparison compareFields(const FieldReadings& readings, const SmoothParts& parts, double pitch_m,
                               const RunControl& control) {

@@ -9,7 +9,7 @@
 #include "calib/core/statistics.h"
 #include "calib/effects/registry.h"
 #include "calib/field/tracker_model.h"
-#include "calib/identify/search.h"
+#include "calib/identify/selection.h"
 #include "calib/recording/cleaning.h"
 
 namespace fieldtrue::identify {

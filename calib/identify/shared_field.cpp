@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 
 #include "calib/identify/unnamed.h"
@@ -12,6 +11,10 @@ namespace fieldtrue::identify {
 namespace {
 
 constexpr double kFreeSd = 0.1;  ///< Of a refitted alignment, metres or radians: so wide that it says nothing.
+
+double logDeterminant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
+  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+}
 
 /// Columns of one vector that the rows of one group have in common, turned by each row or not.
 void addFree(FieldReadings& readings, const std::vector<Eigen::Matrix3d>& by_row) {
@@ -51,6 +54,28 @@ void addAlignment(const GapSearch& search, const GapAlignment& alignment, bool r
   }
 }
 
+/// Of the readings of one component, alignments apart; the lower half alone.
+Eigen::MatrixXd covarianceOf(const FieldReadings& readings, const SharedLaw& law,
+                             const std::optional<ChangeLaw>& change) {
+  const auto n = static_cast<Eigen::Index>(readings.size());
+  Eigen::MatrixXd K(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto a = static_cast<std::size_t>(i);
+    const double factor = law.noiseFactor(readings.is_later[a] != 0);
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const auto b = static_cast<std::size_t>(j);
+      K(i, j) = covariance(law.field, readings.points[a], readings.points[b]);
+      if (i != j && readings.places[a] == readings.places[b])
+        K(i, j) += law.rig_share * factor * law.noiseFactor(readings.is_later[b] != 0) *
+                   std::sqrt(readings.rig_variances[i] * readings.rig_variances[j]);
+      if (change && readings.sees_change[a] != 0 && readings.sees_change[b] != 0)
+        K(i, j) += covariance(*change, readings.points[a], readings.points[b]);
+    }
+    K(i, i) += factor * factor * readings.variances[i];
+  }
+  return K;
+}
+
 }  // namespace
 
 double covariance(const ChangeLaw& law, const FieldPoint& a, const FieldPoint& b) {
@@ -60,6 +85,7 @@ double covariance(const ChangeLaw& law, const FieldPoint& a, const FieldPoint& b
 
 FieldReadings FieldReadings::only(std::span<const std::size_t> rows) const {
   FieldReadings some;
+  some.free_of_earlier = free_of_earlier;
   const auto n = static_cast<Eigen::Index>(rows.size());
   some.values.resize(n, 3);
   some.variances.resize(n);
@@ -102,6 +128,7 @@ FieldReadings readingsOf(const GapSearch& search, const GapAlignment& alignment,
 
 FieldReadings joined(const FieldReadings& earlier, const FieldReadings& later, std::span<const int> places_of_later) {
   FieldReadings both = earlier;
+  both.free_of_earlier = earlier.free.size();
   both.points.insert(both.points.end(), later.points.begin(), later.points.end());
   both.places.insert(both.places.end(), places_of_later.begin(), places_of_later.end());
   both.is_later.insert(both.is_later.end(), later.size(), char{1});
@@ -126,38 +153,23 @@ FieldReadings joined(const FieldReadings& earlier, const FieldReadings& later, s
 
 SharedField::SharedField(const FieldReadings& readings, const SharedLaw& law, const std::optional<ChangeLaw>& change)
     : readings_(readings), law_(law), change_(change) {
-  const auto n = static_cast<Eigen::Index>(readings.size());
-  const auto factor = [&](Eigen::Index i) {
-    return law.noiseFactor(readings.is_later[static_cast<std::size_t>(i)] != 0);
-  };
-  Eigen::MatrixXd K(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto a = static_cast<std::size_t>(i);
-    for (Eigen::Index j = 0; j < i; ++j) {
-      const auto b = static_cast<std::size_t>(j);
-      K(i, j) = covariance(law.field, readings.points[a], readings.points[b]);
-      if (readings.places[a] == readings.places[b])
-        K(i, j) +=
-            law.rig_share * factor(i) * factor(j) * std::sqrt(readings.rig_variances[i] * readings.rig_variances[j]);
-      if (change && readings.sees_change[a] != 0 && readings.sees_change[b] != 0)
-        K(i, j) += covariance(*change, readings.points[a], readings.points[b]);
-    }
-    K(i, i) =
-        covariance(law.field, readings.points[a], readings.points[a]) + factor(i) * factor(i) * readings.variances[i];
-    if (change && readings.sees_change[a] != 0) K(i, i) += covariance(*change, readings.points[a], readings.points[a]);
-  }
-  factor_.compute(K);
-  if (factor_.info() != Eigen::Success) {
-    log_evidence_ = -std::numeric_limits<double>::infinity();
-    weights_ = Eigen::MatrixX3d::Zero(n, 3);
-    refitted_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(readings.free.size()));
+  factor_.compute(covarianceOf(readings, law, change));
+  if (factor_.info() == Eigen::Success) {
+    refit();
     return;
   }
-  const auto columns = static_cast<Eigen::Index>(readings.free.size());
+  log_evidence_ = -std::numeric_limits<double>::infinity();
+  weights_ = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(readings.size()), 3);
+  refitted_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(readings.free.size()));
+}
+
+void SharedField::refit() {
+  const auto n = static_cast<Eigen::Index>(readings_.size());
+  const auto columns = static_cast<Eigen::Index>(readings_.free.size());
   Eigen::MatrixXd right(n, 3 + 3 * columns);
-  right.leftCols<3>() = readings.values;
+  right.leftCols<3>() = readings_.values;
   for (Eigen::Index c = 0; c < columns; ++c)
-    right.middleCols<3>(3 + 3 * c) = readings.free[static_cast<std::size_t>(c)];
+    right.middleCols<3>(3 + 3 * c) = readings_.free[static_cast<std::size_t>(c)];
   const Eigen::MatrixXd solved = factor_.solve(right);
   Eigen::MatrixXd A = Eigen::MatrixXd::Identity(columns, columns) / (kFreeSd * kFreeSd);
   Eigen::VectorXd b(columns);
@@ -170,13 +182,10 @@ SharedField::SharedField(const FieldReadings& readings, const SharedLaw& law, co
   refitted_ = small.solve(b);
   weights_ = solved.leftCols<3>();
   for (Eigen::Index c = 0; c < columns; ++c) weights_ -= refitted_[c] * solved.middleCols<3>(3 + 3 * c);
-  const double squares = readings.values.cwiseProduct(solved.leftCols<3>()).sum() - b.dot(refitted_);
-  const auto logOf = [](const Eigen::LLT<Eigen::MatrixXd>& of) {
-    return 2.0 * of.matrixLLT().diagonal().array().log().sum();
-  };
-  log_evidence_ =
-      -0.5 * (squares + 3.0 * logOf(factor_) + logOf(small) + 2.0 * static_cast<double>(columns) * std::log(kFreeSd) +
-              3.0 * static_cast<double>(n) * std::log(2.0 * std::numbers::pi));
+  const double squares = readings_.values.cwiseProduct(solved.leftCols<3>()).sum() - b.dot(refitted_);
+  log_evidence_ = -0.5 * (squares + 3.0 * logDeterminant(factor_) + logDeterminant(small) +
+                          2.0 * static_cast<double>(columns) * std::log(kFreeSd) +
+                          3.0 * static_cast<double>(n) * std::log(2.0 * std::numbers::pi));
 }
 
 Eigen::VectorXd SharedField::sharedWith(const FieldPoint& point, int place) const {

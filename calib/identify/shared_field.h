@@ -23,6 +23,7 @@ struct FieldReadings {
   /// What refitting the alignments would add to the values, per metre or radian: n x 3 each. Of each recording come
   /// first three shifts (not of rotations), then three turns about the tracker's origin, then three of each mount.
   std::vector<Eigen::MatrixX3d> free;
+  std::size_t free_of_earlier = 0;  ///< How many of `free` are the earlier one's, of two recordings.
 
   std::size_t size() const { return points.size(); }
   FieldReadings only(std::span<const std::size_t> rows) const;
@@ -72,6 +73,8 @@ class SharedField {
   Eigen::ArrayXd visibilityOf(const ChangeLaw& change) const;
 
  private:
+  /// The alignments, and the density of the readings under them.
+  void refit();
   Eigen::VectorXd sharedWith(const FieldPoint& point, int place) const;
 
   const FieldReadings& readings_;

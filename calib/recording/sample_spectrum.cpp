@@ -3,10 +3,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numbers>
 
 #include "calib/core/statistics.h"
+#include "calib/recording/autoregression.h"
 
 namespace fieldtrue::recording {
 
@@ -29,6 +29,7 @@ constexpr std::size_t kMostLines = 3;
 constexpr double kLargestChance = 1e-3;
 /// A line that adds less than this share to the noise's power does no harm that could be seen.
 constexpr double kSmallestExcess = 0.2;
+constexpr Eigen::Index kHighestOrder = 12;  ///< Of the noise's autoregression.
 
 /// A stop's readings, or a part of a long stop's: channels of unit variance, one reading a row.
 struct Part {
@@ -233,43 +234,6 @@ std::vector<double> pooledAutocovariance(const std::vector<Part>& parts, Eigen::
   return sums;
 }
 
-/// Noise that follows its own past: x_k = a_1 x_(k-1) + a_2 x_(k-2) + ... + e_k.
-struct Autoregression {
-  std::vector<double> coefficients;
-  double variance = 1.0;  ///< Of e.
-
-  double powerAt(double frequency_hz, double rate_hz) const {
-    std::complex<double> transfer = 1.0;
-    for (std::size_t k = 0; k < coefficients.size(); ++k)
-      transfer -= coefficients[k] * std::polar(1.0, -kTwoPi * frequency_hz / rate_hz * static_cast<double>(k + 1));
-    return variance / std::norm(transfer);
-  }
-};
-
-/// Of the order that is likeliest for its number of coefficients.
-/// @source Durbin 1960 for the recursion; Schwarz 1978 for the order
-Autoregression fittedAutoregression(const std::vector<Part>& parts, double n_values) {
-  constexpr Eigen::Index kHighestOrder = 12;
-  const std::vector<double> r = pooledAutocovariance(parts, kHighestOrder);
-  Autoregression at{{}, r[0]};
-  Autoregression best = at;
-  double least = n_values * std::log(at.variance);
-  for (std::size_t order = 1; order < r.size(); ++order) {
-    double sum = r[order];
-    for (std::size_t k = 0; k < at.coefficients.size(); ++k) sum -= at.coefficients[k] * r[order - 1 - k];
-    const double reflection = sum / at.variance;
-    std::vector<double> next = at.coefficients;
-    for (std::size_t k = 0; k < next.size(); ++k) next[k] -= reflection * at.coefficients[next.size() - 1 - k];
-    next.push_back(reflection);
-    at = {std::move(next), at.variance * (1.0 - reflection * reflection)};
-    const double cost = n_values * std::log(at.variance) + static_cast<double>(order) * std::log(n_values);
-    if (cost >= least) continue;
-    least = cost;
-    best = at;
-  }
-  return best;
-}
-
 /// What the neighbourhood of each frequency, itself left out, says of the noise there at most: neither a slope nor the
 /// top of a filter's lobe is a line. The lowest frequencies have no neighbours below: there red noise rises as a line
 /// would, and what the readings' own autoregression says counts too.
@@ -281,7 +245,7 @@ std::vector<double> backgroundOf(const std::vector<double>& power, const std::ve
                                    medianBetween(power, bin + kNearest, bin + kFarthest), parabolaAcross(power, bin)}));
     if (bin < kFarthest)
       background.back() =
-          std::max(background.back(), noise.powerAt(frequencies_hz[static_cast<std::size_t>(bin)], rate_hz));
+          std::max(background.back(), noise.powerAt(frequencies_hz[static_cast<std::size_t>(bin)] / rate_hz));
   }
   return background;
 }
@@ -391,8 +355,8 @@ std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& vis
   const std::vector<Part> white = prewhitened(parts, rho);
   spectrum.power = pooledPower(white, spectrum.frequencies_hz);
   const double n_white = spectrum.series * static_cast<double>(medianLength(white));
-  spectrum.background =
-      backgroundOf(spectrum.power, spectrum.frequencies_hz, fittedAutoregression(white, n_white), *rate_hz);
+  const Autoregression noise = fittedAutoregression(pooledAutocovariance(white, kHighestOrder), n_white);
+  spectrum.background = backgroundOf(spectrum.power, spectrum.frequencies_hz, noise, *rate_hz);
   while (spectrum.lines.size() < kMostLines) {
     const std::optional<SpectralLine> line = strongestLine(spectrum, white, rho);
     if (!line || (!spectrum.lines.empty() && line->amplitude_sd < 0.3 * spectrum.lines.front().amplitude_sd)) break;

@@ -83,6 +83,8 @@ GapReport someReport() {
   report.next_measurement = "Turn the sensor.";
   report.next_separates = {"compact_metal", "closed_loop"};
   report.predictions = {{"compact_metal", 17, 31.0, 12.0, 4.0}};
+  report.replicates = Replicates{50, 41, 0.25, "closed_loop", 10, 7, 2, "Of 50, 41 were named right."};
+  report.against = Against{true, 0.0025, 4.5, Eigen::Vector3d(0.25, -0.5, 0.75), "compact_metal"};
   return report;
 }
 
@@ -149,6 +151,8 @@ class GapJsonTest : public QObject {
                                   .split(' ');
     QTest::newRow("isolability") << "/isolability" << QStringList{"pairs", "warnings"};
     QTest::newRow("pair") << "/isolability/pairs/0" << QString("a b r2").split(' ');
+    QTest::newRow("against") << "/against" << QString("changed p_value rms_mm location_m effect").split(' ');
+    QTest::newRow("replicates") << "/replicates" << QString("n named_right within_m_median text").split(' ');
     QTest::newRow("next") << "/next_measurement" << QStringList{"text", "separates"};
   }
 
@@ -180,17 +184,22 @@ class GapJsonTest : public QObject {
     report.orientation_rms_deg.reset();
     report.floor_orientation_deg.reset();
     report.hotspot.reset();
+    report.against->location_m.reset();
+    report.against->effect.clear();
     report.origin.sensor = std::numeric_limits<double>::quiet_NaN();
     const json document = toJson(report);
     QVERIFY(document["gap"]["orientation_rms_deg"].is_null());
     QVERIFY(document["gap"]["floor_orientation_deg"].is_null());
     QVERIFY(document["where"]["hotspot"].is_null());
+    QVERIFY(document["against"]["location_m"].is_null());
+    QVERIFY(document["against"]["effect"].is_null());
     QVERIFY(document["where"]["nodes"][0]["gap_deg"].is_null());
     QVERIFY(document["where"]["origin"]["sensor"].is_null());
     const auto read = readGapReport(document, "r");
     FT_VERIFY_OK(read);
     QVERIFY(!read->orientation_rms_deg && !read->hotspot);
     QVERIFY(std::isnan(read->origin.sensor));
+    QVERIFY(read->against && !read->against->location_m && read->against->effect.empty());
   }
 
   void readingGivesTheSameReport() {

@@ -62,6 +62,28 @@ FieldReadings pairOf(double bump_m) {
   return joined(readingsAt(60, 0, 1), readingsAt(60, 1000, 2, bump_m), placesFrom(1000, 60));
 }
 
+/// The same field twice, and in the later recording a smooth change of an SD in each component besides: six waves of
+/// random direction and phase, as long as the squared exponential's with a scale of half the region's diagonal.
+FieldReadings changedBy(double sd_m, unsigned seed) {
+  constexpr int kWaves = 6;
+  const double scale_m = 0.5 * std::sqrt(3.0) * 1.2;
+  std::mt19937 draw(seed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> phase(0.0, 2.0 * std::numbers::pi);
+  FieldReadings pair = pairOf(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int wave = 0; wave < kWaves; ++wave) {
+      const Eigen::Vector3d k_per_m = Eigen::Vector3d(normal(draw), normal(draw), normal(draw)) / scale_m;
+      const double begins = phase(draw);
+      for (std::size_t i = 0; i < pair.size(); ++i)
+        if (pair.is_later[i] != 0)
+          pair.values(static_cast<Eigen::Index>(i), axis) +=
+              sd_m * std::sqrt(2.0 / kWaves) * std::sin(k_per_m.dot(pair.points[i].place_m) + begins);
+    }
+  }
+  return pair;
+}
+
 }  // namespace
 
 class SharedFieldTest : public QObject {
@@ -143,10 +165,19 @@ class SharedFieldTest : public QObject {
     QVERIFY(at(0.3).z() - at(-0.4).z() > 0.002);
   }
 
-  /// A change smaller than what is said to show does not show, one of three times as much does.
+  /// Of changes as wide as half the region's diagonal, those of a third of what is said to show do not show, and those
+  /// of three times as much do.
   void saysWhatWouldShow() {
-    const FieldComparison none = compareFields(pairOf(0.0), {}, 0.2);
-    QVERIFY(none.least_shown > 0.05 * kNoise_m && none.least_shown < 2.0 * kNoise_m);
+    constexpr int kChanges = 6;
+    const double least = compareFields(pairOf(0.0), {}, 0.2).least_shown;
+    int small_shown = 0;
+    int large_shown = 0;
+    for (unsigned seed = 1; seed <= kChanges; ++seed) {
+      small_shown += compareFields(changedBy(least / 3.0, seed), {}, 0.2).log_odds > kSureOfChange ? 1 : 0;
+      large_shown += compareFields(changedBy(3.0 * least, seed), {}, 0.2).log_odds > kSureOfChange ? 1 : 0;
+    }
+    QCOMPARE(small_shown, 0);
+    QVERIFY2(large_shown >= kChanges - 1, std::to_string(large_shown).c_str());
   }
 };
 

@@ -1,0 +1,179 @@
+#include "calib/identify/selection.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+namespace fieldtrue::identify {
+namespace {
+
+class Selector {
+ public:
+  Selector(const GapSearch& search, const EffectSelectionOptions& options, const RunControl& control)
+      : search_(search), options_(options), control_(control) {}
+
+  EffectSelection run() {
+    none_bic_ = search_.bicOf(search_.none().model);
+    if (options_.most_effects < 1) return finished({}, {});
+    const std::vector<TriedEffect> first = search_.rank(search_.none(), control_);
+    const TriedEffect* best = firstWorth(first, options_.least_gain_first);
+    if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);
+    EffectSelection selection = grown(*best);
+    const TriedEffect* other = firstOfOtherKind(first, *best);
+    if (other != nullptr && !control_.stop.stop_requested()) {
+      EffectSelection second = grown(*other);
+      if (second.bic_gain > selection.bic_gain) selection = std::move(second);
+    }
+    return finished(std::move(selection), first);
+  }
+
+ private:
+  /// The best effect worth adding: enough evidence, believable, and better on what it was not fitted to.
+  static const TriedEffect* firstWorth(const std::vector<TriedEffect>& tried, double least_gain) {
+    for (const TriedEffect& one : tried) {
+      if (one.bic_gain < least_gain) break;
+      if (one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
+    }
+    return nullptr;
+  }
+
+  /// Starts with one effect and adds others while they are worth it.
+  EffectSelection grown(const TriedEffect& first) {
+    EffectSelection selection;
+    const TriedEffect* next = &first;
+    std::vector<TriedEffect> following;
+    while (next != nullptr && !control_.stop.stop_requested()) {
+      add(*next, selection);
+      if (selection.ways.size() > 1) {
+        exchange(selection);
+        prune(selection);
+      }
+      if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
+      following = search_.rank(selection.model, control_);
+      next = firstWorth(following, options_.least_gain_more);
+    }
+    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
+    return selection;
+  }
+
+  /// One flexible thing in the room can pass for two errors of the instrument, and the other way round: the best of the
+  /// other kind is worth a start of its own where it explains a good part.
+  const TriedEffect* firstOfOtherKind(const std::vector<TriedEffect>& tried, const TriedEffect& best) const {
+    constexpr double kGoodPart = 0.4;
+    const auto is_in_room = [&](const TriedEffect& one) { return one.fitted.location_m.has_value(); };
+    for (const TriedEffect& one : tried) {
+      if (one.bic_gain < std::max(options_.least_gain_first, kGoodPart * best.bic_gain)) break;
+      if (is_in_room(one) != is_in_room(best) && one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
+    }
+    return nullptr;
+  }
+
+  EffectSelection finished(EffectSelection selection, const std::vector<TriedEffect>& first) {
+    if (selection.ways.empty()) selection.model = search_.none();
+    selection.first = first;
+    selection.alternatives = first;
+    if (selection.ways.size() > 1) findLeading(selection);
+    if (selection.ways.size() == 1) takeOver(selection);
+    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
+    return selection;
+  }
+
+  void add(const TriedEffect& tried, EffectSelection& selection) const {
+    selection.model = tried.refined.model.terms.empty() ? search_.refined(tried.model) : tried.refined;
+    selection.ways.push_back(tried.way);
+  }
+
+  RefinedModel without(const EffectSelection& selection, std::size_t term) const {
+    return search_.refined(withoutTerm(selection.model.model, term));
+  }
+
+  /// Replaces earlier effects by others where these are better now that the last one is there.
+  void exchange(EffectSelection& selection) {
+    for (std::size_t term = 0; term + 1 < selection.ways.size(); ++term) {
+      const double bic = search_.bicOf(selection.model.model);
+      const RefinedModel rest = without(selection, term);
+      const std::vector<TriedEffect> tried = search_.rank(rest, control_);
+      if (tried.empty()) return;
+      const TriedEffect* best = firstWorth(tried, 0.0);
+      if (best == nullptr || search_.bicOf(best->model) > bic - 2.0) continue;
+      selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
+      selection.model = best->refined.model.terms.empty() ? search_.refined(best->model) : best->refined;
+      selection.ways.push_back(best->way);
+    }
+  }
+
+  /// Drops effects whose removal costs less than they are worth, the cheapest first.
+  void prune(EffectSelection& selection) {
+    while (selection.ways.size() > 1) {
+      const double bic = search_.bicOf(selection.model.model);
+      double least = options_.least_gain_more;
+      std::optional<std::size_t> cheapest;
+      RefinedModel best_rest;
+      for (std::size_t term = 0; term < selection.ways.size(); ++term) {
+        RefinedModel rest = without(selection, term);
+        const double cost = search_.bicOf(rest.model) - bic;
+        if (cost >= least) continue;
+        least = cost;
+        cheapest = term;
+        best_rest = std::move(rest);
+      }
+      if (!cheapest) return;
+      selection.model = std::move(best_rest);
+      selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(*cheapest));
+    }
+  }
+
+  /// A single effect that exchanging and dropping ended at may be fitted better than when it was first tried, or worse
+  /// than another alone.
+  void takeOver(EffectSelection& selection) const {
+    const double gain = none_bic_ - search_.bicOf(selection.model.model);
+    const effects::Effect* effect = search_.ways()[selection.ways.front()].effect;
+    for (TriedEffect& tried : selection.alternatives) {
+      if (search_.ways()[tried.way].effect != effect || tried.bic_gain >= gain) continue;
+      tried.way = selection.ways.front();
+      tried.refined = selection.model;
+      tried.model = selection.model.model;
+      tried.bic_gain = gain;
+    }
+    const TriedEffect* best = firstWorth(selection.alternatives, gain + 2.0);
+    if (best == nullptr || search_.ways()[best->way].effect == effect) return;
+    selection.ways.clear();
+    add(*best, selection);
+  }
+
+  /// The effect whose absence costs most leads; the candidates are its alternatives with the others present.
+  void findLeading(EffectSelection& selection) {
+    double most = -std::numeric_limits<double>::infinity();
+    RefinedModel rest;
+    for (std::size_t term = 0; term < selection.ways.size(); ++term) {
+      const RefinedModel reduced = without(selection, term);
+      const double cost = search_.bicOf(reduced.model);
+      if (cost > most) {
+        most = cost;
+        selection.leading = term;
+        rest = reduced;
+      }
+    }
+    selection.alternatives = search_.rank(rest, control_);
+    const double bic = search_.bicOf(selection.model.model);
+    const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
+    if (best == nullptr || search_.bicOf(best->model) > bic - 2.0) return;
+    selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+    add(*best, selection);
+    selection.leading = selection.ways.size() - 1;
+  }
+
+  const GapSearch& search_;
+  const EffectSelectionOptions& options_;
+  const RunControl& control_;
+  double none_bic_ = 0.0;
+};
+
+}  // namespace
+
+EffectSelection selectEffects(const GapSearch& search, const EffectSelectionOptions& options,
+                              const RunControl& control) {
+  return Selector(search, options, control).run();
+}
+
+}  // namespace fieldtrue::identify

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "calib/identify/search.h"
+
+namespace fieldtrue::identify {
+
+/// The effects that together explain a recording best, found by adding, exchanging and dropping.
+struct EffectSelection {
+  std::vector<TriedEffect> first;         ///< All effects on their own, best first.
+  std::vector<TriedEffect> alternatives;  ///< To the leading selected effect, with the others present; best first.
+  RefinedModel model;                     ///< With all selected effects; terms in the order they were added.
+  std::vector<std::size_t> ways;          ///< Of the terms.
+  std::size_t leading = 0;                ///< Term that explains most.
+  double bic_gain = 0.0;                  ///< Against no effect.
+};
+
+struct EffectSelectionOptions {
+  int most_effects = 4;
+  double least_gain_first = 8.0;  ///< BIC gain that the first effect needs.
+  double least_gain_more = 14.0;  ///< And every further one.
+};
+
+EffectSelection selectEffects(const GapSearch& search, const EffectSelectionOptions& options,
+                              const RunControl& control);
+
+}  // namespace fieldtrue::identify
