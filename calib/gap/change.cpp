@@ -231,8 +231,7 @@ std::string nothingText(const RecordingChange& change) {
 }
 
 std::string changedText(const RecordingChange& change, const GapReport& report) {
-  std::string text = "The field changed since the earlier recording by " + shown(change.rms_mm) + " mm (RMS, " +
-                     howSure(change.p_value) + ")";
+  std::string text = "The field changed since the earlier recording (" + howSure(change.p_value) + ")";
   if (change.hottest_m)
     text += ", most near (" + shown(change.hottest_m->x()) + ", " + shown(change.hottest_m->y()) + ", " +
             shown(change.hottest_m->z()) + ") m";
@@ -279,6 +278,8 @@ void describeChange(const RecordingChange& change, GapReport& report) {
     report.verdict = GapVerdict::kNoGap;
     report.text = nothingText(change);
   } else {
+    against.rms_mm =
+        std::sqrt(std::max(0.0, std::pow(report.position_rms_mm, 2) - std::pow(report.floor_position_mm, 2)));
     if (!report.selected.empty()) {
       against.effect = report.selected.front().effect;
       if (report.selected.front().location_m) against.location_m = report.selected.front().location_m;

@@ -178,7 +178,7 @@ struct Replicates {
 struct Against {
   bool changed = false;
   double p_value = 1.0;                       ///< At most so often two recordings of one field differ as much.
-  double rms_mm = 0.0;                        ///< Of the change of positions.
+  double rms_mm = 0.0;                        ///< Of the change of positions, above the noise.
   std::optional<Eigen::Vector3d> location_m;  ///< Of what is named, else where positions changed most; tracker frame.
   std::string effect;                         ///< "" where nothing is named.
 };

@@ -8,6 +8,7 @@ namespace fieldtrue::testing {
 /// A room in which the withheld cause is known.
 struct KnownRoom {
   CalibrationTable table;
+  CalibrationTable before;  ///< Recorded at other places before the metal came.
   SampleTable samples;
   Eigen::Vector3d body_m;  ///< The metal's centre in the rig's frame.
 };
@@ -26,6 +27,9 @@ inline KnownRoom roomWithSteel() {
   room.body_m = kBody_m;
   GapPlan plan;
   plan.counts = {5, 5, 4};
+  plan.is_scattered = true;
+  room.before = recordedIn(gapScene(), gapPlan(plan), 6);
+  plan.is_scattered = false;
   room.table = recordedIn(scene, gapPlan(plan), 7, &room.samples);
   return room;
 }

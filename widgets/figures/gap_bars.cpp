@@ -60,7 +60,8 @@ GapBarChart waterfallChart(const gap::GapReport& report) {
   GapBarChart chart{"waterfall", "Error above noise as each cause is added (mm, 90 % range)", {}};
   for (const gap::GapStep& step : report.sequence) {
     GapBar bar;
-    bar.name = step.effect.empty() ? "As simulated now" : "+ " + effectLabel(step.effect);
+    bar.name = step.effect.empty() ? (report.against ? "As it was before" : "As simulated now")
+                                   : "+ " + effectLabel(step.effect);
     bar.value = std::max(0.0, step.excess_mm);
     bar.low90 = step.low90_mm;
     bar.high90 = step.high90_mm;

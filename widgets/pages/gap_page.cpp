@@ -8,7 +8,6 @@
 #include <QPointer>
 #include <QProgressBar>
 #include <QPushButton>
-#include <QScrollArea>
 #include <QSplitter>
 #include <QStackedWidget>
 #include <QStyle>
@@ -18,17 +17,17 @@
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/report_json.h"
-#include "calib/recording/finding.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/tables/table_io.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/figures/field_scale.h"
+#include "widgets/figures/gap_bars.h"
 #include "widgets/figures/gap_field.h"
 #include "widgets/forms/empty_page.h"
 #include "widgets/forms/sensor_choice.h"
+#include "widgets/pages/gap_inspector.h"
 #include "widgets/report/gap_section.h"
 #include "widgets/style/theme.h"
-#include "widgets/views/charts/gap_bar_view.h"
 #include "widgets/views/draw_picture.h"
 #include "widgets/views/field/field_view.h"
 
@@ -56,7 +55,8 @@ GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
   rows->addWidget(makeHeader());
   auto* splitter = new QSplitter(content);
   splitter->addWidget(makeFieldSide());
-  splitter->addWidget(makeInspector());
+  inspector_ = new GapInspector(splitter);
+  splitter->addWidget(inspector_);
   splitter->setStretchFactor(0, 1);
   splitter->setSizes({880, kGapInspectorWidth});
   splitter->setCollapsible(0, false);
@@ -160,20 +160,6 @@ QWidget* GapPage::makeFieldSide() {
   layout->addLayout(switch_row);
   layout->addWidget(field_, 1);
   return side;
-}
-
-QWidget* GapPage::makeInspector() {
-  auto* inspector = new QScrollArea(this);
-  inspector->setWidgetResizable(true);
-  inspector->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
-  inspector->setMinimumWidth(320);
-  charts_ = new QWidget(inspector);
-  charts_layout_ = new QVBoxLayout(charts_);
-  charts_layout_->setContentsMargins(12, 12, 12, 12);
-  charts_layout_->setSpacing(16);
-  inspector->setWidget(charts_);
-  inspector->setObjectName(QStringLiteral("inspector"));
-  return inspector;
 }
 
 void GapPage::setRecording(const CalibrationTable& table, std::function<SampleTable()> samples) {
@@ -333,7 +319,7 @@ Result<void> GapPage::saveScene(const QString& path) const {
 void GapPage::showReport() {
   showWords();
   showField();
-  showCharts();
+  inspector_->setReport(report_);
   showButtons();
   workbench_.setGapReport(report_);
 }
@@ -373,34 +359,6 @@ void GapPage::showField() {
   field_->setField(gapField(*report_, after_->isChecked(), &table_));
   field_->setScaleMax_mm(scale.max_mm);
   field_->setMagnification(scale.magnification);
-}
-
-void GapPage::addText(const char* name, const QString& words) {
-  auto* label = new QLabel(words, charts_);
-  label->setObjectName(QLatin1String(name));
-  label->setWordWrap(true);
-  label->setTextInteractionFlags(Qt::TextSelectableByMouse);
-  charts_layout_->addWidget(label);
-}
-
-void GapPage::showCharts() {
-  while (QLayoutItem* item = charts_layout_->takeAt(0)) {
-    delete item->widget();
-    delete item;
-  }
-  if (!report_) return;
-  for (const GapBarChart& chart : gapCharts(*report_)) {
-    auto* view = new GapBarView(charts_);
-    view->setChart(chart);
-    charts_layout_->addWidget(view);
-  }
-  if (report_->replicates) addText("gapTrust", QString::fromStdString(report_->replicates->text));
-  const std::string prediction = predictionText(*report_);
-  if (!prediction.empty()) addText("gapPrediction", tr("To be checked: %1").arg(QString::fromStdString(prediction)));
-  for (const recording::GapFinding& finding : report_->findings)
-    addText("gapFinding", QString::fromStdString(finding.text));
-  charts_layout_->addStretch(1);
-  charts_layout_->activate();
 }
 
 void GapPage::showButtons() {

@@ -18,11 +18,11 @@ class QLabel;
 class QProgressBar;
 class QPushButton;
 class QStackedWidget;
-class QVBoxLayout;
 
 namespace fieldtrue::widgets {
 
 class FieldView;
+class GapInspector;
 
 /// Simulation and reality: where they differ, which unmodelled effect causes it, how far the gap shrinks with it.
 class GapPage : public QWidget {
@@ -61,7 +61,6 @@ class GapPage : public QWidget {
   QWidget* makeHeader();
   QWidget* makeButtons(QWidget* header);
   QWidget* makeFieldSide();
-  QWidget* makeInspector();
   QPushButton* addButton(QWidget* parent, const QString& words, const char* name, void (GapPage::*slot)());
   void run(const gap::DiagnosisOptions& options = {});
   void tryAgainAndAgain();
@@ -77,8 +76,6 @@ class GapPage : public QWidget {
   void showReport();
   void showWords();
   void showField();
-  void showCharts();
-  void addText(const char* name, const QString& words);
   void showButtons();
 
   Workbench& workbench_;
@@ -109,8 +106,7 @@ class GapPage : public QWidget {
   QPushButton* save_scene_ = nullptr;
   QCheckBox* after_ = nullptr;
   FieldView* field_ = nullptr;
-  QWidget* charts_ = nullptr;
-  QVBoxLayout* charts_layout_ = nullptr;
+  GapInspector* inspector_ = nullptr;
 };
 
 }  // namespace fieldtrue::widgets

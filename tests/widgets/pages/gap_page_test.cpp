@@ -61,6 +61,7 @@ class GapPageTest : public QObject {
   void switchShowsWhatIsLeft();
   void trustIsAskedFor();
   void changeSinceIsAskedFor();
+  void unitsOfTheEarlierAreChecked();
   void addAndUndoChangeTheScene();
   void stopEndsTheRun();
   void otherRowsDropTheReport();
@@ -69,6 +70,7 @@ class GapPageTest : public QObject {
   void realDiagnosisStopsSoon();
   void positionOnlyIsDiagnosed();
   void windowFindsTheMetal();
+  void windowTellsWhatCame();
 
  private:
   /// A page on the known room whose diagnosis answers at once.
@@ -216,6 +218,25 @@ void GapPageTest::changeSinceIsAskedFor() {
   QVERIFY(!page.report()->against);
 }
 
+/// True positions in millimetres are no earlier recording until somebody insists.
+void GapPageTest::unitsOfTheEarlierAreChecked() {
+  const auto page = pageThatAnswers(writtenReport());
+  CalibrationTable in_mm = room_.before;
+  for (Node& node : in_mm.nodes) node.reference_from_sensor.position_m *= 1000.0;
+  const QString path = folder_.filePath("in_mm.nodes.csv");
+  QVERIFY(writeNodeTable(path.toStdString(), in_mm).has_value());
+  QSignalSpy messages(workbench_.get(), &Workbench::messageShown);
+  page->diagnoseSince(path);
+  QVERIFY(!page->isDiagnosing());
+  QCOMPARE(messages.size(), 1);
+  const auto message = messages[0][0].value<Message>();
+  QVERIFY2(message.text.contains("millimetres"), qPrintable(message.text));
+  QCOMPARE(message.action_label, QStringLiteral("Use anyway"));
+  message.action();
+  QTRY_VERIFY_WITH_TIMEOUT(runs_.load() == 2 && !page->isDiagnosing(), kWaitMs);
+  QVERIFY(find<QLabel>(*page, "gapBelieved")->text().contains("in_mm.nodes.csv"));
+}
+
 void GapPageTest::addAndUndoChangeTheScene() {
   const auto page = pageThatAnswers(writtenReport());
   QVERIFY(!find<QPushButton>(*page, "undoAdd")->isEnabled());
@@ -341,6 +362,33 @@ void GapPageTest::windowFindsTheMetal() {
   find<QCheckBox>(*page, "showAfter")->setChecked(true);
   QTest::qWait(400);
   QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-after.png")));
+}
+
+/// The known room held against itself before the metal came, at other places: that is what changed.
+void GapPageTest::windowTellsWhatCame() {
+  MainWindow window;
+  window.resize(1280, 800);
+  window.show();
+  QVERIFY(QTest::qWaitForWindowExposed(&window));
+  QTest::mouseClick(find<QWidget>(window, "step_gap"), Qt::LeftButton);
+  auto* page = window.findChild<GapPage*>();
+  QVERIFY(page && page->isVisible());
+  page->setRecording(room_.table, {});
+  const QString path = folder_.filePath("before.nodes.csv");
+  QVERIFY(writeNodeTable(path.toStdString(), room_.before).has_value());
+  page->diagnoseSince(path);
+  QTRY_VERIFY_WITH_TIMEOUT(page->report().has_value() && !page->isDiagnosing(), kWaitMs);
+  QVERIFY(page->report()->against && page->report()->against->changed);
+  QCOMPARE(QString::fromStdString(page->report()->against->effect), QStringLiteral("compact_metal"));
+  const ErrorField& field = find<FieldView>(*page, "gapField")->field();
+  QVERIFY(!field.bodies.empty());
+  const double off_m = (field.bodies[0].center_m - room_.body_m).norm();
+  QVERIFY2(off_m < 0.1, qPrintable(QStringLiteral("%1 m from where the metal is").arg(off_m)));
+  const QString folder = qEnvironmentVariable("FIELDTRUE_ARTEFACTS");
+  if (folder.isEmpty()) return;
+  QVERIFY(QDir().mkpath(folder));
+  QTest::qWait(400);
+  QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-since.png")));
 }
 
 FIELDTRUE_WINDOW_TEST(GapPageTest)
