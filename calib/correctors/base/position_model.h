@@ -59,6 +59,9 @@ class PositionModel {
     return uncertainty_m(tracker_from_sensor.position_m);
   }
 
+  /// How much of each reading's displacement the correction at a pose is made of, where the method is linear in them.
+  virtual std::optional<Eigen::VectorXd> weightsAt(const Pose&) const { return std::nullopt; }
+
   /// Whether the method can be evaluated there at all. Local methods cannot outside their cells; global ones always
   /// can.
   virtual bool covers(const Eigen::Vector3d&) const { return true; }

@@ -28,8 +28,9 @@ Eigen::Matrix3d turned(const Eigen::Matrix3d& strain, const Eigen::Quaterniond& 
 class CoilsPosition : public PositionModel {
  public:
   /// @param mean_strain over the orientations that were fitted, transmitter's axes
-  CoilsPosition(std::unique_ptr<PositionModel> model, const SensorCoils& coils, const Eigen::Matrix3d& mean_strain)
-      : model_(std::move(model)), coils_(coils), mean_strain_(mean_strain) {}
+  CoilsPosition(std::unique_ptr<PositionModel> model, const SensorCoils& coils, CoilDesign design,
+                const Eigen::Matrix3d& mean_strain)
+      : model_(std::move(model)), coils_(coils), design_(std::move(design)), mean_strain_(mean_strain) {}
 
   bool takesOrientation() const override { return true; }
   Eigen::Vector3d displacementAt_m(const Pose& tracked) const override {
@@ -41,15 +42,19 @@ class CoilsPosition : public PositionModel {
   }
   Result<std::unique_ptr<PositionModel>> onLattices(const LatticeMaker& maker, double max_deviation_m) const override {
     FT_TRY(auto model, model_->onLattices(maker, max_deviation_m));
-    return std::make_unique<CoilsPosition>(std::move(model), coils_, mean_strain_);
+    return std::make_unique<CoilsPosition>(std::move(model), coils_, CoilDesign(0, 18), mean_strain_);
   }
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
     return model_->displacement_m(p_tracked_m) + shiftOf_m(mean_strain_, p_tracked_m);
   }
   std::optional<double> uncertaintyAt_m(const Pose& tracked) const override {
     const auto sd_m = model_->uncertaintyAt_m(tracked);
-    if (!sd_m) return sd_m;
-    return std::sqrt(*sd_m * *sd_m + coils_.variance_m2(tracked));
+    const auto weights = design_.rows() > 0 ? model_->weightsAt(tracked) : std::nullopt;
+    if (!sd_m || !weights) return sd_m;
+    const Eigen::Matrix<double, 18, 1> taken = design_.transpose() * *weights;
+    const Eigen::Matrix<double, 3, 6> left = coilDerivative(tracked) - taken.reshaped(3, 6);
+    return std::sqrt(*sd_m * *sd_m + (left * coils_.covariance * left.transpose()).trace() +
+                     3.0 * coils_.left_sd_m * coils_.left_sd_m);
   }
   /// Of the mean over the orientations that were fitted.
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
@@ -61,6 +66,8 @@ class CoilsPosition : public PositionModel {
     return {{"coils",
              {{"strain", std::vector<double>(coils_.strain.begin(), coils_.strain.end())},
               {"covariance", jsonOf(Eigen::MatrixXd(coils_.covariance))},
+              {"left_sd_m", coils_.left_sd_m},
+              {"design", jsonOf(Eigen::MatrixXd(design_))},
               {"mean_strain", jsonOf(Eigen::MatrixXd(mean_strain_))}}},
             {"without_coils", model_->parameters()}};
   }
@@ -68,6 +75,7 @@ class CoilsPosition : public PositionModel {
  private:
   std::unique_ptr<PositionModel> model_;
   SensorCoils coils_;
+  CoilDesign design_;
   Eigen::Matrix3d mean_strain_;
 };
 
@@ -84,11 +92,6 @@ Eigen::Vector3d SensorCoils::shift_m(const Pose& tracked) const {
   return shiftOf_m(turned(matrixOf(strain), tracked.orientation), tracked.position_m);
 }
 
-double SensorCoils::variance_m2(const Pose& tracked) const {
-  const Eigen::Matrix<double, 3, 6> d = coilDerivative(tracked);
-  return (d * covariance * d.transpose()).trace();
-}
-
 FitData withoutCoils(FitData data, const SensorCoils& coils) {
   for (std::size_t row = 0; row < data.size(); ++row)
     data.p_true_m[row] -= coils.shift_m({data.p_tracked_m[row], data.q_tracked[row]});
@@ -96,11 +99,11 @@ FitData withoutCoils(FitData data, const SensorCoils& coils) {
 }
 
 std::unique_ptr<PositionModel> withCoils(std::unique_ptr<PositionModel> model, const SensorCoils& coils,
-                                         std::span<const Eigen::Quaterniond> q) {
+                                         CoilDesign design, std::span<const Eigen::Quaterniond> q) {
   Eigen::Matrix3d mean_strain = Eigen::Matrix3d::Zero();
   for (const Eigen::Quaterniond& one : q)
     mean_strain += turned(matrixOf(coils.strain), one) / static_cast<double>(q.size());
-  return std::make_unique<CoilsPosition>(std::move(model), coils, mean_strain);
+  return std::make_unique<CoilsPosition>(std::move(model), coils, std::move(design), mean_strain);
 }
 
 std::unique_ptr<PositionModel> readCoils(const JsonReader& parameters,
@@ -110,10 +113,13 @@ std::unique_ptr<PositionModel> readCoils(const JsonReader& parameters,
   const Eigen::MatrixXd covariance = from["covariance"].matrix(6);
   if (strain.size() != 6) from["strain"].refuse("six numbers");
   if (covariance.rows() != 6) from["covariance"].refuse("six rows");
+  const Eigen::MatrixXd design = from["design"].matrix(18);
   SensorCoils coils;
   coils.strain = Eigen::Map<const CoilStrain>(strain.data());
   coils.covariance = covariance;
-  return std::make_unique<CoilsPosition>(base(parameters["without_coils"]), coils, from["mean_strain"].matrix3());
+  coils.left_sd_m = from["left_sd_m"].number();
+  return std::make_unique<CoilsPosition>(base(parameters["without_coils"]), coils, design,
+                                         from["mean_strain"].matrix3());
 }
 
 }  // namespace fieldtrue::correctors

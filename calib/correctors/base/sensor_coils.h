@@ -23,12 +23,14 @@ using CoilStrain = Eigen::Matrix<double, 6, 1>;  ///< xx, yy, zz, xy, xz, yz.
 struct SensorCoils {
   CoilStrain strain = CoilStrain::Zero();
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  double left_sd_m = 0.0;  ///< Each axis: what else changes as the sensor turns, where nothing else tells it.
 
   /// True minus tracked [m].
   Eigen::Vector3d shift_m(const Pose& tracked) const;
-  /// Variance of that, of all three axes together [m^2].
-  double variance_m2(const Pose& tracked) const;
 };
+
+/// What each of the strain's six numbers, were it 1, would do to each of some readings: n x 18, of each number x, y, z.
+using CoilDesign = Eigen::Matrix<double, Eigen::Dynamic, 18>;
 
 /// d shift / d strain: the shift is linear in it.
 Eigen::Matrix<double, 3, 6> coilDerivative(const Pose& tracked);
@@ -36,10 +38,12 @@ Eigen::Matrix<double, 3, 6> coilDerivative(const Pose& tracked);
 /// The data without what the coils do: its truth moved to where a sensor with perfect coils would have been read.
 FitData withoutCoils(FitData data, const SensorCoils& coils);
 
-/// A model of that data with the coils' shift added. @param q orientations it was fitted on; their mean counts where
-/// none is told
+/// A model of that data with the coils' shift added. Coils that are misjudged leave an error of which the model takes
+/// what it can for its own: what is uncertain is only the rest.
+/// @param design of the readings that the model was fitted to; no rows where it cannot tell of what it is made
+/// @param q orientations it was fitted on; their mean counts where none is told
 std::unique_ptr<PositionModel> withCoils(std::unique_ptr<PositionModel> model, const SensorCoils& coils,
-                                         std::span<const Eigen::Quaterniond> q);
+                                         CoilDesign design, std::span<const Eigen::Quaterniond> q);
 /// @param base reads the model without coils
 std::unique_ptr<PositionModel> readCoils(const JsonReader& parameters,
                                          std::unique_ptr<PositionModel> (*base)(const JsonReader&));

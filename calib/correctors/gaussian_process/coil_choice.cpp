@@ -95,12 +95,13 @@ Result<CoilChoice> chooseCoils(const PoseSystem& system, const GaussianProcessSc
   if (!first || first->nats < kNatsAParameter * kStrainParameters) return CoilChoice{};
   // Scales that need not explain the coils weigh the rows better.
   const auto after = rowScales(without(system, first->coils), before->field, used, spacing_m, control);
-  const auto second = after ? fitCoils(system, *after, used) : std::nullopt;
+  auto second = after ? fitCoils(system, *after, used) : std::nullopt;
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
   if (!second) return CoilChoice{};
   const double before_m = heldOutRms_m(system, *before, used);
   const double after_m = heldOutRms_m(without(system, second->coils), *after, used);
   if (!(after_m < kClearlyLess * before_m)) return CoilChoice{};
+  second->coils.left_sd_m = after->row_sd_m;
   return CoilChoice{second->coils, noteOf(second->coils, first->nats, before_m, after_m)};
 }
 

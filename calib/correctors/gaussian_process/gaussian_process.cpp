@@ -46,19 +46,15 @@ class GaussianProcessPosition : public PositionModel {
   }
   /// 3-D, of the smooth field and of what the fit found neither smooth nor stated as noise.
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
-    std::call_once(lazy_->once, [this] {
-      const auto n = static_cast<double>(field_.centers_m().size());
-      if (checkMemory("The uncertainty of a Gaussian process", kGaussianProcessMatrices * 8.0 * n * n))
-        lazy_->posterior = GaussianProcessPosterior::of(
-            field_.frame().tail(field_.centers_m()),
-            covarianceMatrix(field_.kernel(), field_.frame(), scales_, field_.centers_m(), noise_m2_));
-    });
-    if (!lazy_->posterior) return std::nullopt;
-    const double signal_m2 = scales_.signal_sd_m * scales_.signal_sd_m;
-    const double field_m2 =
-        lazy_->posterior->variance_m2(signal_m2, signal_m2 * field_.kernelValues(p_tracked_m),
-                                      field_.frame().tail(std::span(&p_tracked_m, 1)).row(0).transpose());
+    const GaussianProcessPosterior* known = posterior();
+    if (known == nullptr) return std::nullopt;
+    const double field_m2 = known->variance_m2(signal_m2(), covarianceWith(p_tracked_m), tailAt(p_tracked_m));
     return std::sqrt(3.0 * (field_m2 + scales_.nugget_sd_m * scales_.nugget_sd_m));
+  }
+  std::optional<Eigen::VectorXd> weightsAt(const Pose& tracked) const override {
+    const GaussianProcessPosterior* known = posterior();
+    if (known == nullptr) return std::nullopt;
+    return known->weights(covarianceWith(tracked.position_m), tailAt(tracked.position_m));
   }
   std::string note() const override { return note_; }
   nlohmann::json parameters() const override {
@@ -72,6 +68,23 @@ class GaussianProcessPosition : public PositionModel {
   }
 
  private:
+  double signal_m2() const { return scales_.signal_sd_m * scales_.signal_sd_m; }
+  Eigen::VectorXd covarianceWith(const Eigen::Vector3d& p_m) const { return signal_m2() * field_.kernelValues(p_m); }
+  Eigen::VectorXd tailAt(const Eigen::Vector3d& p_m) const {
+    return field_.frame().tail(std::span(&p_m, 1)).row(0).transpose();
+  }
+  /// @return null where memory does not suffice
+  const GaussianProcessPosterior* posterior() const {
+    std::call_once(lazy_->once, [this] {
+      const auto n = static_cast<double>(field_.centers_m().size());
+      if (checkMemory("The uncertainty of a Gaussian process", kGaussianProcessMatrices * 8.0 * n * n))
+        lazy_->posterior = GaussianProcessPosterior::of(
+            field_.frame().tail(field_.centers_m()),
+            covarianceMatrix(field_.kernel(), field_.frame(), scales_, field_.centers_m(), noise_m2_));
+    });
+    return lazy_->posterior ? &*lazy_->posterior : nullptr;
+  }
+
   RadialField field_;
   GaussianProcessScales scales_;
   Eigen::VectorXd noise_m2_;
@@ -90,6 +103,7 @@ struct GaussianProcessSystem {
   MemoryBooking memory;
   std::optional<PoseSystem> poses;               ///< Where orientation is an input; it stands instead of all else.
   std::optional<SensorCoils> coils;              ///< All else is of the data without them.
+  CoilDesign design;                             ///< Of what is fitted, where there are coils.
   std::vector<Eigen::Quaterniond> orientations;  ///< Of the rows, where there are coils.
 
   Eigen::VectorXd noise() const {
@@ -149,6 +163,21 @@ Result<GaussianProcessScales> chooseScales(const GaussianProcessSystem& system, 
   return *scales;
 }
 
+/// Of rows, or of places, each the mean of its rows.
+CoilDesign designOf(const FitData& data, const Places& places, bool by_row) {
+  CoilDesign of_rows(static_cast<Eigen::Index>(data.size()), 18);
+  for (std::size_t row = 0; row < data.size(); ++row)
+    of_rows.row(static_cast<Eigen::Index>(row)) =
+        coilDerivative({data.p_tracked_m[row], data.q_tracked[row]}).reshaped().transpose();
+  if (by_row) return of_rows;
+  CoilDesign of_places = CoilDesign::Zero(static_cast<Eigen::Index>(places.size()), 18);
+  for (std::size_t place = 0; place < places.size(); ++place)
+    for (const std::size_t row : places.rows[place])
+      of_places.row(static_cast<Eigen::Index>(place)) +=
+          of_rows.row(static_cast<Eigen::Index>(row)) / static_cast<double>(places.rows[place].size());
+  return of_places;
+}
+
 /// The coils of a sensor that was turned, where they explain what changes.
 Result<CoilChoice> coilsOf(const FitData& data, const GaussianProcessSystem& system, std::size_t tuning_places,
                            const RunControl& control) {
@@ -194,6 +223,8 @@ Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& s
       FitData rest = withoutCoils(data, *choice.coils);
       FT_TRY(GaussianProcessSystem without, buildSystem(rest, settings, control, Coils::kLeave));
       without.coils = choice.coils;
+      if (without.poses) without.coils->left_sd_m = 0.0;  // The process over poses has its own.
+      without.design = designOf(data, without.places, without.poses.has_value());
       without.orientations = data.q_tracked;
       (without.poses ? without.poses->note : without.note) += " " + choice.note;
       return without;
@@ -243,14 +274,16 @@ Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, c
   FT_TRY(const auto system, buildSystem(data, settings, control));
   if (system.poses)
     return fitPoses(*system.poses).map([&](std::unique_ptr<PositionModel> model) {
-      return system.coils ? withCoils(std::move(model), *system.coils, system.orientations) : std::move(model);
+      return system.coils ? withCoils(std::move(model), *system.coils, system.design, system.orientations)
+                          : std::move(model);
     });
   const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
   if (!projection) return notSolvable(system);
   const auto solution = solveRadial(*projection, matrixOf(system), displacementMatrix(system.places));
   if (!solution) return notSolvable(system);
   auto model = modelOf(system, {}, *solution);
-  return system.coils ? withCoils(std::move(model), *system.coils, system.orientations) : std::move(model);
+  return system.coils ? withCoils(std::move(model), *system.coils, system.design, system.orientations)
+                      : std::move(model);
 }
 
 class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
@@ -281,7 +314,7 @@ class CoilsHoldOut : public HoldOutFits<PositionModel> {
   Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
                                                  const Pose& fold_from_data) const override {
     return fits_->without(rows, fold_from_data).map([&](std::unique_ptr<PositionModel> model) {
-      return withCoils(std::move(model), coils_, orientations_);
+      return withCoils(std::move(model), coils_, CoilDesign(0, 18), orientations_);
     });
   }
 

@@ -30,4 +30,11 @@ double GaussianProcessPosterior::variance_m2(double prior_m2, const Eigen::Vecto
   return std::max(start_m2 - gap.squaredNorm(), 0.0);
 }
 
+Eigen::VectorXd GaussianProcessPosterior::weights(const Eigen::VectorXd& k, const Eigen::VectorXd& h) const {
+  const Eigen::VectorXd s = projection_.tailCoordinates(h);
+  Eigen::MatrixXd z = projection_.toComplement(k - k_of_weights_ * s);
+  choleskySolve(factor_, z);
+  return projection_.tailBasis() * s + projection_.fromComplement(z).col(0);
+}
+
 }  // namespace fieldtrue::correctors

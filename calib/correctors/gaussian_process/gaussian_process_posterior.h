@@ -17,6 +17,8 @@ class GaussianProcessPosterior {
   /// Variance of the field per output at one input [m2]; the nugget is not in it.
   /// @param prior_m2 before anything was measured; @param k covariance with each measurement [m2]; @param h its tail
   double variance_m2(double prior_m2, const Eigen::VectorXd& k, const Eigen::VectorXd& h) const;
+  /// How much of each measurement the field there is made of.
+  Eigen::VectorXd weights(const Eigen::VectorXd& k, const Eigen::VectorXd& h) const;
 
  private:
   explicit GaussianProcessPosterior(TailProjection projection) : projection_(std::move(projection)) {}

@@ -61,6 +61,11 @@ class PosePosition : public PositionModel {
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
     return sd_m(p_tracked_m, meanTurn().with_rows, meanTurn().among);
   }
+  std::optional<Eigen::VectorXd> weightsAt(const Pose& tracked) const override {
+    const GaussianProcessPosterior* known = posterior();
+    if (known == nullptr) return std::nullopt;
+    return known->weights(covarianceWith(tracked.position_m, turnAt(tracked.orientation)), tailAt(tracked.position_m));
+  }
   std::string note() const override { return note_; }
   Result<std::unique_ptr<PositionModel>> onLattices(const LatticeMaker& maker, double max_deviation_m) const override {
     const TurningPart part{field_.kernel(),
@@ -141,19 +146,30 @@ class PosePosition : public PositionModel {
   /// 3-D, of the field and of what the fit found neither smooth nor stated as noise.
   /// @param turn correlation of the orientation with each row's; @param among of it with itself
   std::optional<double> sd_m(const Eigen::Vector3d& p_m, const Eigen::VectorXd& turn, double among) const {
+    const GaussianProcessPosterior* known = posterior();
+    if (known == nullptr) return std::nullopt;
+    const double signal_m2 = squareOf(scales_.field.signal_sd_m), turn_m2 = squareOf(scales_.turn_sd_m);
+    const double field_m2 = known->variance_m2(signal_m2 + turn_m2 * among, covarianceWith(p_m, turn), tailAt(p_m)) +
+                            turn_m2 * (1.0 - among);
+    return std::sqrt(3.0 * (field_m2 + squareOf(scales_.field.nugget_sd_m) + squareOf(scales_.row_sd_m)));
+  }
+
+  /// @return null where memory does not suffice
+  const GaussianProcessPosterior* posterior() const {
     std::call_once(lazy_->once, [this] {
       const auto n = static_cast<double>(rows_.size());
       if (checkMemory("The uncertainty of " + kProcessOverPoses, kGaussianProcessMatrices * 8.0 * n * n))
         lazy_->posterior = GaussianProcessPosterior::of(frame_.tail(rows_.p_m),
                                                         poseCovariance(field_.kernel(), frame_, scales_, rows_));
     });
-    if (!lazy_->posterior) return std::nullopt;
-    const double signal_m2 = squareOf(scales_.field.signal_sd_m), turn_m2 = squareOf(scales_.turn_sd_m);
-    const Eigen::VectorXd k =
-        signal_m2 * field_.kernelValues(p_m) + turn_m2 * turned_.kernelValues(p_m).cwiseProduct(turn);
-    const Eigen::VectorXd h = frame_.tail(std::span(&p_m, 1)).row(0).transpose();
-    const double field_m2 = lazy_->posterior->variance_m2(signal_m2 + turn_m2 * among, k, h) + turn_m2 * (1.0 - among);
-    return std::sqrt(3.0 * (field_m2 + squareOf(scales_.field.nugget_sd_m) + squareOf(scales_.row_sd_m)));
+    return lazy_->posterior ? &*lazy_->posterior : nullptr;
+  }
+  Eigen::VectorXd covarianceWith(const Eigen::Vector3d& p_m, const Eigen::VectorXd& turn) const {
+    return squareOf(scales_.field.signal_sd_m) * field_.kernelValues(p_m) +
+           squareOf(scales_.turn_sd_m) * turned_.kernelValues(p_m).cwiseProduct(turn);
+  }
+  Eigen::VectorXd tailAt(const Eigen::Vector3d& p_m) const {
+    return frame_.tail(std::span(&p_m, 1)).row(0).transpose();
   }
 
   FieldFrame frame_;

@@ -126,6 +126,48 @@ class SensorCoilsTest : public QObject {
     QVERIFY2(std::sqrt(squares_m2) < 0.002, std::to_string(1000.0 * std::sqrt(squares_m2)).c_str());
   }
 
+  /// In 200 poses that were never fitted: what is uncertain of the coils is not what the field takes for its own.
+  void errorsAreAsLargeAsStated_data() { areFoundWithTheField_data(); }
+  void errorsAreAsLargeAsStated() {
+    QFETCH(int, orientations);
+    const auto model = testing::fitted("gaussian_process", turnedData(orientations, 0.004, kCoils), {});
+    RandomGeometry random(8);
+    double ratio = 0.0;
+    for (int i = 0; i < 200; ++i) {
+      const Eigen::Vector3d p_m =
+          Eigen::Vector3d(0.6, 0.1, 0.1) + 0.1 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      const Eigen::Quaterniond q = random.rotation();
+      const Eigen::Vector3d field(std::sin(5.0 * p_m.x()), std::cos(4.0 * p_m.y()), std::sin(3.0 * p_m.z()));
+      const Pose tracked{read_m(p_m, q, kCoils) + 0.004 * field, q};
+      const double error_m = (tracked.position_m + model->displacementAt_m(tracked) - p_m).norm();
+      ratio += std::pow(error_m / model->uncertaintyAt_m(tracked).value(), 2) / 200.0;
+    }
+    QVERIFY2(ratio > 0.15 && ratio < 2.0, std::to_string(ratio).c_str());
+  }
+
+  /// What the process corrects is its weights times what was read; a linear field is foretold as it is.
+  void weightsMakeTheCorrection() {
+    const FitData data = turnedData(3, 0.004, CoilStrain::Zero());
+    for (const std::string inputs : {"position", "pose"}) {
+      const auto model = testing::fitted("gaussian_process", data, {{"inputs", inputs}, {"sensor_coils", "none"}});
+      const bool by_row = inputs == "pose";
+      const std::size_t each = by_row ? 1 : 3;
+      const Pose tracked{{0.7, 0.15, 0.1}, RandomGeometry(5).rotation()};
+      const auto weights = model->weightsAt(tracked);
+      QVERIFY(weights.has_value());
+      QCOMPARE(static_cast<std::size_t>(weights->size()), data.size() / each);
+      Eigen::Vector3d made_m = Eigen::Vector3d::Zero();
+      Eigen::Vector3d place_m = Eigen::Vector3d::Zero();
+      for (std::size_t row = 0; row < data.size(); ++row) {
+        const double weight = (*weights)[static_cast<Eigen::Index>(row / each)] / static_cast<double>(each);
+        made_m += weight * (data.p_true_m[row] - data.p_tracked_m[row]);
+        place_m += weight * data.p_tracked_m[row];
+      }
+      FT_VERIFY_MATCH(near((made_m - model->displacementAt_m(tracked)).norm(), 0.0, 1e-9));
+      FT_VERIFY_MATCH(near((place_m - tracked.position_m).norm(), 0.0, 1e-9));
+    }
+  }
+
   void areNotFoundWhereTheyAreNot_data() { areFoundWithTheField_data(); }
   void areNotFoundWhereTheyAreNot() {
     QFETCH(int, orientations);
