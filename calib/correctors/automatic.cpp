@@ -163,10 +163,11 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
   FT_TRY(auto model,
          blend ? fitBlend(candidates, *blend, data, inner) : winner.method->fit(data, winner.settings, inner));
   control.progress(1.0);
-  nlohmann::json table = {{"method", blend ? kBlend : winner.method->id},
-                          {"settings", blend ? nlohmann::json::object() : toJson(winner.settings)},
-                          {"candidates", tableOf(candidates, scores)},
-                          {"note", noteOf(data, candidates, scores, chosen, blend ? &*blend : nullptr, folds.size())}};
+  nlohmann::json table = {
+      {"method", blend ? kBlend : winner.method->id},
+      {"settings", blend ? nlohmann::json::object() : toJson(winner.settings)},
+      {"candidates", tableOf(candidates, scores)},
+      {"note", noteOf(data, candidates, scores, chosen, blend ? &*blend : nullptr, folds.rows.size())}};
   return std::make_unique<AutomaticModel>(std::move(model), std::move(table));
 }
 

@@ -87,19 +87,19 @@ Weighted leastSquares(const Gram& gram, const std::vector<std::size_t>& from) {
   return best;
 }
 
-/// Products of held-out errors in every fold. @param row_weights one over the rows of a row's place
-std::vector<Gram> gramsOf(const std::vector<InnerScore>& scores, const std::vector<std::vector<std::size_t>>& folds,
-                          const std::vector<double>& row_weights) {
+/// Products of held-out errors in every fold. @param shares of the region, by row
+std::vector<Gram> gramsOf(const std::vector<InnerScore>& scores, const InnerFolds& folds,
+                          const std::vector<double>& shares) {
   const auto n = static_cast<Eigen::Index>(scores.size());
   std::vector<Gram> grams;
-  for (const auto& fold : folds) {
+  for (const auto& fold : folds.rows) {
     Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(fold.size()), n);
     for (Eigen::Index i = 0; i < n; ++i) {
       const InnerScore& score = scores[static_cast<std::size_t>(i)];
       if (score.skipped) continue;
       for (std::size_t k = 0; k < fold.size(); ++k)
         errors.block<3, 1>(3 * static_cast<Eigen::Index>(k), i) =
-            std::sqrt(row_weights[fold[k]]) * score.row_residual_m[fold[k]];
+            std::sqrt(shares[fold[k]]) * score.row_residual_m[fold[k]];
     }
     grams.emplace_back(errors.transpose() * errors);
   }
@@ -187,13 +187,13 @@ class BlendModel : public PositionModel {
 
 std::optional<Blend> blendCandidates(const std::vector<AutomaticCandidate>& candidates,
                                      const std::vector<InnerScore>& scores, const FitData& data,
-                                     const std::vector<std::vector<std::size_t>>& folds) {
+                                     const InnerFolds& folds) {
   const std::vector<std::size_t> slots = placeSlots(data);
   std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
   for (const std::size_t slot : slots) n_rows[slot] += 1.0;
-  std::vector<double> row_weights;
-  for (const std::size_t slot : slots) row_weights.push_back(1.0 / n_rows[slot]);
-  const std::vector<Gram> grams = gramsOf(scores, folds, row_weights);
+  std::vector<double> row_shares;
+  for (const std::size_t slot : slots) row_shares.push_back(folds.shares[slot] / n_rows[slot]);
+  const std::vector<Gram> grams = gramsOf(scores, folds, row_shares);
   const auto n = static_cast<Eigen::Index>(scores.size());
   const Gram all = std::accumulate(grams.begin(), grams.end(), Gram(Gram::Zero(n, n)));
 
@@ -203,14 +203,15 @@ std::optional<Blend> blendCandidates(const std::vector<AutomaticCandidate>& cand
   blend.members = chosen.members;
   blend.weights.assign(chosen.weights.data(), chosen.weights.data() + chosen.weights.size());
   blend.score.dimension = data.dimension;
+  blend.score.shares = folds.shares;
   blend.score.squares_m2.assign(n_rows.size(), 0.0);
   blend.score.residual_m.assign(n_rows.size(), Eigen::Vector3d::Zero());
   blend.score.row_residual_m.assign(data.size(), Eigen::Vector3d::Zero());
-  for (std::size_t k = 0; k < folds.size(); ++k) {
+  for (std::size_t k = 0; k < folds.rows.size(); ++k) {
     const Gram others = all - grams[k];
     const Weighted without = leastSquares(others, bestOfMethods(candidates, scores, others));
-    for (const std::size_t row : folds[k])
-      blend.score.add(slots[row], row, residualOf(without, scores, row), row_weights[row]);
+    for (const std::size_t row : folds.rows[k])
+      blend.score.add(slots[row], row, residualOf(without, scores, row), 1.0 / n_rows[slots[row]]);
   }
   return blend;
 }

@@ -22,7 +22,7 @@ struct Blend {
 /// @source Wolpert 1992 ("Stacked generalization"); Breiman 1996 ("Stacked regressions"), equation 2 with sum 1
 std::optional<Blend> blendCandidates(const std::vector<AutomaticCandidate>& candidates,
                                      const std::vector<InnerScore>& scores, const FitData& data,
-                                     const std::vector<std::vector<std::size_t>>& folds);
+                                     const InnerFolds& folds);
 
 /// Whether a blend is worth its further parts beside one candidate: its RMS is at least 5 % lower.
 bool isWorthBlending(const InnerScore& blend, const InnerScore& chosen);

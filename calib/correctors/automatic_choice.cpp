@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "calib/core/region_shares.h"
 #include "calib/correctors/base/fit_rows.h"
 #include "calib/correctors/base/method.h"
 
@@ -27,17 +28,23 @@ struct PairedDifference {
   double standard_error = HUGE_VAL;
 
   PairedDifference(const InnerScore& a, const InnerScore& b) {
-    std::vector<double> differences;
-    for (std::size_t i = 0; i < a.squares_m2.size(); ++i) {
-      const double difference = a.squares_m2[i] - b.squares_m2[i];
-      if (!std::isnan(difference)) differences.push_back(difference);
-    }
-    const auto n = static_cast<double>(differences.size());
-    if (n < 1.0) return;
-    mean = std::accumulate(differences.begin(), differences.end(), 0.0) / n;
+    double n = 0.0, shares = 0.0, sum = 0.0;
+    const auto each = [&](const auto& take) {
+      for (std::size_t i = 0; i < a.squares_m2.size(); ++i) {
+        const double difference = a.squares_m2[i] - b.squares_m2[i];
+        if (!std::isnan(difference)) take(difference, a.shareOf(i));
+      }
+    };
+    each([&](double difference, double share) {
+      n += 1.0;
+      shares += share;
+      sum += share * difference;
+    });
+    if (!(shares > 0.0)) return;
+    mean = sum / shares;
     double squares = 0.0;
-    for (const double difference : differences) squares += (difference - mean) * (difference - mean);
-    if (n > 1.0) standard_error = std::sqrt(squares / (n * (n - 1.0)));
+    each([&](double difference, double share) { squares += std::pow(share * (difference - mean), 2); });
+    if (n > 1.0) standard_error = std::sqrt(squares * n / (n - 1.0)) / shares;
   }
 };
 
@@ -139,10 +146,15 @@ void InnerScore::add(std::size_t place, std::size_t row, const Eigen::Vector3d& 
 }
 
 double InnerScore::rms_m() const {
-  return std::sqrt(std::accumulate(squares_m2.begin(), squares_m2.end(), 0.0) / static_cast<double>(squares_m2.size()));
+  double sum_m2 = 0.0, sum = 0.0;
+  for (std::size_t place = 0; place < squares_m2.size(); ++place) {
+    sum_m2 += shareOf(place) * squares_m2[place];
+    sum += shareOf(place);
+  }
+  return std::sqrt(sum_m2 / sum);
 }
 
-std::vector<std::vector<std::size_t>> innerFolds(const FitData& data) {
+InnerFolds innerFolds(const FitData& data) {
   const std::vector<std::size_t> slots = placeSlots(data);
   const std::size_t n_places = 1 + *std::max_element(slots.begin(), slots.end());
   std::vector<std::size_t> order(n_places);
@@ -152,14 +164,18 @@ std::vector<std::vector<std::size_t>> innerFolds(const FitData& data) {
   const std::size_t n_folds = n_places < kPlacesForFolds ? n_places : kFolds;
   std::vector<std::size_t> fold_of_place(n_places);
   for (std::size_t i = 0; i < n_places; ++i) fold_of_place[order[i]] = i % n_folds;
-  std::vector<std::vector<std::size_t>> folds(n_folds);
-  for (std::size_t row = 0; row < data.size(); ++row) folds[fold_of_place[slots[row]]].push_back(row);
+  InnerFolds folds{std::vector<std::vector<std::size_t>>(n_folds), {}};
+  std::vector<Eigen::Vector3d> places_m(n_places);
+  for (std::size_t row = 0; row < data.size(); ++row) {
+    folds.rows[fold_of_place[slots[row]]].push_back(row);
+    places_m[slots[row]] = data.p_true_m[row];
+  }
+  folds.shares = regionShares(places_m);
   return folds;
 }
 
-Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
-                                  const std::vector<std::vector<std::size_t>>& folds, const InnerScore* best,
-                                  const RunControl& control) {
+Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data, const InnerFolds& folds,
+                                  const InnerScore* best, const RunControl& control) {
   const auto cancelled = [] { return fail(ErrorCode::kCancelled, "Stopped on request"); };
   if (control.stop.stop_requested()) return cancelled();
   const auto model_without = modelsOf(candidate, data, control);
@@ -171,32 +187,33 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
   std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
   for (const std::size_t slot : slots) n_rows[slot] += 1.0;
   InnerScore score;
+  score.shares = folds.shares;
   score.squares_m2.assign(n_rows.size(), std::nan(""));
   score.residual_m.assign(n_rows.size(), Eigen::Vector3d::Zero());
   score.row_residual_m.assign(data.size(), Eigen::Vector3d::Zero());
   score.dimension = data.dimension;
-  for (std::size_t k = 0; k < folds.size(); ++k) {
+  for (std::size_t k = 0; k < folds.rows.size(); ++k) {
     if (control.stop.stop_requested()) return cancelled();
-    const auto model = (*model_without)(folds[k]);
+    const std::vector<std::size_t>& out = folds.rows[k];
+    const auto model = (*model_without)(out);
     if (!model && model.error().code == ErrorCode::kCancelled) return tl::unexpected(model.error());
     if (!model) return skippedScore(model.error().message);
-    for (const std::size_t row : folds[k]) score.squares_m2[slots[row]] = 0.0;
-    for (const std::size_t row : folds[k]) {
+    for (const std::size_t row : out) score.squares_m2[slots[row]] = 0.0;
+    for (const std::size_t row : out) {
       const Eigen::Vector3d left_m = residual_m(**model, data, row);
       if (!left_m.allFinite()) return skippedScore("its errors at held-out places are not finite");
       score.add(slots[row], row, left_m, 1.0 / n_rows[slots[row]]);
     }
-    const bool may_drop = best != nullptr && candidate.method->isCostly() && k + 1 < folds.size();
+    const bool may_drop = best != nullptr && candidate.method->isCostly() && k + 1 < folds.rows.size();
     if (may_drop && isClearlyWorse(score, *best))
-      return skippedScore("dropped after " + std::to_string(k + 1) + " of " + std::to_string(folds.size()) +
+      return skippedScore("dropped after " + std::to_string(k + 1) + " of " + std::to_string(folds.rows.size()) +
                           " folds, clearly worse than another candidate");
   }
   return score;
 }
 
 Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandidate>& candidates, const FitData& data,
-                                                const std::vector<std::vector<std::size_t>>& folds,
-                                                const RunControl& control) {
+                                                const InnerFolds& folds, const RunControl& control) {
   RunControl inner = control;
   inner.progress = [](double) {};
   std::vector<std::size_t> order(candidates.size());

@@ -31,6 +31,7 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set);
 /// What inner cross-validation found about one candidate.
 struct InnerScore {
   std::vector<double> squares_m2;               ///< Held-out squared error of each place, mean over its rows.
+  std::vector<double> shares;                   ///< Of the region, which each place stands for; none = all alike.
   std::vector<Eigen::Vector3d> residual_m;      ///< True minus corrected there, mean over its rows.
   std::vector<Eigen::Vector3d> row_residual_m;  ///< The same of each row.
   int dimension = 3;                            ///< Of the places.
@@ -38,29 +39,35 @@ struct InnerScore {
 
   /// Takes one row of a place in. @param weight one over the place's rows
   void add(std::size_t place, std::size_t row, const Eigen::Vector3d& left_m, double weight);
+  double shareOf(std::size_t place) const { return shares.empty() ? 1.0 : shares[place]; }
+  /// Over the region, as far as it is scored.
   double rms_m() const;
 };
 
 /// Places as 0, 1, ... in order of first appearance, by row.
 std::vector<std::size_t> placeSlots(const FitData& data);
 
-/// Rows in folds by place, the same for every candidate: five, or one a place below twenty places.
-std::vector<std::vector<std::size_t>> innerFolds(const FitData& data);
+/// Rows in folds by place, the same for every candidate: five, or one a place below twenty places. Places left out at
+/// an edge are foretold from one side, and are more of the places than edges are of the region: each counts for the
+/// share that it stands for.
+struct InnerFolds {
+  std::vector<std::vector<std::size_t>> rows;
+  std::vector<double> shares;  ///< Of the region, by place.
+};
+InnerFolds innerFolds(const FitData& data);
 
 /// Scores a candidate on places its fits did not see: in closed form where the method has one and is not tuned by the
 /// data, by refits otherwise.
 /// @param best so far, or null: a costly method that after any fold is worse by two standard errors is dropped
 /// @error kCancelled only; what a method cannot do is in the score
-Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data,
-                                  const std::vector<std::vector<std::size_t>>& folds, const InnerScore* best,
-                                  const RunControl& control);
+Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data, const InnerFolds& folds,
+                                  const InnerScore* best, const RunControl& control);
 
 /// Scores every candidate, costly ones last; in the candidates' order.
 /// @param progress is told the fraction done
 /// @error kCancelled
 Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandidate>& candidates, const FitData& data,
-                                                const std::vector<std::vector<std::size_t>>& folds,
-                                                const RunControl& control);
+                                                const InnerFolds& folds, const RunControl& control);
 
 /// The simplest candidate that corrects at all and whose mean squared error exceeds the least by no more than one
 /// standard error of the difference, the better one among equally simple ones. None, which must be the first, where

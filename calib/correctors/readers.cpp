@@ -40,6 +40,7 @@ constexpr ReaderRow<OrientationModel> kOrientationReaders[] = {
     {"polynomial_euler", readPolynomialEulerOrientation},
     {"polynomial_quaternion", readPolynomialQuaternionOrientation},
     {"hmq_matrix", readHmqMatrixOrientation},
+    {"gaussian_process", readGaussianProcessOrientation},
     {"imported", readImportedOrientation}};
 
 template <class Model>

@@ -62,7 +62,8 @@ std::span<const OrientationMethod> orientationMethods() {
                                                          localQuaternionOrientation(),
                                                          polynomialEulerOrientation(),
                                                          polynomialQuaternionOrientation(),
-                                                         hmqMatrixOrientation()};
+                                                         hmqMatrixOrientation(),
+                                                         gaussianProcessOrientation()};
   return methods;
 }
 

@@ -16,8 +16,7 @@ struct Bounded {
   std::optional<double> high90;
 };
 
-/// Which share of the recorded region each place stands for: the part of the places' convex hull that is nearest to it.
-/// A place at an edge of a grid stands for a half, at a corner for an eighth of what one inside does.
+/// Which share of the recorded region each place stands for.
 std::vector<double> regionShares(const identify::GapRows& rows);
 
 /// How far the gap shrinks, as every figure, sentence and picture has it: mean squares over the recorded region, from

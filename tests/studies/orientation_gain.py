@@ -8,7 +8,7 @@ are dealt to ten folds; every fold's table is fitted with the others alone (alig
 and its own rows are corrected by `apply`. Folds, errors and intervals are this script's own: it asks the program for no
 judgement. Printed are the RMS over places with position alone, with `inputs=auto` and with `inputs=pose`, and the change of
 the RMS from position alone to `auto` with its paired 90 % interval (bootstrap over places). Then: what a correction fitted in
-1, 3 and 6 orientations is worth in others.
+1, 3 and 6 orientations is worth in others. Then the same of orientations: the RMS angle left, by the same folds.
 """
 import csv
 import itertools
@@ -34,6 +34,7 @@ METAL = ("compact_metal", {"center_m": [0.7, 0.4, -0.5], "radius_m": 0.12, "mate
 COILS = [("coil_gain", {"receiver_gain": [0.01, -0.01, 0.005]}),
          ("coil_nonorthogonality", {"receiver_rad": [0.005, -0.01, 0.005]}),
          ("finite_coil", {"coil": "receiver", "radius_m": [0.02, 0.015, 0.01]})]
+TURNING = ["polynomial_quaternion", "hmq_matrix", "gaussian_process:inputs=position", "gaussian_process"]
 SCENES = {"unequal coils": scene("unequal coils", COILS), "metal": scene("metal", [METAL]),
           "metal and unequal coils": scene("metal and unequal coils", [METAL] + COILS)}
 
@@ -106,6 +107,12 @@ def square_mm2(row):
     return sum((1e3 * (float(row[f"{axis}_corrected_m"]) - float(row[f"{axis}_true_m"]))) ** 2 for axis in "xyz")
 
 
+def square_deg2(row):
+    """Of the angle between corrected and true."""
+    cosine = abs(sum(float(row[f"{turn}_corrected"]) * float(row[f"{turn}_true"]) for turn in TURN))
+    return math.degrees(2 * math.acos(min(1.0, cosine))) ** 2
+
+
 def foreign_squares(program, seen, unseen, inputs):
     """{place: squared error [mm2]} in orientations that were not fitted, inside the region that was; the share of the errors
     below twice the stated uncertainty; and the RMS of that over the RMS of the errors."""
@@ -121,8 +128,8 @@ def foreign_squares(program, seen, unseen, inputs):
     return {row["node"]: square_mm2(row) for row in rows}, within, stated
 
 
-def squares_by_place(program, table, inputs):
-    """{place: mean squared error of its rows [mm2]}, each by a fit that saw none of them."""
+def squares_by_place(program, table, method, square=square_mm2):
+    """{place: mean squared error of its rows}, each by a fit that saw none of them. @param method options of `fit`"""
     places = sorted({row["node"] for row in table.rows}, key=int)
     random.Random(5).shuffle(places)
     fold_of = {place: number % min(FOLDS, len(places)) for number, place in enumerate(places)}
@@ -130,12 +137,11 @@ def squares_by_place(program, table, inputs):
     for fold in sorted(set(fold_of.values())):
         table.write(program.file("seen.nodes.csv"), [row for row in table.rows if fold_of[row["node"]] != fold])
         table.write(program.file("unseen.csv"), [row for row in table.rows if fold_of[row["node"]] == fold])
-        program.run("fit", "--nodes", program.file("seen.nodes.csv"), "--position", f"gaussian_process:inputs={inputs}",
-                    "--out", program.file("fold.ftcal.json"))
+        program.run("fit", "--nodes", program.file("seen.nodes.csv"), *method, "--out", program.file("fold.ftcal.json"))
         program.run("apply", "--calibration", program.file("fold.ftcal.json"), "--in", program.file("unseen.csv"), "--out",
                     program.file("corrected.csv"), "--force")
         for row in Table(program.file("corrected.csv")).rows:
-            squares[row["node"]].append(square_mm2(row))
+            squares[row["node"]].append(square(row))
     return {place: sum(rows) / len(rows) for place, rows in squares.items()}
 
 
@@ -166,9 +172,12 @@ def main():
         program = Program(sys.argv[1], folder)
 
         def line(name, table):
-            position, auto = (squares_by_place(program, table, inputs) for inputs in ("position", "auto"))
+            def of(inputs):
+                return squares_by_place(program, table, ["--position", f"gaussian_process:inputs={inputs}"])
+
+            position, auto = of("position"), of("auto")
             try:
-                pose = f"{rms_of(squares_by_place(program, table, 'pose')):.3g}"
+                pose = f"{rms_of(of('pose')):.3g}"
             except ValueError:  # Turned alike.
                 pose = "-"
             low, high = paired_interval(position, auto)
@@ -196,6 +205,15 @@ def main():
                 print(f"| {name}, fitted in {turns} | {len(seen.rows)} | {rms_of(position):.3g} | {rms_of(auto):.3g} | "
                       f"{100 * (rms_of(auto) / rms_of(position) - 1):+.0f} % ({100 * low:+.0f} to {100 * high:+.0f}) | "
                       f"{100 * within:.0f} %, {100 * within_auto:.0f} % | {stated:.2g} |", flush=True)
+        print("\n| orientations | rows | none | " + " | ".join(TURNING) + " |\n|---|---|---|" + "---|" * len(TURNING))
+        for name, room in SCENES.items():
+            for plan, words in (("grid:4x4x3@0.2:orientations=3", "3 orientations"),
+                                (scattered_plan(random.Random(2)), "each place turned at random")):
+                table = program.simulated(room, plan)
+                left = [squares_by_place(program, table, ["--position", "affine", "--orientation", method], square_deg2)
+                        for method in ["none"] + TURNING]
+                print(f"| {name}, {words} | {len(table.rows)} | " + " | ".join(f"{rms_of(one):.3g}" for one in left) + " |",
+                      flush=True)
         print("\n| table | rows | position alone | auto | pose | change by auto, 90 % |\n|---|---|---|---|---|---|")
         for path in sys.argv[2:]:
             line(os.path.basename(path).removesuffix(".nodes.csv"), Table(path))

@@ -22,7 +22,7 @@ std::vector<Eigen::Quaterniond> errorRotations(const FitData& data, ErrorFrame f
 
 Eigen::Quaterniond ErrorRotationModel::correct(const Eigen::Vector3d& p_tracked_m,
                                                const Eigen::Quaterniond& q_tracked) const {
-  const Eigen::Quaterniond q_error_inverse = errorRotation(p_tracked_m).conjugate();
+  const Eigen::Quaterniond q_error_inverse = errorRotationAt({p_tracked_m, q_tracked}).conjugate();
   const Eigen::Quaterniond q_true =
       frame_ == ErrorFrame::kTracker ? q_error_inverse * q_tracked : q_tracked * q_error_inverse;
   return q_true.normalized();

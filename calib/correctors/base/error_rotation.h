@@ -32,8 +32,9 @@ class ErrorRotationModel : public OrientationModel {
   nlohmann::json parameters() const final;
 
  protected:
-  /// Unit quaternion.
+  /// Unit quaternion; where it depends on how the sensor is turned, the mean over the orientations that were fitted.
   virtual Eigen::Quaterniond errorRotation(const Eigen::Vector3d& p_tracked_m) const = 0;
+  virtual Eigen::Quaterniond errorRotationAt(const Pose& tracked) const { return errorRotation(tracked.position_m); }
   virtual nlohmann::json errorParameters() const = 0;
 
  private:

@@ -8,7 +8,8 @@
 namespace fieldtrue::correctors {
 
 /// A fitted, immutable orientation correction. It models the error rotation q_error(p) as a function of tracked
-/// position and undoes it: q_true = q_error^-1 q_tracked (error frame `tracker`) or q_true = q_tracked q_error^-1
+/// position, or of the whole tracked pose, and undoes it: q_true = q_error^-1 q_tracked (error frame `tracker`) or
+/// q_true = q_tracked q_error^-1
 /// (`sensor`).
 class OrientationModel {
  public:
@@ -17,6 +18,9 @@ class OrientationModel {
   /// Corrected orientation, tracker_from_sensor.
   /// @param p_tracked_m tracker frame [m]
   virtual Eigen::Quaterniond correct(const Eigen::Vector3d& p_tracked_m, const Eigen::Quaterniond& q_tracked) const = 0;
+
+  /// Whether the error rotation depends on how the sensor is turned.
+  virtual bool takesOrientation() const { return false; }
 
   virtual bool covers(const Eigen::Vector3d&) const { return true; }
   virtual std::string note() const { return {}; }

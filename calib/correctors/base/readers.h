@@ -30,6 +30,7 @@ std::unique_ptr<PositionModel> readRigidPosition(const JsonReader& parameters);
 std::unique_ptr<PositionModel> readTetrahedralPosition(const JsonReader& parameters);
 std::unique_ptr<PositionModel> readTrilinearPosition(const JsonReader& parameters);
 
+std::unique_ptr<OrientationModel> readGaussianProcessOrientation(const JsonReader& parameters);
 std::unique_ptr<OrientationModel> readHmqMatrixOrientation(const JsonReader& parameters);
 std::unique_ptr<OrientationModel> readImportedOrientation(const JsonReader& parameters);
 std::unique_ptr<OrientationModel> readLocalQuaternionOrientation(const JsonReader& parameters);

@@ -33,6 +33,7 @@ OrientationMethod localQuaternionOrientation();
 OrientationMethod slerpTrilinearOrientation();
 OrientationMethod tetrahedralQuaternionOrientation();
 OrientationMethod hmqMatrixOrientation();
+OrientationMethod gaussianProcessOrientation();
 OrientationMethod polynomialEulerOrientation();
 OrientationMethod polynomialQuaternionOrientation();
 OrientationMethod importedOrientation();

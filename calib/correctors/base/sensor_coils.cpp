@@ -20,6 +20,16 @@ Eigen::Vector3d shiftOf_m(const Eigen::Matrix3d& strain, const Eigen::Vector3d& 
   return range_m * ((3.0 * n.dot(strain * n) + strain.trace()) / 18.0 * n + 4.0 / 3.0 * across);
 }
 
+/// The rotation vector, up to a factor.
+Eigen::Vector3d turnOf(const Eigen::Matrix3d& strain, const Eigen::Vector3d& p_m) {
+  const Eigen::Vector3d n = p_m.stableNormalized();
+  return n.cross(strain * n);
+}
+
+Eigen::Vector3d effectOf(CoilEffect effect, const Eigen::Matrix3d& strain, const Eigen::Vector3d& p_m) {
+  return effect == CoilEffect::kShift ? shiftOf_m(strain, p_m) : turnOf(strain, p_m);
+}
+
 Eigen::Matrix3d turned(const Eigen::Matrix3d& strain, const Eigen::Quaterniond& q) {
   const Eigen::Matrix3d r = q.normalized().toRotationMatrix();
   return r * strain * r.transpose();
@@ -34,25 +44,25 @@ class CoilsPosition : public PositionModel {
 
   bool takesOrientation() const override { return true; }
   Eigen::Vector3d displacementAt_m(const Pose& tracked) const override {
-    return model_->displacementAt_m(tracked) + coils_.shift_m(tracked);
+    return model_->displacementAt_m(tracked) + coils_.at(tracked);
   }
   void correctPoses(std::span<const Pose> tracked, std::span<Eigen::Vector3d> p_corrected_m) const override {
     model_->correctPoses(tracked, p_corrected_m);
-    for (std::size_t i = 0; i < tracked.size(); ++i) p_corrected_m[i] += coils_.shift_m(tracked[i]);
+    for (std::size_t i = 0; i < tracked.size(); ++i) p_corrected_m[i] += coils_.at(tracked[i]);
   }
   Result<std::unique_ptr<PositionModel>> onLattices(const LatticeMaker& maker, double max_deviation_m) const override {
     FT_TRY(auto model, model_->onLattices(maker, max_deviation_m));
     return std::make_unique<CoilsPosition>(std::move(model), coils_, CoilDesign(0, 18), mean_strain_);
   }
   Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
-    return model_->displacement_m(p_tracked_m) + shiftOf_m(mean_strain_, p_tracked_m);
+    return model_->displacement_m(p_tracked_m) + effectOf(coils_.effect, mean_strain_, p_tracked_m);
   }
   std::optional<double> uncertaintyAt_m(const Pose& tracked) const override {
     const auto sd_m = model_->uncertaintyAt_m(tracked);
     const auto weights = design_.rows() > 0 ? model_->weightsAt(tracked) : std::nullopt;
     if (!sd_m || !weights) return sd_m;
     const Eigen::Matrix<double, 18, 1> taken = design_.transpose() * *weights;
-    const Eigen::Matrix<double, 3, 6> left = coilDerivative(tracked) - taken.reshaped(3, 6);
+    const Eigen::Matrix<double, 3, 6> left = coilDerivative(coils_.effect, tracked) - taken.reshaped(3, 6);
     return std::sqrt(*sd_m * *sd_m + (left * coils_.covariance * left.transpose()).trace() +
                      3.0 * coils_.left_sd_m * coils_.left_sd_m);
   }
@@ -64,7 +74,8 @@ class CoilsPosition : public PositionModel {
   std::string note() const override { return model_->note(); }
   nlohmann::json parameters() const override {
     return {{"coils",
-             {{"strain", std::vector<double>(coils_.strain.begin(), coils_.strain.end())},
+             {{"effect", coils_.effect == CoilEffect::kShift ? "shift" : "turn"},
+              {"strain", std::vector<double>(coils_.strain.begin(), coils_.strain.end())},
               {"covariance", jsonOf(Eigen::MatrixXd(coils_.covariance))},
               {"left_sd_m", coils_.left_sd_m},
               {"design", jsonOf(Eigen::MatrixXd(design_))},
@@ -81,20 +92,21 @@ class CoilsPosition : public PositionModel {
 
 }  // namespace
 
-Eigen::Matrix<double, 3, 6> coilDerivative(const Pose& tracked) {
+Eigen::Matrix<double, 3, 6> coilDerivative(CoilEffect effect, const Pose& tracked) {
   Eigen::Matrix<double, 3, 6> derivative;
   for (int k = 0; k < 6; ++k)
-    derivative.col(k) = shiftOf_m(turned(matrixOf(CoilStrain::Unit(k)), tracked.orientation), tracked.position_m);
+    derivative.col(k) =
+        effectOf(effect, turned(matrixOf(CoilStrain::Unit(k)), tracked.orientation), tracked.position_m);
   return derivative;
 }
 
-Eigen::Vector3d SensorCoils::shift_m(const Pose& tracked) const {
-  return shiftOf_m(turned(matrixOf(strain), tracked.orientation), tracked.position_m);
+Eigen::Vector3d SensorCoils::at(const Pose& tracked) const {
+  return effectOf(effect, turned(matrixOf(strain), tracked.orientation), tracked.position_m);
 }
 
 FitData withoutCoils(FitData data, const SensorCoils& coils) {
   for (std::size_t row = 0; row < data.size(); ++row)
-    data.p_true_m[row] -= coils.shift_m({data.p_tracked_m[row], data.q_tracked[row]});
+    data.p_true_m[row] -= coils.at({data.p_tracked_m[row], data.q_tracked[row]});
   return data;
 }
 
@@ -115,6 +127,7 @@ std::unique_ptr<PositionModel> readCoils(const JsonReader& parameters,
   if (covariance.rows() != 6) from["covariance"].refuse("six rows");
   const Eigen::MatrixXd design = from["design"].matrix(18);
   SensorCoils coils;
+  coils.effect = from["effect"].oneOf({"shift", "turn"}) == "turn" ? CoilEffect::kTurn : CoilEffect::kShift;
   coils.strain = Eigen::Map<const CoilStrain>(strain.data());
   coils.covariance = covariance;
   coils.left_sd_m = from["left_sd_m"].number();

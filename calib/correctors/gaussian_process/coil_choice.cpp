@@ -8,8 +8,9 @@
 namespace fieldtrue::correctors {
 namespace {
 
-/// What coils of trackers differ by before it is known: a per cent or two.
+/// What coils of trackers differ by before it is known: a per cent or two; three times that turns.
 constexpr double kStrainSd = 0.02;
+constexpr double kTurningStrainSd = 0.06;
 constexpr double kStrainParameters = 6.0;
 
 struct CoilFit {
@@ -18,11 +19,11 @@ struct CoilFit {
 };
 
 /// The three axes of a row have one strain in common: their columns of the design matrix, row by row.
-std::array<Eigen::MatrixXd, 3> designOf(const PoseRows& rows) {
+std::array<Eigen::MatrixXd, 3> designOf(const PoseRows& rows, CoilEffect effect) {
   std::array<Eigen::MatrixXd, 3> design;
   for (Eigen::MatrixXd& axis : design) axis.resize(static_cast<Eigen::Index>(rows.size()), 6);
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Eigen::Matrix<double, 3, 6> derivative = coilDerivative({rows.p_m[i], rows.q[i]});
+    const Eigen::Matrix<double, 3, 6> derivative = coilDerivative(effect, {rows.p_m[i], rows.q[i]});
     for (std::size_t axis = 0; axis < 3; ++axis)
       design[axis].row(static_cast<Eigen::Index>(i)) = derivative.row(static_cast<Eigen::Index>(axis));
   }
@@ -30,14 +31,16 @@ std::array<Eigen::MatrixXd, 3> designOf(const PoseRows& rows) {
 }
 
 /// Under a normal prior of the strain, with the scales of the process given.
-std::optional<CoilFit> fitCoils(const PoseSystem& system, const PoseScales& scales, std::span<const std::size_t> used) {
+std::optional<CoilFit> fitCoils(const PoseSystem& system, CoilEffect effect, const PoseScales& scales,
+                                std::span<const std::size_t> used) {
+  const double strain_sd = effect == CoilEffect::kShift ? kStrainSd : kTurningStrainSd;
   const PoseRows rows = system.rows.only(used);
   const auto projection = TailProjection::of(system.frame.tail(rows.p_m));
   if (!projection) return std::nullopt;
   Eigen::LLT<Eigen::MatrixXd> factor(projection->projected(poseCovariance(system.kernel, system.frame, scales, rows)));
   if (factor.info() != Eigen::Success) return std::nullopt;
-  const std::array<Eigen::MatrixXd, 3> design = designOf(rows);
-  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Identity() / (kStrainSd * kStrainSd);
+  const std::array<Eigen::MatrixXd, 3> design = designOf(rows, effect);
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Identity() / (strain_sd * strain_sd);
   CoilStrain right_side = CoilStrain::Zero();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Eigen::VectorXd y(rows.p_m.size());
@@ -51,10 +54,11 @@ std::optional<CoilFit> fitCoils(const PoseSystem& system, const PoseScales& scal
   }
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> of_strain(information);
   CoilFit fit;
+  fit.coils.effect = effect;
   fit.coils.strain = of_strain.solve(right_side);
   fit.coils.covariance = of_strain.solve(Eigen::Matrix<double, 6, 6>::Identity());
   const double log_volume =
-      2.0 * of_strain.matrixLLT().diagonal().array().log().sum() + 2.0 * kStrainParameters * std::log(kStrainSd);
+      2.0 * of_strain.matrixLLT().diagonal().array().log().sum() + 2.0 * kStrainParameters * std::log(strain_sd);
   fit.nats = 0.5 * (right_side.dot(fit.coils.strain) - log_volume);
   return fit;
 }
@@ -68,7 +72,7 @@ PoseSystem without(const PoseSystem& system, const SensorCoils& coils) {
   rest.displacement_m = system.displacement_m;
   for (std::size_t i = 0; i < system.rows.size(); ++i)
     rest.displacement_m.row(static_cast<Eigen::Index>(i)) -=
-        coils.shift_m({system.rows.p_m[i], system.rows.q[i]}).transpose();
+        coils.at({system.rows.p_m[i], system.rows.q[i]}).transpose();
   return rest;
 }
 
@@ -87,15 +91,15 @@ std::string noteOf(const SensorCoils& coils, double nats, double before_m, doubl
 
 }  // namespace
 
-Result<CoilChoice> chooseCoils(const PoseSystem& system, const GaussianProcessScales& start,
+Result<CoilChoice> chooseCoils(const PoseSystem& system, CoilEffect effect, const GaussianProcessScales& start,
                                std::span<const std::size_t> used, double spacing_m, const RunControl& control) {
   const auto before = rowScales(system, start, used, spacing_m, control);
-  const auto first = before ? fitCoils(system, *before, used) : std::nullopt;
+  const auto first = before ? fitCoils(system, effect, *before, used) : std::nullopt;
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
   if (!first || first->nats < kNatsAParameter * kStrainParameters) return CoilChoice{};
   // Scales that need not explain the coils weigh the rows better.
   const auto after = rowScales(without(system, first->coils), before->field, used, spacing_m, control);
-  auto second = after ? fitCoils(system, *after, used) : std::nullopt;
+  auto second = after ? fitCoils(system, effect, *after, used) : std::nullopt;
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
   if (!second) return CoilChoice{};
   const double before_m = heldOutRms_m(system, *before, used);

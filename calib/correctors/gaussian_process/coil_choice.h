@@ -19,7 +19,7 @@ struct CoilChoice {
 /// parameter more likely than none and takes 3 % off the error at rows whose places are left out.
 /// @param start scales of the process over positions; @param used rows
 /// @error kCancelled
-Result<CoilChoice> chooseCoils(const PoseSystem& system, const GaussianProcessScales& start,
+Result<CoilChoice> chooseCoils(const PoseSystem& system, CoilEffect effect, const GaussianProcessScales& start,
                                std::span<const std::size_t> used, double spacing_m, const RunControl& control);
 
 }  // namespace fieldtrue::correctors

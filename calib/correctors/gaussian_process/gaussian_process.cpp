@@ -1,8 +1,9 @@
+#include "calib/correctors/gaussian_process/gaussian_process.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <mutex>
 
 #include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
@@ -12,7 +13,7 @@
 #include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/gaussian_process/coil_choice.h"
-#include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
+#include "calib/correctors/gaussian_process/gaussian_process_position.h"
 #include "calib/correctors/gaussian_process/gaussian_process_tuning.h"
 #include "calib/correctors/gaussian_process/pose_process.h"
 #include "calib/correctors/radial/rbf_system.h"
@@ -24,73 +25,6 @@ constexpr std::size_t kMaxPlaces = 10000;  // 800 MB for the matrix.
 const std::string kName = "Gaussian process";
 /// Displacements that a linear trend explains this well [m] leave nothing to find scales from.
 constexpr double kNoResidual_m = 1e-9;
-
-/// The posterior, factorised when it is first asked for: views ask, evaluation does not, and at 5,000 places it takes
-/// seconds and 200 MB.
-struct LazyPosterior {
-  std::once_flag once;
-  std::optional<GaussianProcessPosterior> posterior;
-};
-
-class GaussianProcessPosition : public PositionModel {
- public:
-  GaussianProcessPosition(RadialField field, const GaussianProcessScales& scales, Eigen::VectorXd noise_m2,
-                          std::string note)
-      : field_(std::move(field)), scales_(scales), noise_m2_(std::move(noise_m2)), note_(std::move(note)) {}
-
-  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_tracked_m) const override {
-    return field_.value(p_tracked_m);
-  }
-  Eigen::Matrix3d jacobian(const Eigen::Vector3d& p_tracked_m) const override {
-    return Eigen::Matrix3d::Identity() + field_.gradient(p_tracked_m);
-  }
-  /// 3-D, of the smooth field and of what the fit found neither smooth nor stated as noise.
-  std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
-    const GaussianProcessPosterior* known = posterior();
-    if (known == nullptr) return std::nullopt;
-    const double field_m2 = known->variance_m2(signal_m2(), covarianceWith(p_tracked_m), tailAt(p_tracked_m));
-    return std::sqrt(3.0 * (field_m2 + scales_.nugget_sd_m * scales_.nugget_sd_m));
-  }
-  std::optional<Eigen::VectorXd> weightsAt(const Pose& tracked) const override {
-    const GaussianProcessPosterior* known = posterior();
-    if (known == nullptr) return std::nullopt;
-    return known->weights(covarianceWith(tracked.position_m), tailAt(tracked.position_m));
-  }
-  std::string note() const override { return note_; }
-  nlohmann::json parameters() const override {
-    nlohmann::json json = field_.toJson();
-    json["signal_sd_m"] = scales_.signal_sd_m;
-    json["nugget_sd_m"] = scales_.nugget_sd_m;
-    json["length_m"] = jsonOf(scales_.length_m);
-    json["noise_m2"] = std::vector<double>(noise_m2_.begin(), noise_m2_.end());
-    json["note"] = note_;
-    return json;
-  }
-
- private:
-  double signal_m2() const { return scales_.signal_sd_m * scales_.signal_sd_m; }
-  Eigen::VectorXd covarianceWith(const Eigen::Vector3d& p_m) const { return signal_m2() * field_.kernelValues(p_m); }
-  Eigen::VectorXd tailAt(const Eigen::Vector3d& p_m) const {
-    return field_.frame().tail(std::span(&p_m, 1)).row(0).transpose();
-  }
-  /// @return null where memory does not suffice
-  const GaussianProcessPosterior* posterior() const {
-    std::call_once(lazy_->once, [this] {
-      const auto n = static_cast<double>(field_.centers_m().size());
-      if (checkMemory("The uncertainty of a Gaussian process", kGaussianProcessMatrices * 8.0 * n * n))
-        lazy_->posterior = GaussianProcessPosterior::of(
-            field_.frame().tail(field_.centers_m()),
-            covarianceMatrix(field_.kernel(), field_.frame(), scales_, field_.centers_m(), noise_m2_));
-    });
-    return lazy_->posterior ? &*lazy_->posterior : nullptr;
-  }
-
-  RadialField field_;
-  GaussianProcessScales scales_;
-  Eigen::VectorXd noise_m2_;
-  std::string note_;
-  std::unique_ptr<LazyPosterior> lazy_ = std::make_unique<LazyPosterior>();
-};
 
 /// Everything a fit and its hold-outs share.
 struct GaussianProcessSystem {
@@ -164,11 +98,11 @@ Result<GaussianProcessScales> chooseScales(const GaussianProcessSystem& system, 
 }
 
 /// Of rows, or of places, each the mean of its rows.
-CoilDesign designOf(const FitData& data, const Places& places, bool by_row) {
+CoilDesign designOf(CoilEffect effect, const FitData& data, const Places& places, bool by_row) {
   CoilDesign of_rows(static_cast<Eigen::Index>(data.size()), 18);
   for (std::size_t row = 0; row < data.size(); ++row)
     of_rows.row(static_cast<Eigen::Index>(row)) =
-        coilDerivative({data.p_tracked_m[row], data.q_tracked[row]}).reshaped().transpose();
+        coilDerivative(effect, {data.p_tracked_m[row], data.q_tracked[row]}).reshaped().transpose();
   if (by_row) return of_rows;
   CoilDesign of_places = CoilDesign::Zero(static_cast<Eigen::Index>(places.size()), 18);
   for (std::size_t place = 0; place < places.size(); ++place)
@@ -179,8 +113,8 @@ CoilDesign designOf(const FitData& data, const Places& places, bool by_row) {
 }
 
 /// The coils of a sensor that was turned, where they explain what changes.
-Result<CoilChoice> coilsOf(const FitData& data, const GaussianProcessSystem& system, std::size_t tuning_places,
-                           const RunControl& control) {
+Result<CoilChoice> coilsOf(const FitData& data, const GaussianProcessSystem& system, CoilEffect effect,
+                           std::size_t tuning_places, const RunControl& control) {
   if (!hasSeveralOrientations(data) || data.size() > kMaxPlaces) return CoilChoice{};
   const auto poses = poseSystemOf(data, system.places, system.kernel, system.frame, control);
   // Without the memory there is no choice, and what there is without orientation is told elsewhere.
@@ -188,21 +122,28 @@ Result<CoilChoice> coilsOf(const FitData& data, const GaussianProcessSystem& sys
   if (!poses) return tl::unexpected(poses.error());
   const std::vector<std::size_t> used =
       rowsOfPlaces(system.places, placesOfAbout(system.places, data.size(), tuning_places));
-  return chooseCoils(*poses, system.scales, used, medianSpacing_m(system.places.p_tracked_m), control);
+  return chooseCoils(*poses, effect, system.scales, used, medianSpacing_m(system.places.p_tracked_m), control);
 }
 
-enum class Coils { kAsk, kLeave };
+/// The same places with the truth of this data.
+Places withTruthOf(const FitData& data, Places places) {
+  for (std::size_t place = 0; place < places.size(); ++place) {
+    places.p_true_m[place].setZero();
+    for (const std::size_t row : places.rows[place])
+      places.p_true_m[place] += data.p_true_m[row] / static_cast<double>(places.rows[place].size());
+  }
+  return places;
+}
 
-Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& settings, const RunControl& control,
-                                          Coils ask = Coils::kAsk) {
-  auto places = smoothFitPlaces(data, kName);
-  if (!places) return tl::unexpected(places.error());
-  if (places->size() > kMaxPlaces)
+/// @param coils what they would do to the values, if they may be asked for
+Result<GaussianProcessSystem> buildSystem(const FitData& data, Places places, const Settings& settings,
+                                          const RunControl& control, std::optional<CoilEffect> coils) {
+  if (places.size() > kMaxPlaces)
     return fail(ErrorCode::kUnsupported, "A Gaussian process takes at most " + std::to_string(kMaxPlaces) +
-                                             " places, got " + std::to_string(places->size()) +
+                                             " places, got " + std::to_string(places.size()) +
                                              "; use a polynomial or B-splines");
   GaussianProcessSystem system;
-  system.places = *std::move(places);
+  system.places = std::move(places);
   auto memory = bookSquareMatrices(kName, kGaussianProcessMatrices, system.places.size(), control);
   if (!memory) return tl::unexpected(memory.error());
   system.memory = *std::move(memory);
@@ -217,14 +158,14 @@ Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& s
   system.scales = *scales;
   const std::string& inputs = choiceSetting(settings, "inputs");
   const auto tuning_places = static_cast<std::size_t>(integerSetting(settings, "tuning_places"));
-  if (inputs != "position" && ask == Coils::kAsk && choiceSetting(settings, "sensor_coils") == "auto") {
-    FT_TRY(const CoilChoice choice, coilsOf(data, system, tuning_places, control));
+  if (inputs != "position" && coils && choiceSetting(settings, "sensor_coils") == "auto") {
+    FT_TRY(const CoilChoice choice, coilsOf(data, system, *coils, tuning_places, control));
     if (choice.coils) {
-      FitData rest = withoutCoils(data, *choice.coils);
-      FT_TRY(GaussianProcessSystem without, buildSystem(rest, settings, control, Coils::kLeave));
+      const FitData rest = withoutCoils(data, *choice.coils);
+      FT_TRY(GaussianProcessSystem without, buildSystem(rest, withTruthOf(rest, system.places), settings, control, {}));
       without.coils = choice.coils;
       if (without.poses) without.coils->left_sd_m = 0.0;  // The process over poses has its own.
-      without.design = designOf(data, without.places, without.poses.has_value());
+      without.design = designOf(*coils, data, without.places, without.poses.has_value());
       without.orientations = data.q_tracked;
       (without.poses ? without.poses->note : without.note) += " " + choice.note;
       return without;
@@ -243,6 +184,11 @@ Result<GaussianProcessSystem> buildSystem(const FitData& data, const Settings& s
     system.poses->note = plane + (plane.empty() ? "" : " ") + system.poses->note;
   }
   return system;
+}
+
+Result<GaussianProcessSystem> systemOf(const FitData& data, const Settings& settings, const RunControl& control) {
+  FT_TRY(auto places, smoothFitPlaces(data, kName));
+  return buildSystem(data, std::move(places), settings, control, CoilEffect::kShift);
 }
 
 Eigen::MatrixXd matrixOf(const GaussianProcessSystem& system) {
@@ -264,14 +210,12 @@ std::unique_ptr<PositionModel> modelOf(const GaussianProcessSystem& system, std:
   const std::vector<double> kept_m2 = withoutPlaces(system.noise_m2, out);
   const Eigen::VectorXd noise_m2 =
       Eigen::Map<const Eigen::VectorXd>(kept_m2.data(), static_cast<Eigen::Index>(kept_m2.size()));
-  return std::make_unique<GaussianProcessPosition>(
+  return makeGaussianProcess(
       RadialField(system.kernel, 0.0, system.frame, withoutPlaces(system.places.p_tracked_m, out), solution),
       system.scales, noise_m2, system.note);
 }
 
-Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, const Settings& settings,
-                                                          const RunControl& control) {
-  FT_TRY(const auto system, buildSystem(data, settings, control));
+Result<std::unique_ptr<PositionModel>> fitSystem(const GaussianProcessSystem& system) {
   if (system.poses)
     return fitPoses(*system.poses).map([&](std::unique_ptr<PositionModel> model) {
       return system.coils ? withCoils(std::move(model), *system.coils, system.design, system.orientations)
@@ -284,6 +228,12 @@ Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, c
   auto model = modelOf(system, {}, *solution);
   return system.coils ? withCoils(std::move(model), *system.coils, system.design, system.orientations)
                       : std::move(model);
+}
+
+Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, const Settings& settings,
+                                                          const RunControl& control) {
+  FT_TRY(const auto system, systemOf(data, settings, control));
+  return fitSystem(system);
 }
 
 class GaussianProcessHoldOut : public HoldOutFits<PositionModel> {
@@ -337,12 +287,27 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutSystem(GaussianProces
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutGaussianProcess(const FitData& data,
                                                                            const Settings& settings,
                                                                            const RunControl& control) {
-  FT_TRY(auto system, buildSystem(data, settings, control));
+  FT_TRY(auto system, systemOf(data, settings, control));
   const std::optional<SensorCoils> coils = system.coils;
   std::vector<Eigen::Quaterniond> orientations = std::move(system.orientations);
   auto fits = holdOutSystem(std::move(system));
   if (!fits || !coils) return fits;
   return std::make_unique<CoilsHoldOut>(*std::move(fits), *coils, std::move(orientations));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<PositionModel>> fitProcessOf(const FitData& data, std::span<const Eigen::Vector3d> values,
+                                                    std::optional<CoilEffect> coils, const Settings& settings,
+                                                    const RunControl& control) {
+  FT_TRY(auto places, smoothFitPlaces(data, kName));
+  FitData of_values = data;
+  of_values.noise_m2.clear();
+  of_values.jig_sd_m = 0.0;
+  for (std::size_t row = 0; row < data.size(); ++row) of_values.p_true_m[row] = data.p_tracked_m[row] + values[row];
+  FT_TRY(const auto system,
+         buildSystem(of_values, withTruthOf(of_values, std::move(places)), settings, control, coils));
+  return fitSystem(system);
 }
 
 std::vector<Setting> gaussianProcessSettings() {
@@ -363,21 +328,6 @@ std::vector<Setting> gaussianProcessSettings() {
       declare::integer(
           "tuning_places", "Places for the scales", {50, 3000}, 700,
           "With more places than these, the scales are found on a well-spread part of them; the fit takes all.")};
-}
-
-}  // namespace
-
-std::unique_ptr<PositionModel> readGaussianProcessPosition(const JsonReader& parameters) {
-  if (parameters.has("coils")) return readCoils(parameters, readGaussianProcessPosition);
-  if (parameters.has("pose")) return readPoses(parameters);
-  RadialField field = RadialField::fromJson(parameters);
-  const GaussianProcessScales scales{parameters["length_m"].vector3(), parameters["signal_sd_m"].number(),
-                                     parameters["nugget_sd_m"].number()};
-  const auto stored_m2 = parameters["noise_m2"].numbers();
-  if (stored_m2.size() != field.centers_m().size()) parameters["noise_m2"].refuse("one number for each centre");
-  const Eigen::VectorXd noise_m2 =
-      Eigen::Map<const Eigen::VectorXd>(stored_m2.data(), static_cast<Eigen::Index>(stored_m2.size()));
-  return std::make_unique<GaussianProcessPosition>(std::move(field), scales, noise_m2, parameters["note"].text());
 }
 
 /// A Gaussian process with an anisotropic Matern kernel about a linear trend, each place with its own noise, scales by

@@ -292,9 +292,19 @@ std::optional<PoseScales> rowScales(const PoseSystem& system, const GaussianProc
   const auto likelihood = PoseLikelihood::of(system.kernel, system.frame, system.rows.only(used),
                                              rowsOfMatrix(system.displacement_m, used));
   if (!likelihood) return std::nullopt;
-  const WeakPrior prior(likelihood->residualVariance_m2(), rmsSpread_m(system.rows.p_m), std::max(spacing_m, 1e-6));
-  const auto optimum = Search{*likelihood, prior, TurnPrior(prior), control}.from(logarithmsOf(start), kPoseIterations);
-  return optimum ? std::optional(poseScalesOf(optimum->parameters)) : std::nullopt;
+  const double spread_m = rmsSpread_m(system.rows.p_m);
+  const WeakPrior prior(likelihood->residualVariance_m2(), spread_m, std::max(spacing_m, 1e-6));
+  const TurnPrior turn_prior(prior);
+  const Search search{*likelihood, prior, turn_prior, control};
+  // Scales of other values than these may lie in a valley of their own.
+  std::optional<Optimum> best = search.from(logarithmsOf(start), kPoseIterations);
+  for (const double length : {0.7, 3.0}) {
+    const GaussianProcessScales plain{Eigen::Vector3d::Constant(length * spread_m), std::exp(prior.signal),
+                                      std::exp(prior.nugget)};
+    const auto other = search.from(logarithmsOf(plain), kPoseIterations);
+    if (other && (!best || other->cost < best->cost)) best = other;
+  }
+  return best ? std::optional(poseScalesOf(best->parameters)) : std::nullopt;
 }
 
 Result<PoseSystem> poseSystemOf(const FitData& data, const Places& places, RadialKernel kernel, const FieldFrame& frame,

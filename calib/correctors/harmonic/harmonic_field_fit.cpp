@@ -18,7 +18,8 @@
 namespace fieldtrue::correctors {
 namespace {
 
-constexpr int kMostSteps = 10;
+constexpr int kMostSteps = 30;
+constexpr double kSettled = 0.04;  ///< Of the noise's SD.
 constexpr std::size_t kCandidatesKept = 90;  ///< Of the first step's, by what each would still add.
 
 /// The linear model of one step, rows whitened, unknowns scaled so that each source moves the places by about its
@@ -69,7 +70,8 @@ class Fitter {
       if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The harmonic field's fit was stopped");
       const double moved_m = improve(linearise(step == 0 ? firstRows() : rowsAtField()), step);
       control_.progress(static_cast<double>(step + 1) / kMostSteps);
-      if (step > 0 && moved_m < 0.04 * jig_sd_m_) break;
+      // Where no tolerance is stated jig_sd_m_ is all that a rigid motion leaves, which is no measure of the noise.
+      if (step > 0 && moved_m < kSettled * std::sqrt(std::min(1.0, noise_factor_)) * jig_sd_m_) break;
     }
     if (misfit_m2_ > without_sources_m2) forgetSources();
     return HarmonicFit{DisturbedField(sources()), field_from_truth_, posterior()};

@@ -57,6 +57,13 @@ double sumOfSquares(const Errors& a, const Errors& b, double weight_of_a, const 
   return sum;
 }
 
+/// Every place stands for as much of the region as any other.
+InnerFolds alikeFolds(const FitData& data) {
+  InnerFolds folds = innerFolds(data);
+  std::fill(folds.shares.begin(), folds.shares.end(), 1.0);
+  return folds;
+}
+
 FitData someData() { return fitDataOf(shakenGrid({3, 3, 3}, 0.2, 0.02), nothing_m); }
 
 }  // namespace
@@ -70,7 +77,7 @@ class AutomaticBlendTest : public QObject {
     const auto blend = blendCandidates(
         candidatesOf({"affine", "rbf"}),
         scoresOf({everywhere(data.size(), {0.001, 0.0, 0.0}), everywhere(data.size(), {0.0, 0.002, 0.0})}), data,
-        innerFolds(data));
+        alikeFolds(data));
     QVERIFY(blend);
     QVERIFY((blend->members == std::vector<std::size_t>{0, 1}));
     FT_VERIFY_MATCH(near(blend->weights[0], 0.8, 1e-9));
@@ -79,13 +86,30 @@ class AutomaticBlendTest : public QObject {
     FT_VERIFY_MATCH(near(blend->score.residual_m[5], Eigen::Vector3d(0.0008, 0.0004, 0.0), 1e-12));
   }
 
+  /// Two places of which the first stands for three quarters: errors of 1 and 2 at one, of 2 and 1 at the other, at
+  /// right angles, leave w^2 (3 + 4) / 4 + (1 - w)^2 (12 + 1) / 4, least at w = 13 / 20.
+  void placesCountForWhatTheyStandFor() {
+    const FitData data = someData();
+    InnerFolds folds = innerFolds(data);
+    Errors a, b;
+    for (std::size_t row = 0; row < data.size(); ++row) {
+      const bool is_first = row % 2 == 0;
+      folds.shares[row] = is_first ? 0.75 / 14.0 : 0.25 / 13.0;
+      a.emplace_back(is_first ? 0.001 : 0.002, 0.0, 0.0);
+      b.emplace_back(0.0, is_first ? 0.002 : 0.001, 0.0);
+    }
+    const auto blend = blendCandidates(candidatesOf({"affine", "rbf"}), scoresOf({a, b}), data, folds);
+    QVERIFY(blend);
+    FT_VERIFY_MATCH(near(blend->weights[0], 13.0 / 20.0, 1e-9));
+  }
+
   void noWeightIsBelowZero() {
     const FitData data = someData();
     // The second errs as the first does, only farther: the best mean would be twice the first less the second.
     QVERIFY(!blendCandidates(
         candidatesOf({"affine", "rbf"}),
         scoresOf({everywhere(data.size(), {0.001, 0.0, 0.0}), everywhere(data.size(), {0.002, 0.0, 0.0})}), data,
-        innerFolds(data)));
+        alikeFolds(data)));
   }
 
   void oneCandidateOfAMethodTakesPart() {
@@ -93,7 +117,7 @@ class AutomaticBlendTest : public QObject {
     QVERIFY(!blendCandidates(
         candidatesOf({"rbf", "rbf"}),
         scoresOf({everywhere(data.size(), {0.001, 0.0, 0.0}), everywhere(data.size(), {0.0, 0.002, 0.0})}), data,
-        innerFolds(data)));
+        alikeFolds(data)));
   }
 
   void skippedCandidatesTakeNoPart() {
@@ -101,17 +125,17 @@ class AutomaticBlendTest : public QObject {
     auto scores = scoresOf({everywhere(data.size(), {0.001, 0.0, 0.0}), everywhere(data.size(), {0.0, 0.002, 0.0})});
     scores[1] = {};
     scores[1].skipped = "cannot";
-    QVERIFY(!blendCandidates(candidatesOf({"affine", "rbf"}), scores, data, innerFolds(data)));
+    QVERIFY(!blendCandidates(candidatesOf({"affine", "rbf"}), scores, data, alikeFolds(data)));
   }
 
   /// The weights of each fold come from the others. Searched for here in steps of 1e-4.
   void aFoldIsJudgedByWeightsThatDidNotSeeIt() {
     const FitData data = someData();
-    const auto folds = innerFolds(data);
+    const auto folds = alikeFolds(data);
     const Errors a = scattered(data.size(), 0.001, 3), b = scattered(data.size(), 0.0015, 4);
     const auto blend = blendCandidates(candidatesOf({"affine", "rbf"}), scoresOf({a, b}), data, folds);
     QVERIFY(blend);
-    for (const auto& fold : folds) {
+    for (const auto& fold : folds.rows) {
       std::vector<std::size_t> others;
       for (std::size_t row = 0; row < data.size(); ++row)
         if (!std::binary_search(fold.begin(), fold.end(), row)) others.push_back(row);
@@ -133,7 +157,7 @@ class AutomaticBlendTest : public QObject {
       errors_b[row] *= 0.0;
     }
     const auto blend =
-        blendCandidates(candidatesOf({"affine", "rbf"}), scoresOf({errors_a, errors_b}), data, innerFolds(data));
+        blendCandidates(candidatesOf({"affine", "rbf"}), scoresOf({errors_a, errors_b}), data, alikeFolds(data));
     QVERIFY(blend);
     // 25 places: one of 25 (mm2) and 24 of 1 against 24 of 1: weights as 24 to 49.
     FT_VERIFY_MATCH(near(blend->weights[0], 24.0 / 73.0, 1e-9));

@@ -130,6 +130,26 @@ class AutomaticTest : public QObject {
     QCOMPARE(chooseCandidate(ranked({0, 3}), scores), static_cast<std::size_t>(expected));
   }
 
+  /// 80 places at the edge stand for a fifth of the region, 20 inside for the rest: mean squares of
+  /// 0.2 * 1 + 0.8 * 9 against 0.2 * 16 + 0.8 * 1; counted alike the first would be the better one.
+  void placesCountForWhatTheyStandFor() {
+    std::vector<InnerScore> scores(3);
+    for (int i = 0; i < 100; ++i) {
+      const bool is_edge = i < 80;
+      scores[0].squares_m2.push_back(100.0);
+      scores[1].squares_m2.push_back(is_edge ? 1.0 : 9.0);
+      scores[2].squares_m2.push_back(is_edge ? 16.0 : 1.0);
+    }
+    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores), std::size_t{1});
+    for (InnerScore& score : scores) {
+      score.shares.assign(80, 0.2 / 80.0);
+      score.shares.insert(score.shares.end(), 20, 0.8 / 20.0);
+    }
+    FT_VERIFY_MATCH(near(scores[1].rms_m(), std::sqrt(7.4), 1e-12));
+    FT_VERIFY_MATCH(near(scores[2].rms_m(), 2.0, 1e-12));
+    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores), std::size_t{2});
+  }
+
   void skippedCandidatesAreNeverChosen() {
     std::vector<InnerScore> scores(3);
     scores[0].squares_m2 = std::vector<double>(50, 1.0);
@@ -141,7 +161,7 @@ class AutomaticTest : public QObject {
   void foldsHoldEveryRowOnceAndNoPlaceTwice() {
     FitData data = noisy(nothing_m, 0.001, 1, {6, 6, 5});
     for (std::size_t row = 0; row < data.size(); ++row) data.node[row] = static_cast<int>(row / 2);
-    const auto folds = innerFolds(data);
+    const auto folds = innerFolds(data).rows;
     QCOMPARE(folds.size(), std::size_t{5});
     std::set<std::size_t> rows;
     std::map<int, std::set<std::size_t>> folds_of_place;
@@ -155,9 +175,9 @@ class AutomaticTest : public QObject {
     }
     QCOMPARE(rows.size(), data.size());
     for (const auto& [place, in] : folds_of_place) QCOMPARE(in.size(), std::size_t{1});
-    QVERIFY(innerFolds(data) == folds);
+    QVERIFY(innerFolds(data).rows == folds);
     const FitData few = rowsOfFitData(data, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
-    QCOMPARE(innerFolds(few).size(), std::size_t{5});
+    QCOMPARE(innerFolds(few).rows.size(), std::size_t{5});
   }
 
   void candidatesAreThoseOfTheSetAndNeverItself() {
@@ -190,7 +210,7 @@ class AutomaticTest : public QObject {
     const auto score = scoreCandidate(candidate, data, folds, nullptr, {});
     FT_VERIFY_OK(score);
     QVERIFY(!score->skipped);
-    for (const auto& fold : folds) {
+    for (const auto& fold : folds.rows) {
       std::vector<std::size_t> kept;
       for (std::size_t row = 0; row < data.size(); ++row)
         if (!std::binary_search(fold.begin(), fold.end(), row)) kept.push_back(row);
