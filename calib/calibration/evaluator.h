@@ -40,9 +40,9 @@ class Evaluator {
   /// @param p_true_m same length; may be the same memory
   void correctPositions(std::span<const Eigen::Vector3d> p_tracked_m, std::span<Eigen::Vector3d> p_true_m) const;
   /// Whether the position part is a function of the tracked pose, not of position alone.
-  bool takesOrientation() const {
-    return parts_.position->takesOrientation() || parts_.orientation->takesOrientation();
-  }
+  bool takesOrientation() const { return parts_.position->takesOrientation(); }
+  /// Whether the error of orientations is a function of the tracked pose.
+  bool turnTakesOrientation() const { return parts_.orientation->takesOrientation(); }
 
   /// SD of the corrected position [m]; at a pose, or for any of the orientations that were fitted.
   std::optional<double> uncertaintyAt_m(const Pose& tracker_from_sensor) const;

@@ -8,7 +8,9 @@
 
 #include "calib/core/file_io.h"
 #include "calib/core/number_text.h"
+#include "calib/core/statistics.h"
 #include "calib/correctors/base/method_text.h"
+#include "calib/exporters/exporter.h"
 
 namespace fieldtrue::exporters {
 namespace {
@@ -49,6 +51,12 @@ ExportSubject::ExportSubject(const calibration::Corrector& corrector, const Expo
     if (distance_m >= least_m || !corrector.reaches(p_m)) continue;
     least_m = distance_m;
     middle_m_ = p_m;
+  }
+  if (corrector.turnTakesOrientation()) {
+    if (options.orientation && !options.mean_orientation)
+      mean_over_ = {*options.orientation};
+    else
+      mean_over_ = corrector.orientationsSeen();
   }
   if (!corrector.takesOrientation()) return;
   if (!options.mean_orientation) orientation_ = options.orientation;
@@ -116,9 +124,22 @@ Eigen::Vector3d ExportSubject::inverse_m(const Eigen::Vector3d& p_true_m) const 
 }
 
 Eigen::Quaterniond ExportSubject::rotation(const Eigen::Vector3d& p_tracked_m) const {
-  const Eigen::Quaterniond q_tracked = orientation_.value_or(Eigen::Quaterniond::Identity());
-  const Eigen::Quaterniond q_true = corrector_.correct(Pose{p_tracked_m, q_tracked}).orientation;
-  return canonical(q_true * corrector_.alignment().mountOf({}).conjugate() * q_tracked.conjugate());
+  const auto turnAt = [&](const Eigen::Quaterniond& q_tracked) {
+    const Eigen::Quaterniond q_true = corrector_.correct(Pose{p_tracked_m, q_tracked}).orientation;
+    return canonical(q_true * corrector_.alignment().mountOf({}).conjugate() * q_tracked.conjugate());
+  };
+  if (mean_over_.empty()) return turnAt(orientation_.value_or(Eigen::Quaterniond::Identity()));
+  std::vector<Eigen::Quaterniond> turns;
+  for (const Eigen::Quaterniond& q_tracked : mean_over_) turns.push_back(turnAt(q_tracked));
+  return canonical(meanRotation(turns));
+}
+
+void ExportSubject::tellOfTurns(Written& written) const {
+  if (mean_over_.empty()) return;
+  written.notes.emplace_back(
+      "How orientations are corrected changes with how the sensor is turned, and this format knows one turn for each "
+      "position: " +
+      std::string(mean_over_.size() == 1 ? "that of one orientation." : "the mean over those that were fitted."));
 }
 
 std::optional<double> ExportSubject::uncertainty_m(const Eigen::Vector3d& p_tracked_m) const {

@@ -38,6 +38,8 @@ struct ExportOptions {
 /// What another program is to be told about a file, in order: unit, frames, handedness, direction, method, ...
 using Facts = std::vector<std::pair<std::string, std::string>>;
 
+struct Written;
+
 /// A calibration as another program takes it: one map of positions, from the tracker's frame to the calibration's own
 /// (that of the rig where an alignment was fitted), or back, at one orientation of the sensor.
 ///
@@ -54,11 +56,14 @@ class ExportSubject {
   Eigen::Vector3d forward_m(const Eigen::Vector3d& p_tracked_m) const;
   /// True to measured, by Newton's method; within 1 um wherever the map can be turned round.
   Eigen::Vector3d inverse_m(const Eigen::Vector3d& p_true_m) const;
-  /// How a read orientation is turned, on its left: q_true = rotation * q_tracked, at the sensor's mounting.
+  /// How a read orientation is turned, on its left: q_true = rotation * q_tracked, at the sensor's mounting. Where that
+  /// changes with how the sensor is turned: at the orientation asked for, or the mean over those seen.
   Eigen::Quaterniond rotation(const Eigen::Vector3d& p_tracked_m) const;
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const;
   /// Whether the calibration holds at a position of the map's domain.
   bool holds(const Eigen::Vector3d& p_m) const;
+  /// That a turn which changes with the sensor's orientation is written for one of them, where it does.
+  void tellOfTurns(Written& written) const;
   bool correctsOrientation() const { return corrector_.choice().orientation_id != "none"; }
 
   /// The places, where the tracker measured them or, in the inverse direction, where they truly are.
@@ -81,6 +86,7 @@ class ExportSubject {
   calibration::Corrector corrector_;
   bool is_inverse_ = false;
   std::optional<Eigen::Quaterniond> orientation_;
+  std::vector<Eigen::Quaterniond> mean_over_;  ///< Orientations that a turn is averaged over.
   double change_m_ = 0.0;
   Eigen::Vector3d middle_m_ = Eigen::Vector3d::Zero();
   double extent_m_ = 1.0;

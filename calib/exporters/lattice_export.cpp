@@ -241,6 +241,7 @@ Result<Written> writeLattice(const ExportSubject& subject, const ExportOptions& 
     return fail(ErrorCode::kIo, path.string() + " reads back " + deviationText(*written.deviation) +
                                     ", which is not what was written; it was removed");
   }
+  if (form.with_rotation) subject.tellOfTurns(written);
   written.notes.push_back("Lattice of " + countText(field.points) + " points, pitch " +
                           pitchText(field.points.pitch_m) + ", " + deviationText(*written.deviation) + ".");
   control.progress(1.0);

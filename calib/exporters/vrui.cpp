@@ -204,6 +204,7 @@ Result<Written> exportForward(const ExportSubject& subject, const ExportOptions&
     points = latticeAround(subject, Eigen::Matrix3d::Identity(), pitch_m, 2);
   }
   FT_TRY(auto written, writeFixedLattice(subject, options, path, points, form, "A Vrui forward grid", control));
+  subject.tellOfTurns(written);
   if (subject.correctsOrientation())
     written.notes.emplace_back(
         "Vrui turns a reading about the tracker's origin, so that between vertices positions are a "
