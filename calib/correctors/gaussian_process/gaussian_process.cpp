@@ -135,6 +135,26 @@ Places withTruthOf(const FitData& data, Places places) {
   return places;
 }
 
+Result<GaussianProcessSystem> buildSystem(const FitData& data, Places places, const Settings& settings,
+                                          const RunControl& control, std::optional<CoilEffect> coils);
+
+/// The system of what is left without the coils, where they are found.
+Result<std::optional<GaussianProcessSystem>> systemWithoutCoils(const FitData& data,
+                                                                const GaussianProcessSystem& system, CoilEffect effect,
+                                                                const Settings& settings, const RunControl& control) {
+  const auto tuning_places = static_cast<std::size_t>(integerSetting(settings, "tuning_places"));
+  FT_TRY(const CoilChoice choice, coilsOf(data, system, effect, tuning_places, control));
+  if (!choice.coils) return std::nullopt;
+  const FitData rest = withoutCoils(data, *choice.coils);
+  FT_TRY(GaussianProcessSystem without, buildSystem(rest, withTruthOf(rest, system.places), settings, control, {}));
+  without.coils = choice.coils;
+  if (without.poses) without.coils->left_sd_m = 0.0;  // The process over poses has its own.
+  without.design = designOf(effect, data, without.places, without.poses.has_value());
+  without.orientations = data.q_tracked;
+  (without.poses ? without.poses->note : without.note) += " " + choice.note;
+  return without;
+}
+
 /// @param coils what they would do to the values, if they may be asked for
 Result<GaussianProcessSystem> buildSystem(const FitData& data, Places places, const Settings& settings,
                                           const RunControl& control, std::optional<CoilEffect> coils) {
@@ -159,17 +179,8 @@ Result<GaussianProcessSystem> buildSystem(const FitData& data, Places places, co
   const std::string& inputs = choiceSetting(settings, "inputs");
   const auto tuning_places = static_cast<std::size_t>(integerSetting(settings, "tuning_places"));
   if (inputs != "position" && coils && choiceSetting(settings, "sensor_coils") == "auto") {
-    FT_TRY(const CoilChoice choice, coilsOf(data, system, *coils, tuning_places, control));
-    if (choice.coils) {
-      const FitData rest = withoutCoils(data, *choice.coils);
-      FT_TRY(GaussianProcessSystem without, buildSystem(rest, withTruthOf(rest, system.places), settings, control, {}));
-      without.coils = choice.coils;
-      if (without.poses) without.coils->left_sd_m = 0.0;  // The process over poses has its own.
-      without.design = designOf(*coils, data, without.places, without.poses.has_value());
-      without.orientations = data.q_tracked;
-      (without.poses ? without.poses->note : without.note) += " " + choice.note;
-      return without;
-    }
+    FT_TRY(auto without, systemWithoutCoils(data, system, *coils, settings, control));
+    if (without) return *std::move(without);
   }
   PoseChoice poses;
   if (inputs != "position") {
@@ -215,19 +226,21 @@ std::unique_ptr<PositionModel> modelOf(const GaussianProcessSystem& system, std:
       system.scales, noise_m2, system.note);
 }
 
+std::unique_ptr<PositionModel> withCoilsOf(const GaussianProcessSystem& system, std::unique_ptr<PositionModel> model) {
+  if (!system.coils) return model;
+  return withCoils(std::move(model), *system.coils, system.design, system.orientations);
+}
+
 Result<std::unique_ptr<PositionModel>> fitSystem(const GaussianProcessSystem& system) {
   if (system.poses)
     return fitPoses(*system.poses).map([&](std::unique_ptr<PositionModel> model) {
-      return system.coils ? withCoils(std::move(model), *system.coils, system.design, system.orientations)
-                          : std::move(model);
+      return withCoilsOf(system, std::move(model));
     });
   const auto projection = TailProjection::of(system.frame.tail(system.places.p_tracked_m));
   if (!projection) return notSolvable(system);
   const auto solution = solveRadial(*projection, matrixOf(system), displacementMatrix(system.places));
   if (!solution) return notSolvable(system);
-  auto model = modelOf(system, {}, *solution);
-  return system.coils ? withCoils(std::move(model), *system.coils, system.design, system.orientations)
-                      : std::move(model);
+  return withCoilsOf(system, modelOf(system, {}, *solution));
 }
 
 Result<std::unique_ptr<PositionModel>> fitGaussianProcess(const FitData& data, const Settings& settings,
