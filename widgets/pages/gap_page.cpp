@@ -14,11 +14,11 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
+#include "acquisition/session/recorded_table.h"
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/report_json.h"
 #include "calib/recording/unit_slip.h"
-#include "calib/tables/table_io.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/figures/field_scale.h"
 #include "widgets/figures/gap_bars.h"
@@ -202,17 +202,18 @@ void GapPage::tryAgainAndAgain() {
 
 void GapPage::chooseEarlier() {
   const QString path =
-      QFileDialog::getOpenFileName(this, tr("Earlier recording of this room"), {}, tr("Node tables (*.csv)"));
+      QFileDialog::getOpenFileName(this, tr("Earlier recording of this room"), Workbench::sessionFolder(),
+                                   tr("Sessions and node tables (*.fieldtrue *.csv)"));
   if (!path.isEmpty()) diagnoseSince(path);
 }
 
 void GapPage::diagnoseSince(const QString& path) {
-  auto earlier = readNodeTable(path.toStdString());
+  auto earlier = acquisition::recordedTable(path);
   if (!earlier) {
     workbench_.showMessage({QString::fromStdString(earlier.error().message), Severity::kAttention, {}, {}});
     return;
   }
-  const auto table = std::make_shared<const CalibrationTable>(std::move(earlier->table));
+  const auto table = std::make_shared<const CalibrationTable>(*std::move(earlier));
   const auto hold = [page = QPointer(this), table, name = QFileInfo(path).fileName()] {
     if (!page) return;
     page->against_name_ = name;

@@ -44,7 +44,7 @@ class GapPage : public QWidget {
   const std::optional<simulation::Scene>& scene() const { return scene_; }
   const std::optional<gap::GapReport>& report() const { return report_; }
   bool isDiagnosing() const { return jobs_.busy(); }
-  /// Diagnoses what changed since an earlier recording, a node table.
+  /// Diagnoses what changed since an earlier recording, a session or a node table.
   void diagnoseSince(const QString& path);
   /// Writes PATH and, beside it, the same as a page: PATH with `.html`. @error kIo
   Result<void> saveReport(const QString& path) const;

@@ -14,6 +14,7 @@
 #include <atomic>
 #include <thread>
 
+#include "acquisition/session/imported_session.h"
 #include "calib/tables/table_writer.h"
 #include "tests/support/matchers.h"
 #include "tests/widgets/gap_fixture.h"
@@ -211,6 +212,12 @@ void GapPageTest::changeSinceIsAskedFor() {
   QVERIFY(page.report()->against && !page.report()->against->changed);
   QCOMPARE(find<QLabel>(page, "headline")->text(), QStringLiteral("Nothing changed since the earlier recording"));
   QVERIFY(find<QLabel>(page, "gapBelieved")->text().contains("yesterday.nodes.csv"));
+  const QString session = folder_.filePath("yesterday.fieldtrue");
+  QVERIFY(acquisition::makeSession(session, room_.table, {}, "yesterday").has_value());
+  page.diagnoseSince(session);
+  QTRY_VERIFY_WITH_TIMEOUT(page.report().has_value() && !page.isDiagnosing(), kWaitMs);
+  QVERIFY(page.report()->against && !page.report()->against->changed);
+  QVERIFY(find<QLabel>(page, "gapBelieved")->text().contains("yesterday.fieldtrue"));
   QVERIFY(!find<QPushButton>(page, "addToSimulation")->isEnabled());
   QCOMPARE(gapField(*page.report(), false).title, QStringLiteral("What changed since the earlier recording"));
   find<QPushButton>(page, "diagnose")->click();
