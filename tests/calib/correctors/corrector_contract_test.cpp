@@ -90,7 +90,7 @@ const std::map<std::string, RotationRecovery> kOrientationRecoveries = {
     {"slerp_trilinear", {turningError, false}},
     {"tetrahedral_quaternion", {turningError, false}},
     {"local_quaternion", {turningError, false}},
-    {"gaussian_process", {turningError, false, 1e-5}},
+    {"gaussian_process", {turningError, false, 1e-4}},
 };
 
 /// Methods that ask for a rectilinear grid in tracked space.
