@@ -19,7 +19,7 @@ namespace fieldtrue::correctors {
 namespace {
 
 constexpr int kMostSteps = 30;
-constexpr double kSettled = 0.04;  ///< Of the noise's SD.
+constexpr double kSettled = 0.04;            ///< Of the noise's SD.
 constexpr std::size_t kCandidatesKept = 90;  ///< Of the first step's, by what each would still add.
 
 /// The linear model of one step, rows whitened, unknowns scaled so that each source moves the places by about its
