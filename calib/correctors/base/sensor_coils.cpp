@@ -60,7 +60,7 @@ class CoilsPosition : public PositionModel {
   std::optional<double> uncertaintyAt_m(const Pose& tracked) const override {
     const auto sd_m = model_->uncertaintyAt_m(tracked);
     const auto weights = design_.rows() > 0 ? model_->weightsAt(tracked) : std::nullopt;
-    if (!sd_m || !weights) return sd_m;
+    if (!sd_m || !weights || weights->size() != design_.rows()) return sd_m;
     const Eigen::Matrix<double, 18, 1> taken = design_.transpose() * *weights;
     const Eigen::Matrix<double, 3, 6> left = coilDerivative(coils_.effect, tracked) - taken.reshaped(3, 6);
     return std::sqrt(*sd_m * *sd_m + (left * coils_.covariance * left.transpose()).trace() +

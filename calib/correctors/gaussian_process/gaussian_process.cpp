@@ -318,8 +318,8 @@ Result<std::unique_ptr<PositionModel>> fitProcessOf(const FitData& data, std::sp
   of_values.noise_m2.clear();
   of_values.jig_sd_m = 0.0;
   for (std::size_t row = 0; row < data.size(); ++row) of_values.p_true_m[row] = data.p_tracked_m[row] + values[row];
-  FT_TRY(const auto system,
-         buildSystem(of_values, withTruthOf(of_values, std::move(places)), settings, control, coils));
+  FT_TRY(auto system, buildSystem(of_values, withTruthOf(of_values, std::move(places)), settings, control, coils));
+  (system.poses ? system.poses->note : system.note).clear();  // It speaks of millimetres.
   return fitSystem(system);
 }
 

@@ -26,8 +26,7 @@ class GaussianProcessOrientation : public ErrorRotationModel {
     return beyondMean(vector_rad_->displacement_m(p_tracked_m));
   }
   Eigen::Quaterniond errorRotationAt(const Pose& tracked) const override {
-    return beyondMean(takesOrientation() ? vector_rad_->displacementAt_m(tracked)
-                                         : vector_rad_->displacement_m(tracked.position_m));
+    return beyondMean(vector_rad_->displacementAt_m(tracked));
   }
   nlohmann::json errorParameters() const override {
     return {{"q_mean_wxyz", jsonOf(q_mean_)}, {"vector_rad", vector_rad_->parameters()}};
@@ -52,13 +51,8 @@ Result<std::unique_ptr<OrientationModel>> fitOrientation(const FitData& data, co
   for (const Eigen::Quaterniond& q : q_error) vectors_rad.push_back(rotationVector_rad(q_mean.conjugate() * q));
   // Seen from the sensor the axis that coils turn about is another one in every orientation.
   const auto coils = frame == ErrorFrame::kTracker ? std::optional(CoilEffect::kTurn) : std::nullopt;
-  FT_TRY(const auto process, fitProcessOf(data, vectors_rad, coils, settings, control));
-  nlohmann::json parameters = process->parameters();
-  (parameters.contains("coils") ? parameters["without_coils"] : parameters)["note"] = "";  // It speaks of millimetres.
-  return readJson<std::unique_ptr<PositionModel>>(parameters, "Gaussian process", readGaussianProcessPosition)
-      .map([&](std::unique_ptr<PositionModel> vector_rad) -> std::unique_ptr<OrientationModel> {
-        return std::make_unique<GaussianProcessOrientation>(frame, q_mean, std::move(vector_rad));
-      });
+  FT_TRY(auto process, fitProcessOf(data, vectors_rad, coils, settings, control));
+  return std::make_unique<GaussianProcessOrientation>(frame, q_mean, std::move(process));
 }
 
 std::vector<Setting> orientationSettings() {

@@ -25,8 +25,9 @@ constexpr std::size_t kRowsOfPoseStarts = 200;
 constexpr int kPoseStartIterations = 25;
 constexpr int kPoseIterations = 40;
 constexpr std::size_t kSearchesOfAll = 2;
-constexpr double kLeastScatter = -9.0;  // log 1e-4, beside what the trend leaves.
-constexpr double kRowSd = 3.0;          // Of the logarithm of the rows' own SD about a tenth of what the trend leaves.
+constexpr std::array<double, 2> kPlainLengths = {0.7, 3.0};  // Of the spread.
+constexpr double kLeastScatter = -9.0;                       // log 1e-4, beside what the trend leaves.
+constexpr double kRowSd = 3.0;  // Of the logarithm of the rows' own SD about a tenth of what the trend leaves.
 
 /// The weak prior of the part that turns: logarithms of its SD beside the signal's, of its stretch and of its length.
 /// And a wall: what coils do is of low degree in the rotation (gains and skew of the second), so that no length is far
@@ -298,7 +299,7 @@ std::optional<PoseScales> rowScales(const PoseSystem& system, const GaussianProc
   const Search search{*likelihood, prior, turn_prior, control};
   // Scales of other values than these may lie in a valley of their own.
   std::optional<Optimum> best = search.from(logarithmsOf(start), kPoseIterations);
-  for (const double length : {0.7, 3.0}) {
+  for (const double length : kPlainLengths) {
     const GaussianProcessScales plain{Eigen::Vector3d::Constant(length * spread_m), std::exp(prior.signal),
                                       std::exp(prior.nugget)};
     const auto other = search.from(logarithmsOf(plain), kPoseIterations);

@@ -9,6 +9,10 @@
 
 namespace fieldtrue::testing {
 
+/// Gains within two per cent of each other and coils half a degree from square.
+inline const correctors::CoilStrain kUnequalCoils =
+    (correctors::CoilStrain() << 0.012, -0.008, 0.004, 0.003, -0.006, 0.005).finished();
+
 inline Eigen::Matrix3d strainMatrix(const correctors::CoilStrain& e) {
   Eigen::Matrix3d strain;
   strain << e[0], e[3], e[4], e[3], e[1], e[5], e[4], e[5], e[2];

@@ -17,8 +17,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-const CoilStrain kUnequal = (CoilStrain() << 0.012, -0.008, 0.004, 0.003, -0.006, 0.005).finished();
-
 /// What bends the field at a place turns every reading there alike, by up to two degrees.
 Eigen::Quaterniond bendAt(const Eigen::Vector3d& p_m) {
   return rotationFromVector(0.03 * Eigen::Vector3d(std::sin(2.0 * p_m.y()), std::cos(3.0 * p_m.x()), p_m.z()));
@@ -90,15 +88,15 @@ class GaussianProcessOrientationTest : public QObject {
   }
   void coilsAreTakenOut() {
     QFETCH(int, orientations);
-    const FitData data = dataOf(orientations, kUnequal);
+    const FitData data = dataOf(orientations, kUnequalCoils);
     const auto model = fittedTo(data);
     FT_VERIFY_OK(model);
     QVERIFY((*model)->takesOrientation());
     const auto of_position = fittedTo(data, {{"inputs", "position"}});
     FT_VERIFY_OK(of_position);
     QVERIFY(!(*of_position)->takesOrientation());
-    const double left_rad = leftAt(**model, kUnequal, 5);
-    const double left_by_position_rad = leftAt(**of_position, kUnequal, 5);
+    const double left_rad = leftAt(**model, kUnequalCoils, 5);
+    const double left_by_position_rad = leftAt(**of_position, kUnequalCoils, 5);
     const std::string both = std::to_string(left_rad) + " and " + std::to_string(left_by_position_rad);
     QVERIFY2(left_rad < 0.004 && left_by_position_rad > 0.02, both.c_str());
   }
@@ -125,7 +123,7 @@ class GaussianProcessOrientationTest : public QObject {
   }
 
   void isReadBackToTheBit() {
-    const auto model = fittedTo(dataOf(0, kUnequal));
+    const auto model = fittedTo(dataOf(0, kUnequalCoils));
     FT_VERIFY_OK(model);
     const auto read =
         findOrientationMethod("gaussian_process").value()->load(nlohmann::json::parse((*model)->parameters().dump()));

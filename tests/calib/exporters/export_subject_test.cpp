@@ -18,8 +18,6 @@ namespace {
 
 /// 60 places, each in three orientations, read by a sensor of unequal coils.
 CalibrationTable turnedTable() {
-  const correctors::CoilStrain strain =
-      (correctors::CoilStrain() << 0.012, -0.008, 0.004, 0.003, -0.006, 0.0).finished();
   RandomGeometry random(2);
   const std::vector<Eigen::Quaterniond> turns = {random.rotation(), random.rotation(), random.rotation()};
   CalibrationTable table;
@@ -31,7 +29,7 @@ CalibrationTable turnedTable() {
       node.node = number;
       node.visit = static_cast<int>(visit);
       node.reference_from_sensor = {at_m + Eigen::Vector3d(0.5, 0.0, 0.0), turns[visit]};
-      node.tracker_from_sensor = readBy(node.reference_from_sensor.position_m, turns[visit], strain);
+      node.tracker_from_sensor = readBy(node.reference_from_sensor.position_m, turns[visit], kUnequalCoils);
       table.nodes.push_back(node);
     }
     ++number;
