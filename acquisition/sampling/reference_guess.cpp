@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "calib/core/geometry.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::acquisition {
 

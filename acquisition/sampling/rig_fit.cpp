@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "calib/core/geometry.h"
 #include "calib/core/statistics.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::acquisition {
 

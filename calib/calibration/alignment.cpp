@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "calib/calibration/corrector.h"
-#include "calib/core/grid_index.h"
 #include "calib/core/place_name.h"
 #include "calib/core/statistics.h"
+#include "calib/geometry/grid_index.h"
 
 namespace fieldtrue::calibration {
 namespace {

@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "calib/calibration/alignment.h"
-#include "calib/core/spacing.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/baked/baked_position.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/readers.h"
 #include "calib/correctors/registry.h"
+#include "calib/geometry/spacing.h"
 #include "calib/tables/table_setup.h"
 
 namespace fieldtrue::calibration {

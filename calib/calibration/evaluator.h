@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "calib/calibration/alignment.h"
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/orientation_model.h"
 #include "calib/correctors/base/position_model.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::calibration {
 

@@ -7,9 +7,9 @@
 #include <numeric>
 #include <random>
 
-#include "calib/core/region_shares.h"
 #include "calib/correctors/base/fit_rows.h"
 #include "calib/correctors/base/method.h"
+#include "calib/geometry/region_shares.h"
 
 namespace fieldtrue::correctors {
 namespace {

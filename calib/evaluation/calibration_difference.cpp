@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/statistics.h"
 #include "calib/core/units.h"
@@ -16,6 +15,7 @@
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/judged_calibration.h"
 #include "calib/evaluation/region/region_lattice.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::evaluation {
 

@@ -6,14 +6,14 @@
 #include <map>
 #include <set>
 
-#include "calib/core/convex_hull.h"
-#include "calib/core/spacing.h"
 #include "calib/evaluation/base/figures.h"
 #include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/evaluation/region/region_lattice.h"
 #include "calib/evaluation/verdict.h"
+#include "calib/geometry/convex_hull.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::evaluation {
 namespace {

@@ -2,7 +2,6 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
-#include "calib/core/spacing.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/regrid/regrid_error.h"
 #include "calib/evaluation/base/figures.h"
@@ -11,6 +10,7 @@
 #include "calib/evaluation/limits.h"
 #include "calib/evaluation/region/region_lattice.h"
 #include "calib/evaluation/verdict.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::evaluation {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "calib/core/geometry.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::exporters {
 

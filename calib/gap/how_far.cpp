@@ -5,9 +5,9 @@
 #include <limits>
 #include <numeric>
 
-#include "calib/core/region_shares.h"
 #include "calib/core/statistics.h"
 #include "calib/evaluation/base/intervals.h"
+#include "calib/geometry/region_shares.h"
 
 namespace fieldtrue::gap {
 namespace {

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <random>
 
-#include "calib/core/geometry.h"
 #include "calib/core/statistics.h"
 #include "calib/effects/registry.h"
 #include "calib/gap/verdict.h"
+#include "calib/geometry/geometry.h"
 #include "calib/identify/unnamed.h"
 
 namespace fieldtrue::gap {

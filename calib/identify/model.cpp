@@ -1,8 +1,8 @@
 #include "calib/identify/model.h"
 
-#include "calib/core/geometry.h"
 #include "calib/core/statistics.h"
 #include "calib/field/tracker_model.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::identify {
 

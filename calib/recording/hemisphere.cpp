@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "calib/core/geometry.h"
 #include "calib/core/statistics.h"
+#include "calib/geometry/geometry.h"
 #include "calib/recording/cleaning.h"
 
 namespace fieldtrue::recording {

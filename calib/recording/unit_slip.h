@@ -8,7 +8,7 @@
 
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
-#include "calib/core/geometry.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::recording {
 

@@ -4,8 +4,8 @@
 #include <span>
 
 #include "calib/core/error.h"
-#include "calib/core/geometry.h"
 #include "calib/correctors/base/orientation_model.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::runtime {
 

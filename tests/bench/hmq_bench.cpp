@@ -11,12 +11,12 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "calib/core/geometry.h"
 #include "calib/correctors/baked/baked_lattice_maker.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/multiquadric/hmq_kernel.h"
 #include "calib/correctors/numerics/aligned_vector.h"
 #include "calib/correctors/registry.h"
+#include "calib/geometry/geometry.h"
 #include "tests/bench/bent_grid.h"
 #include "tests/bench/hmq_peers.h"
 #include "tests/bench/square_roots.h"

@@ -3,9 +3,9 @@
 #include <memory>
 #include <span>
 
-#include "calib/core/geometry.h"
 #include "calib/core/run_control.h"
 #include "calib/correctors/baked/baked_lattice.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 

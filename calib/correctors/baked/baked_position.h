@@ -3,10 +3,10 @@
 #include <memory>
 #include <span>
 
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/run_control.h"
 #include "calib/correctors/base/position_model.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/orientation_model.h"
 #include "calib/correctors/base/position_model.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <random>
 
-#include "calib/core/geometry.h"
 #include "calib/correctors/baked/turning_lattices.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/radial/turn_correlation.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 namespace {

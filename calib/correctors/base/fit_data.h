@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "calib/core/calibration_table.h"
-#include "calib/core/geometry.h"
 #include "calib/core/units.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <set>
 
-#include "calib/core/geometry.h"
 #include "calib/correctors/base/fit_names.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 namespace {

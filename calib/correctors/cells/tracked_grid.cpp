@@ -6,11 +6,11 @@
 #include <numeric>
 
 #include "calib/core/declare.h"
-#include "calib/core/geometry.h"
-#include "calib/core/grid_index.h"
 #include "calib/correctors/base/fit_names.h"
 #include "calib/correctors/cells/local_interpolation.h"
 #include "calib/correctors/regrid/regrid.h"
+#include "calib/geometry/geometry.h"
+#include "calib/geometry/grid_index.h"
 
 namespace fieldtrue::correctors {
 namespace {

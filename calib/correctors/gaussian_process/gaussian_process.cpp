@@ -7,7 +7,6 @@
 
 #include "calib/core/declare.h"
 #include "calib/core/json_reader.h"
-#include "calib/core/spacing.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/readers.h"
@@ -17,6 +16,7 @@
 #include "calib/correctors/gaussian_process/gaussian_process_tuning.h"
 #include "calib/correctors/gaussian_process/pose_process.h"
 #include "calib/correctors/radial/rbf_system.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::correctors {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "calib/core/spacing.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/gaussian_process/gaussian_process_likelihood.h"
 #include "calib/correctors/gaussian_process/gaussian_process_search.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::correctors {
 namespace {

@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <map>
 
-#include "calib/core/spacing.h"
 #include "calib/core/units.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/gaussian_process/pose_process.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::correctors {
 namespace {

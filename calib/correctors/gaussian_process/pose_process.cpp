@@ -3,10 +3,10 @@
 #include <cmath>
 #include <mutex>
 
-#include "calib/core/geometry.h"
 #include "calib/correctors/baked/turning_lattices_maker.h"
 #include "calib/correctors/base/fit_memory.h"
 #include "calib/correctors/gaussian_process/gaussian_process_posterior.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 namespace {

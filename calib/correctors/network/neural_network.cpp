@@ -3,7 +3,6 @@
 #include <cstdio>
 
 #include "calib/core/declare.h"
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/base/method.h"
@@ -12,6 +11,7 @@
 #include "calib/correctors/base/soft_box.h"
 #include "calib/correctors/network/feed_forward_network.h"
 #include "calib/correctors/network/neural_network_training.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 namespace {

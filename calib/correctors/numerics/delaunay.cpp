@@ -7,7 +7,7 @@ extern "C" {
 #include <libqhull_r/qhull_ra.h>
 }
 
-#include "calib/core/qhull_run.h"
+#include "calib/geometry/qhull_run.h"
 
 namespace fieldtrue::correctors {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 namespace {

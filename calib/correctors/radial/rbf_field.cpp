@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/multiquadric/hmq_kernel.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 namespace {

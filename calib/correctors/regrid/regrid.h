@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "calib/core/error.h"
-#include "calib/core/geometry.h"
 #include "calib/core/pose.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 

@@ -3,7 +3,6 @@
 #include <cstdio>
 
 #include "calib/core/declare.h"
-#include "calib/core/geometry.h"
 #include "calib/core/json_reader.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/readers.h"
@@ -11,6 +10,7 @@
 #include "calib/correctors/radial/field_position.h"
 #include "calib/correctors/radial/rbf_system.h"
 #include "calib/correctors/splines/bspline_fit.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
 namespace {

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "calib/core/spacing.h"
 #include "calib/evaluation/base/index_source.h"
 #include "calib/evaluation/orientation/orientation_models.h"
 #include "calib/evaluation/orientation/orientation_rows.h"
 #include "calib/evaluation/region/region_lattice.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::evaluation {
 namespace {

@@ -10,14 +10,14 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
-#include "calib/core/convex_hull.h"
 #include "calib/core/number_text.h"
 #include "calib/core/place_name.h"
-#include "calib/core/spacing.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/evaluation/base/figures.h"
 #include "calib/evaluation/region/region_lattice.h"
+#include "calib/geometry/convex_hull.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::evaluation {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "calib/core/calibration_table.h"
-#include "calib/core/geometry.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::evaluation {
 

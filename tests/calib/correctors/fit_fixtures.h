@@ -9,10 +9,10 @@
 #include <set>
 #include <vector>
 
-#include "calib/core/geometry.h"
 #include "calib/correctors/base/fit_data.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::testing {
 

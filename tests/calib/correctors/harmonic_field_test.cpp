@@ -3,7 +3,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "calib/core/geometry.h"
 #include "calib/correctors/baked/baked_lattice_maker.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/rows.h"
@@ -13,6 +12,7 @@
 #include "calib/effects/compact_metal.h"
 #include "calib/field/pose_solver.h"
 #include "calib/field/tracker_model.h"
+#include "calib/geometry/geometry.h"
 #include "tests/calib/correctors/fit_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random_geometry.h"

@@ -38,30 +38,6 @@ identify::GapRows gridRows() {
 class HowFarTest : public QObject {
   Q_OBJECT
  private slots:
-  /// Of a grid of 3 x 3 x 3 the place in the middle is nearest to an eighth of the box, a face's to a sixteenth, an
-  /// edge's to 1/32, a corner's to 1/64.
-  void aPlaceStandsForWhatIsNearestToIt() {
-    const std::vector<double> shares = regionShares(gridRows());
-    FT_VERIFY_MATCH(near(shares[13], 1.0 / 8.0, 2e-3));
-    FT_VERIFY_MATCH(near(shares[4], 1.0 / 16.0, 2e-3));
-    FT_VERIFY_MATCH(near(shares[1], 1.0 / 32.0, 2e-3));
-    FT_VERIFY_MATCH(near(shares[0], 1.0 / 64.0, 2e-3));
-    double sum = 0.0;
-    for (const double share : shares) sum += share;
-    FT_VERIFY_MATCH(near(sum, 1.0, 1e-12));
-  }
-
-  /// In one plane the shares are of its area.
-  void placesInAPlane() {
-    std::vector<Eigen::Vector3d> places_m;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) places_m.emplace_back(0.3 * i, 0.3 * j, 0.5);
-    const std::vector<double> shares = regionShares(rowsAt(places_m));
-    FT_VERIFY_MATCH(near(shares[4], 1.0 / 4.0, 2e-3));
-    FT_VERIFY_MATCH(near(shares[1], 1.0 / 8.0, 2e-3));
-    FT_VERIFY_MATCH(near(shares[0], 1.0 / 16.0, 2e-3));
-  }
-
   /// Mean squares of 25, 9 and 4 mm2 over a floor of 4: 21 at the start, 5 with one effect, nothing with two; a floor
   /// above what is left gives a share below nothing.
   void squaresLessTheFloor() {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "calib/core/geometry.h"
+#include "calib/geometry/geometry.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "tests/support/matchers.h"

@@ -1,10 +1,10 @@
-#include "calib/core/region_shares.h"
+#include "calib/geometry/region_shares.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 
-#include "calib/core/convex_hull.h"
+#include "calib/geometry/convex_hull.h"
 
 namespace fieldtrue {
 namespace {

@@ -1,4 +1,4 @@
-#include "calib/core/grid_index.h"
+#include "calib/geometry/grid_index.h"
 
 #include <algorithm>
 #include <map>

@@ -1,4 +1,4 @@
-#include "calib/core/qhull_run.h"
+#include "calib/geometry/qhull_run.h"
 
 #include <string>
 

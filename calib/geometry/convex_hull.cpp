@@ -1,4 +1,4 @@
-#include "calib/core/convex_hull.h"
+#include "calib/geometry/convex_hull.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@ extern "C" {
 #include <libqhull_r/qhull_ra.h>
 }
 
-#include "calib/core/qhull_run.h"
+#include "calib/geometry/qhull_run.h"
 
 namespace fieldtrue {
 

@@ -1,4 +1,4 @@
-#include "calib/core/geometry.h"
+#include "calib/geometry/geometry.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
@@ -8,8 +8,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "calib/core/convex_hull.h"
 #include "calib/core/json_reader.h"
+#include "calib/geometry/convex_hull.h"
 
 namespace fieldtrue {
 

@@ -1,4 +1,4 @@
-#include "calib/core/spacing.h"
+#include "calib/geometry/spacing.h"
 
 #include <QTest>
 #include <vector>

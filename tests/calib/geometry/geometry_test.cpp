@@ -1,4 +1,4 @@
-#include "calib/core/geometry.h"
+#include "calib/geometry/geometry.h"
 
 #include <QTest>
 #include <cmath>
