@@ -2,9 +2,9 @@
 
 #include <QTest>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
+#include "calib/core/units.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -12,7 +12,6 @@ using namespace fieldtrue;
 using namespace fieldtrue::testing;
 
 namespace {
-constexpr double kPi = std::numbers::pi;
 const double kHalf = std::sqrt(0.5);
 }  // namespace
 

@@ -2,8 +2,8 @@
 
 #include <QTest>
 #include <cmath>
-#include <numbers>
 
+#include "calib/core/units.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -13,7 +13,6 @@ using fieldtrue::testing::near;
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 const Metal kAluminium{3.5e7, 1.0};
 const Metal kCopper{5.8e7, 1.0};
 const Metal kSteel{6e6, 100.0};

@@ -3,9 +3,9 @@
 #include <vtkRenderer.h>
 
 #include <QTest>
-#include <numbers>
 
 #include "calib/core/number_text.h"
+#include "calib/core/units.h"
 #include "tests/support/test_main.h"
 #include "widgets/figures/scene_space.h"
 #include "widgets/views/charts/histogram_scene.h"
@@ -16,8 +16,6 @@ using namespace fieldtrue;
 using namespace fieldtrue::widgets;
 
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 std::vector<Eigen::Vector3d> grid(int nx, int ny, int nz, const Eigen::Vector3d& pitch) {
   std::vector<Eigen::Vector3d> points;
