@@ -17,6 +17,7 @@
 #include "app/cli_values.h"
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
+#include "calib/gap/plan_check.h"
 #include "calib/gap/report_json.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/report/gap_section.h"
@@ -190,15 +191,16 @@ Outcome runPlanCheck(const PlanCheckOptions& options, const CommonOptions& commo
     if (!read) return tl::unexpected(read.error());
     scene = *std::move(read);
   }
-  const auto isolability = stoppable<gap::Isolability>(runControl(common, "checking"), [&](const RunControl& control) {
+  const auto check = stoppable<gap::PlanCheck>(runControl(common, "checking"), [&](const RunControl& control) {
     return gap::planCheck(*places, scene ? &*scene : nullptr, control);
   });
-  if (!isolability) return notPossible(isolability.error());
+  if (!check) return notPossible(check.error());
   Answer answer;
-  answer.json = toJson(*isolability);
+  answer.json = toJson(check->isolability);
+  answer.json["orientations"] = toJson(check->orientations);
   answer.json["schema"] = "fieldtrue.plan-check/1";
   answer.json["rows"] = places->size();
-  answer.text = isolabilityText(*isolability);
+  answer.text = isolabilityText(check->isolability) + "\n" + check->orientations.text + "\n";
   return answer;
 }
 

@@ -30,13 +30,8 @@ constexpr std::size_t kStartsForIsolability = 24;
 
 Result<std::vector<std::unique_ptr<field::PhysicalEffect>>> believedEffects(const simulation::Scene* scene,
                                                                             const field::Excitation& excitation) {
-  std::vector<std::unique_ptr<field::PhysicalEffect>> effects;
-  if (scene == nullptr) return effects;
-  for (const simulation::EffectInstance& instance : scene->effects) {
-    FT_TRY(auto effect, effects::makeEffect(instance.id, instance.parameters, excitation));
-    effects.push_back(std::move(effect));
-  }
-  return effects;
+  if (scene == nullptr) return std::vector<std::unique_ptr<field::PhysicalEffect>>();
+  return simulation::makeEffects(scene->effects, excitation);
 }
 
 void takeFromScene(const simulation::Scene* scene, const TableMetadata& metadata, identify::GapRows& rows) {
@@ -270,72 +265,6 @@ simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& 
   for (const SelectedEffect& effect : report.selected)
     if (effect.scene_parameters.is_object()) updated.effects.push_back({effect.effect, effect.scene_parameters});
   return updated;
-}
-
-namespace {
-
-/// The transmitter one pitch behind the middle of the grid's first face, where no scene says otherwise.
-Pose defaultTransmitter(std::span<const PlannedPlace> plan) {
-  Eigen::AlignedBox3d box;
-  for (const PlannedPlace& place : plan) box.extend(place.reference_from_sensor.position_m);
-  Pose reference_from_tracker;
-  reference_from_tracker.position_m = box.center();
-  reference_from_tracker.position_m.x() = box.min().x() - std::max(0.3, 0.25 * box.sizes().x());
-  return reference_from_tracker;
-}
-
-/// The rows that a plan would give were nothing wrong, with the noise of the scene's tracker and rig.
-Result<identify::GapRows> plannedRows(std::span<const PlannedPlace> plan, const simulation::Scene& scene) {
-  constexpr double kSecondsEach = 10.0;
-  constexpr double kSamplesEach = 60.0;
-  const Pose tracker_from_reference = inverse(scene.reference_from_tracker);
-  std::vector<Node> nodes;
-  for (const PlannedPlace& place : plan) {
-    if (place.role == NodeRole::kSkipped) continue;
-    Node node;
-    node.node = place.node;
-    node.visit = place.visit;
-    node.index = place.index;
-    node.reference_from_sensor = place.reference_from_sensor;
-    node.tracker_from_sensor = tracker_from_reference * place.reference_from_sensor;
-    const Eigen::Matrix<double, 6, 9> by_field = field::poseByField(node.tracker_from_sensor.position_m);
-    const double sd = scene.tracker.coupling_noise / scene.tracker.dipole_constant_m3;
-    node.covariance_m2 = sd * sd * by_field.topRows<3>() * by_field.topRows<3>().transpose();
-    node.sd_rot_rad = sd * by_field.bottomRows<3>().norm();
-    node.n_used = static_cast<int>(kSamplesEach);
-    node.n_effective = kSamplesEach * (1.0 - scene.tracker.correlation) / (1.0 + scene.tracker.correlation);
-    node.t_start_s = kSecondsEach * static_cast<double>(nodes.size());
-    node.t_end_s = node.t_start_s;
-    nodes.push_back(node);
-  }
-  TableMetadata metadata;
-  metadata.alignment_known = scene.rig.alignment_known;
-  metadata.alignment_tolerance_m = scene.rig.alignment_tolerance_m;
-  metadata.alignment_tolerance_rad = scene.rig.alignment_tolerance_rad;
-  metadata.jig_tolerance_m = scene.rig.tolerance_m > 0.0 ? scene.rig.tolerance_m : 2e-3;
-  metadata.jig_tolerance_rad = scene.rig.tolerance_rad > 0.0 ? scene.rig.tolerance_rad : 3.5e-3;
-  auto rows = identify::makeGapRows(nodes, metadata);
-  if (rows) rows->stated_tracker_from_reference = tracker_from_reference;
-  return rows;
-}
-
-}  // namespace
-
-Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const simulation::Scene* scene,
-                              const RunControl& control) {
-  simulation::Scene believed = scene != nullptr ? *scene : simulation::Scene{};
-  if (scene == nullptr) believed.reference_from_tracker = defaultTransmitter(plan);
-  FT_TRY(auto rows, plannedRows(plan, believed));
-  if (rows.place_nodes.size() < identify::kFewestPlacesForCauses) {
-    return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " +
-                                             std::to_string(identify::kFewestPlacesForCauses) +
-                                             " places; this one has " + std::to_string(rows.place_nodes.size()) + ".");
-  }
-  FT_TRY(auto effects, believedEffects(&believed, rows.excitation));
-  const identify::GapSearch search(rows, std::move(effects), identify::NoiseFrom::kStated);
-  Isolability isolability = isolabilityOf(search, 60, control);
-  if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The check of the plan was stopped.");
-  return isolability;
 }
 
 }  // namespace fieldtrue::gap

@@ -34,11 +34,4 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
 /// The scene with the selected effects of a report added; the transmitter's pose and signal effects are taken over too.
 simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report);
 
-/// Which effects a planned grid can tell apart, before a day is spent on it.
-/// @param scene the tracker, its place in the rig's frame and the tolerances; null = the default tracker one pitch
-/// behind the middle of the grid's first face
-/// @error kTooFewNodes; kCancelled
-Result<Isolability> planCheck(std::span<const PlannedPlace> plan, const simulation::Scene* scene,
-                              const RunControl& control = {});
-
 }  // namespace fieldtrue::gap

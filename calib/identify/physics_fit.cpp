@@ -19,10 +19,7 @@ ScenePositions::ScenePositions(PositionScene scene)
 
 Result<ScenePositions> ScenePositions::make(PositionScene scene) {
   ScenePositions positions(std::move(scene));
-  for (const simulation::EffectInstance& instance : positions.scene_.effects) {
-    FT_TRY(auto effect, effects::makeEffect(instance.id, instance.parameters));
-    positions.effects_.push_back(std::move(effect));
-  }
+  FT_TRY(positions.effects_, simulation::makeEffects(positions.scene_.effects));
   for (const Eigen::Vector3d& p_m : positions.scene_.places_m) {
     const auto report_m = positions.trackedPosition_m(p_m, positions.scene_.tracker_from_reference * p_m);
     positions.reports_m_.push_back(

@@ -113,6 +113,16 @@ field::Excitation excitationOf(const TrackerModel& tracker) {
   return {tracker.excitation == "pulsed_dc", tracker.carrier_hz, tracker.sampling_delay_s};
 }
 
+Result<std::vector<std::unique_ptr<field::PhysicalEffect>>> makeEffects(std::span<const EffectInstance> instances,
+                                                                        const field::Excitation& excitation) {
+  std::vector<std::unique_ptr<field::PhysicalEffect>> made;
+  for (const EffectInstance& instance : instances) {
+    FT_TRY(auto effect, effects::makeEffect(instance.id, instance.parameters, excitation));
+    made.push_back(std::move(effect));
+  }
+  return made;
+}
+
 Result<Scene> sceneFromJson(const nlohmann::json& json, const std::string& name) {
   return readJson<Scene>(json, name, sceneFrom);
 }

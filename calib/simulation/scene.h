@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -46,6 +48,10 @@ struct EffectInstance {
   std::string id;
   nlohmann::json parameters;
 };
+
+/// The effects themselves, in their order. @error kBadInput as effects::makeEffect, of the first that cannot be made
+Result<std::vector<std::unique_ptr<field::PhysicalEffect>>> makeEffects(std::span<const EffectInstance> instances,
+                                                                        const field::Excitation& excitation = {});
 
 /// What the simulator believes about the room. Effects' positions are in the tracker (transmitter) frame [m].
 struct Scene {

@@ -150,9 +150,12 @@ class CliGapTest : public QObject {
     }
     // A unit error of the jig and of the tracker are the same thing.
     FT_VERIFY_MATCH(near(scales, 1.0, 1e-3));
+    QCOMPARE(result["orientations"]["count"].get<int>(), 1);
+    QCOMPARE(result["orientations"]["coil_ways_told"].get<int>(), 0);
     const CliRun text = runCli({"plan-check", "--plan", kPlan});
     FT_VERIFY_STATUS(text, 0);
     QVERIFY(text.out.contains("cannot be told apart"));
+    QVERIFY(text.out.contains("One orientation: a correction holds"));
   }
 
   void theBlindProgramIsStartedOrMissed() {

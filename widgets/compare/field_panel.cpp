@@ -169,6 +169,7 @@ void FieldPanel::setComparison(const CalibrationTable& table, const std::optiona
   comparison_ = comparison;
   orientation_row_.reset();
   volume_bar_->setLattice(comparison ? latticeAround(table) : VolumeField{});
+  volume_bar_->setWaysHeld(waysHeld(table));
   fillChoosers();
   if (!comparison_) return;
   setLeft(positionRow(*comparison_, left));
@@ -257,8 +258,9 @@ void FieldPanel::draw() {
 VolumeKey FieldPanel::keyOf(const FieldView* view) const {
   const VolumeQuantity quantity = volume_bar_->quantity();
   if (quantity != VolumeQuantity::kNone && view_bar_->mode() == ViewBar::Mode::kDifference)
-    return {VolumeQuantity::kCorrection, left(), right(), true};
-  return {quantity, view == left_ ? left() : right(), std::nullopt, false};
+    return {VolumeQuantity::kCorrection, left(), right(), true, volume_bar_->held()};
+  const int held = quantity == VolumeQuantity::kExpectedError ? kMeanHeld : volume_bar_->held();
+  return {quantity, view == left_ ? left() : right(), std::nullopt, false, held};
 }
 
 void FieldPanel::drawVolume() {

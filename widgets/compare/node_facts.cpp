@@ -22,15 +22,6 @@ QString roleText(NodeRole role) {
   return QObject::tr("skipped");
 }
 
-/// Azimuth, elevation and roll as the trackers name them.
-QString turnText(const Eigen::Quaterniond& orientation) {
-  const Eigen::Vector3d angles_deg = kDegPerRad * eulerFromRotation_rad(orientation);
-  return QObject::tr("azimuth %1\u00b0   elevation %2\u00b0   roll %3\u00b0")
-      .arg(angles_deg.x(), 0, 'f', 1)
-      .arg(angles_deg.y(), 0, 'f', 1)
-      .arg(angles_deg.z(), 0, 'f', 1);
-}
-
 QString scatterText(const Node& node) {
   if (!node.covariance_m2) return QObject::tr("not stated");
   const Eigen::Vector3d sd_mm = 1000.0 * node.covariance_m2->diagonal().cwiseMax(0.0).cwiseSqrt();

@@ -23,6 +23,7 @@ constexpr double kMostIso_mm = 2000.0;
 VolumeBar::VolumeBar(QWidget* parent)
     : QWidget(parent),
       quantity_(new QComboBox(this)),
+      held_(new QComboBox(this)),
       show_slice_(new QCheckBox(tr("Slice"), this)),
       axis_(new QComboBox(this)),
       position_(new QSlider(Qt::Horizontal, this)),
@@ -43,10 +44,16 @@ VolumeBar::VolumeBar(QWidget* parent)
     showState();
     emit quantityChanged();
   });
+  held_->setObjectName(QStringLiteral("volumeHeld"));
+  held_->setAccessibleName(tr("How the sensor is held"));
+  held_->setToolTip(tr("How the sensor is held, for corrections that take orientation: azimuth, elevation, roll"));
+  held_->hide();
+  connect(held_, &QComboBox::currentIndexChanged, this, &VolumeBar::quantityChanged);
   makeSlice();
   makeIso();
   auto* row = new QHBoxLayout;
   row->addWidget(quantity_);
+  row->addWidget(held_);
   row->addWidget(show_slice_);
   row->addWidget(axis_);
   row->addWidget(position_, 1);
@@ -108,6 +115,17 @@ void VolumeBar::makeIso() {
 
 VolumeQuantity VolumeBar::quantity() const { return static_cast<VolumeQuantity>(quantity_->currentData().toInt()); }
 
+void VolumeBar::setWaysHeld(const std::vector<Eigen::Quaterniond>& ways) {
+  const QSignalBlocker quiet(held_);
+  held_->clear();
+  held_->addItem(tr("Mean of all turns"), kMeanHeld);
+  for (std::size_t i = 0; i < ways.size(); ++i)
+    held_->addItem(tr("Turned by %1").arg(shortTurnText(ways[i])), static_cast<int>(i));
+  held_->setVisible(ways.size() > 1);
+}
+
+int VolumeBar::held() const { return held_->count() == 0 ? kMeanHeld : held_->currentData().toInt(); }
+
 void VolumeBar::setQuantity(VolumeQuantity quantity) {
   quantity_->setCurrentIndex(quantity_->findData(static_cast<int>(quantity)));
 }
@@ -155,6 +173,7 @@ QString VolumeBar::text() const { return text_->text(); }
 void VolumeBar::showState() {
   const bool on = quantity() != VolumeQuantity::kNone;
   show_slice_->setEnabled(on);
+  held_->setEnabled(quantity() == VolumeQuantity::kCorrection || quantity() == VolumeQuantity::kUncertainty);
   show_iso_->setEnabled(on);
   for (QWidget* widget : {static_cast<QWidget*>(axis_), static_cast<QWidget*>(position_)})
     widget->setEnabled(on && show_slice_->isChecked());

@@ -19,6 +19,9 @@ class VolumeBar : public QWidget {
   explicit VolumeBar(QWidget* parent = nullptr);
 
   VolumeQuantity quantity() const;
+  /// The ways a sensor may be held, of which one is chosen, or the mean over all; asked for where there are several.
+  void setWaysHeld(const std::vector<Eigen::Quaterniond>& ways);
+  int held() const;
   void setQuantity(VolumeQuantity quantity);
   /// In a difference the quantity is always the distance between the two.
   void setDifference(bool difference);
@@ -45,6 +48,7 @@ class VolumeBar : public QWidget {
   double position_m() const;
 
   QComboBox* quantity_;
+  QComboBox* held_;
   QCheckBox* show_slice_;
   QComboBox* axis_;
   QSlider* position_;

@@ -5,7 +5,9 @@
 #include <functional>
 #include <limits>
 
+#include "calib/core/units.h"
 #include "calib/correctors/regrid/regrid.h"
+#include "calib/geometry/geometry.h"
 #include "widgets/figures/scene_space.h"
 
 namespace fieldtrue::widgets {
@@ -31,7 +33,24 @@ VolumeField sample(VolumeField lattice, const RunControl& control,
   return lattice;
 }
 
+Eigen::Vector3d corrected_m(const calibration::Corrector& corrector, const Eigen::Vector3d& p_tracked_m,
+                            const Held& held) {
+  return held ? corrector.correct(Pose{p_tracked_m, *held}).position_m : corrector.correctPosition_m(p_tracked_m);
+}
+
 }  // namespace
+
+std::vector<Eigen::Quaterniond> waysHeld(const CalibrationTable& table) {
+  constexpr double kWithin_rad = 5.0 * kRadPerDeg;
+  constexpr std::size_t kMost = 24;
+  std::vector<Eigen::Quaterniond> held;
+  for (const Node& node : table.nodes)
+    if (node.has_orientation && node.role != NodeRole::kSkipped) held.push_back(node.tracker_from_sensor.orientation);
+  std::vector<Eigen::Quaterniond> ways = distinctRotations(held, kWithin_rad);
+  if (ways.size() < 2) return {};
+  ways.resize(std::min(ways.size(), kMost));
+  return ways;
+}
 
 VolumeField latticeAround(const CalibrationTable& table, int most_points) {
   const std::vector<Eigen::Vector3d> points_m = pointsOf(truePositions_m(table));
@@ -56,32 +75,35 @@ VolumeField latticeAround(const CalibrationTable& table, int most_points) {
   return lattice;
 }
 
-VolumeField correctionVolume(const calibration::Corrector& corrector, VolumeField lattice, const RunControl& control) {
+VolumeField correctionVolume(const calibration::Corrector& corrector, const Held& held, VolumeField lattice,
+                             const RunControl& control) {
   const Pose reference_from_tracker = corrector.alignment().reference_from_tracker;
   const Pose tracker_from_reference = inverse(reference_from_tracker);
   return sample(std::move(lattice), control, [&](const Eigen::Vector3d& at_m) {
     const Eigen::Vector3d p_tracked_m = tracker_from_reference * at_m;
     if (!corrector.covers(p_tracked_m)) return kNan;
-    return 1000.0 * (corrector.correctPosition_m(p_tracked_m) - at_m).norm();
+    return 1000.0 * (corrected_m(corrector, p_tracked_m, held) - at_m).norm();
   });
 }
 
-VolumeField differenceVolume(const calibration::Corrector& a, const calibration::Corrector& b, VolumeField lattice,
-                             const RunControl& control) {
+VolumeField differenceVolume(const calibration::Corrector& a, const calibration::Corrector& b, const Held& held,
+                             VolumeField lattice, const RunControl& control) {
   const Pose tracker_from_reference = inverse(a.alignment().reference_from_tracker);
   return sample(std::move(lattice), control, [&](const Eigen::Vector3d& at_m) {
     const Eigen::Vector3d p_tracked_m = tracker_from_reference * at_m;
     if (!a.covers(p_tracked_m) || !b.covers(p_tracked_m)) return kNan;
-    return 1000.0 * (a.correctPosition_m(p_tracked_m) - b.correctPosition_m(p_tracked_m)).norm();
+    return 1000.0 * (corrected_m(a, p_tracked_m, held) - corrected_m(b, p_tracked_m, held)).norm();
   });
 }
 
-VolumeField uncertaintyVolume(const calibration::Corrector& corrector, VolumeField lattice, const RunControl& control) {
+VolumeField uncertaintyVolume(const calibration::Corrector& corrector, const Held& held, VolumeField lattice,
+                              const RunControl& control) {
   const Pose tracker_from_reference = inverse(corrector.alignment().reference_from_tracker);
   return sample(std::move(lattice), control, [&](const Eigen::Vector3d& at_m) {
     const Eigen::Vector3d p_tracked_m = tracker_from_reference * at_m;
     if (!corrector.covers(p_tracked_m)) return kNan;
-    const std::optional<double> sd_m = corrector.uncertainty_m(p_tracked_m);
+    const std::optional<double> sd_m =
+        held ? corrector.uncertaintyAt_m(Pose{p_tracked_m, *held}) : corrector.uncertainty_m(p_tracked_m);
     return sd_m ? 1000.0 * *sd_m : kNan;
   });
 }
@@ -117,7 +139,9 @@ std::vector<double> uncertaintyAtPlaces_mm(const calibration::Corrector& correct
   std::map<int, double> sum_mm, count;
   for (const Node& node : table.nodes) {
     if (node.role == NodeRole::kSkipped) continue;
-    const std::optional<double> sd_m = corrector.uncertainty_m(node.tracker_from_sensor.position_m);
+    const std::optional<double> sd_m = node.has_orientation
+                                           ? corrector.uncertaintyAt_m(node.tracker_from_sensor)
+                                           : corrector.uncertainty_m(node.tracker_from_sensor.position_m);
     sum_mm[node.node] += sd_m ? 1000.0 * *sd_m : kNan;
     count[node.node] += 1.0;
   }

@@ -11,6 +11,7 @@ void VolumeStore::reset(const CalibrationTable& table, const std::optional<evalu
   table_ = table;
   comparison_ = comparison;
   lattice_ = comparison ? latticeAround(table) : VolumeField{};
+  ways_held_ = waysHeld(table);
   volumes_.clear();
   why_.clear();
   broken_.clear();
@@ -47,25 +48,45 @@ VolumeStore::Sampling VolumeStore::samplingOf(const VolumeKey& key, QString* why
     *why = fitted_.why(!a ? *key.a : *key.b);
     return {};
   }
+  const Held held = heldOf(key);
   if (key.difference)
-    return [a, b, lattice = lattice_](const RunControl& control) { return differenceVolume(*a, *b, lattice, control); };
-  if (key.quantity == VolumeQuantity::kCorrection)
-    return [a, lattice = lattice_](const RunControl& control) { return correctionVolume(*a, lattice, control); };
-  return [a, lattice = lattice_](const RunControl& control) { return uncertaintyVolume(*a, lattice, control); };
+    return [a, b, held, lattice = lattice_](const RunControl& control) {
+      return differenceVolume(*a, *b, held, lattice, control);
+    };
+  const auto sampled = key.quantity == VolumeQuantity::kCorrection ? correctionVolume : uncertaintyVolume;
+  return
+      [a, held, sampled, lattice = lattice_](const RunControl& control) { return sampled(*a, held, lattice, control); };
+}
+
+Held VolumeStore::heldOf(const VolumeKey& key) const {
+  return key.held == kMeanHeld ? Held() : Held(ways_held_[static_cast<std::size_t>(key.held)]);
+}
+
+/// Empty where no correction of a volume looks at how the sensor is held.
+QString VolumeStore::turnOf(const VolumeKey& key) const {
+  const auto takes = [this](MethodRow row) {
+    const auto corrector = row ? fitted_.get(*row) : nullptr;
+    return corrector && corrector->takesOrientation();
+  };
+  if (ways_held_.empty()) return {};
+  if (!takes(key.a) && !takes(key.b)) return tr(" It is the same however the sensor is held.");
+  return key.held == kMeanHeld ? tr(" Mean over the ways the sensor was held.")
+                               : tr(" The sensor turned by %1.").arg(shortTurnText(*heldOf(key)));
 }
 
 QString VolumeStore::titleOf(const VolumeKey& key) const {
   const QString a = positionLabel(*comparison_, key.a);
   if (key.difference)
     return tr("Distance between the corrected positions of A, %1, and B, %2.")
-        .arg(a, positionLabel(*comparison_, key.b));
+               .arg(a, positionLabel(*comparison_, key.b)) +
+           turnOf(key);
   switch (key.quantity) {
     case VolumeQuantity::kCorrection:
-      return tr("How far %1 moves a reading, beyond the rigid alignment.").arg(a);
+      return tr("How far %1 moves a reading, beyond the rigid alignment.").arg(a) + turnOf(key);
     case VolumeQuantity::kExpectedError:
       return tr("%1: held-out error, interpolated between the places (local RMS).").arg(a);
     case VolumeQuantity::kUncertainty:
-      return tr("SD of the corrected position as %1 states it.").arg(a);
+      return tr("SD of the corrected position as %1 states it.").arg(a) + turnOf(key);
     case VolumeQuantity::kNone:
       break;
   }

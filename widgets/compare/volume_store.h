@@ -18,8 +18,10 @@ struct VolumeKey {
   MethodRow a;
   MethodRow b;
   bool difference = false;
+  int held = kMeanHeld;  ///< Of waysHeld().
   bool operator<(const VolumeKey& other) const {
-    return std::tie(quantity, a, b, difference) < std::tie(other.quantity, other.a, other.b, other.difference);
+    return std::tie(quantity, a, b, difference, held) <
+           std::tie(other.quantity, other.a, other.b, other.difference, other.held);
   }
 };
 
@@ -44,12 +46,15 @@ class VolumeStore : public QObject {
   /// What fills the volume; empty while a fit is awaited or where it is impossible, which `why` then tells.
   Sampling samplingOf(const VolumeKey& key, QString* why);
   QString titleOf(const VolumeKey& key) const;
+  QString turnOf(const VolumeKey& key) const;
+  Held heldOf(const VolumeKey& key) const;
   void start(const VolumeKey& key, const Sampling& sampling);
 
   FittedMethods& fitted_;
   CalibrationTable table_;
   std::optional<evaluation::Comparison> comparison_;
   VolumeField lattice_;
+  std::vector<Eigen::Quaterniond> ways_held_;
   std::map<VolumeKey, VolumeField> volumes_;
   std::map<VolumeKey, QString> why_;
   std::set<VolumeKey> broken_;  ///< Their sampling threw, and would again.

@@ -16,6 +16,7 @@
 #include <limits>
 #include <set>
 
+#include "calib/evaluation/orientation/planned_orientations.h"
 #include "widgets/forms/number_box.h"
 #include "widgets/style/unit_texts.h"
 #include "widgets/style/units.h"
@@ -123,7 +124,8 @@ QWidget* PlanPage::makeForm() {
   order_->setAccessibleName(tr("Order"));
   connect(order_, &QComboBox::currentIndexChanged, this, &PlanPage::onChanged);
   seed_ = makeCount(tr("Seed of the random order"), 1, 0, kMaxSeed);
-  orientations_ = makeCount(tr("Sensor orientations at each place"), 1, 1, 8);
+  orientations_ = makeCount(tr("Sensor orientations at each place"), 1, 1, acquisition::kMaxOrientations);
+  orientations_->setObjectName(QStringLiteral("orientations"));
   reseat_ = makeCount(tr("Times each place is seated anew"), 1, 1, 8);
   samples_ = makeCount(tr("Samples at each place"), 60, 1, 10000);
   samples_->setObjectName(QStringLiteral("samplesPerNode"));
@@ -151,6 +153,7 @@ QWidget* PlanPage::makeForm() {
   layout->addLayout(form);
 
   summary_ = new QLabel(panel);
+  summary_->setObjectName(QStringLiteral("planSummary"));
   summary_->setWordWrap(true);
   layout->addWidget(summary_);
   create_ = new QPushButton(tr("Start a session with this plan"), panel);
@@ -270,7 +273,8 @@ QString PlanPage::summary(const acquisition::Plan& now, const std::vector<Planne
   QStringList pipes;
   for (const double length_m : acquisition::pipeLengths_m(now)) pipes << coordinateText(length_m);
   if (!pipes.isEmpty()) text += tr(" Pipes: %1.").arg(pipes.join(QStringLiteral(", ")));
-  return text;
+  const std::string orientations = evaluation::plannedOrientations(planned, Pose{}).text;
+  return text + QStringLiteral("\n\n") + QString::fromStdString(orientations);
 }
 
 void PlanPage::loadPlanFile() {

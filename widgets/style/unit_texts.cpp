@@ -1,10 +1,14 @@
 #include "widgets/style/unit_texts.h"
 
 #include <QLocale>
+#include <QObject>
 #include <QSettings>
+#include <QStringList>
 #include <algorithm>
 #include <cmath>
 
+#include "calib/core/pose.h"
+#include "calib/core/units.h"
 #include "widgets/style/units.h"
 
 namespace fieldtrue::widgets {
@@ -32,6 +36,21 @@ QString coordinateText(double coordinate_m) {
 QString positionText(const Eigen::Vector3d& position_m) {
   return QStringLiteral("x %1   y %2   z %3")
       .arg(coordinateText(position_m.x()), coordinateText(position_m.y()), coordinateText(position_m.z()));
+}
+
+QString turnText(const Eigen::Quaterniond& q) {
+  const Eigen::Vector3d angles_deg = kDegPerRad * eulerFromRotation_rad(q);
+  return QObject::tr("azimuth %1\u00b0   elevation %2\u00b0   roll %3\u00b0")
+      .arg(angles_deg.x(), 0, 'f', 1)
+      .arg(angles_deg.y(), 0, 'f', 1)
+      .arg(angles_deg.z(), 0, 'f', 1);
+}
+
+QString shortTurnText(const Eigen::Quaterniond& q) {
+  QStringList angles;
+  for (const double angle_rad : eulerFromRotation_rad(q))
+    angles << QStringLiteral("%1°").arg(std::lround(kDegPerRad * angle_rad));
+  return angles.join(QStringLiteral(", "));
 }
 
 QString distanceText(double distance_m) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <QString>
 
 #include "widgets/style/theme.h"
@@ -16,6 +17,10 @@ void setPlacingUnit(LengthUnit unit);
 QString coordinateText(double coordinate_m);
 /// "x 1.219 m   y 0.610 m   z 0.914 m" in the placing unit.
 QString positionText(const Eigen::Vector3d& position_m);
+/// An orientation as the trackers name it: "azimuth 120.0°   elevation 0.0°   roll -90.0°".
+QString turnText(const Eigen::Quaterniond& q);
+/// The same to the nearest degree: "120°, 0°, -90°".
+QString shortTurnText(const Eigen::Quaterniond& q);
 /// How far there is still to go, in the smaller unit when that is near: "0.42 m", "7 mm", "0.3 in".
 QString distanceText(double distance_m);
 /// Decimals with which a length of this unit is told and entered: a tenth of a millimetre.

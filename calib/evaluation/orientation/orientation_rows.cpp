@@ -10,7 +10,6 @@
 namespace fieldtrue::evaluation {
 namespace {
 
-constexpr double kAlike_rad = 10.0 / kDegPerRad;
 constexpr std::size_t kMostGroups = 8;
 
 /// Groups around orientations picked farthest from those picked before, until all are within the tolerance or there

@@ -8,8 +8,12 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
+#include "calib/core/units.h"
 
 namespace fieldtrue::evaluation {
+
+/// Orientations nearer to each other than this count as one.
+inline constexpr double kAlike_rad = 10.0 * kRadPerDeg;
 
 /// The rows of a table as the question needs them: where, how turned, how wrong.
 struct OrientationRows {

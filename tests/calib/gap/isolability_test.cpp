@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "calib/gap/diagnosis.h"
+#include "calib/gap/plan_check.h"
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -97,8 +97,8 @@ class GapIsolabilityTest : public QObject {
     const auto turned = planCheck(gapPlan(cube(3)), &scene);
     FT_VERIFY_OK(fixed);
     FT_VERIFY_OK(turned);
-    QVERIFY(r2(*fixed, "sensor_offset", "transmitter_misalignment") > 0.8);
-    QVERIFY(r2(*turned, "sensor_offset", "transmitter_misalignment") < 0.05);
+    QVERIFY(r2(fixed->isolability, "sensor_offset", "transmitter_misalignment") > 0.8);
+    QVERIFY(r2(turned->isolability, "sensor_offset", "transmitter_misalignment") < 0.05);
   }
 
   /// Places visited along x: a gain that drifts passes for a scale, and no longer once the order is random.
@@ -108,9 +108,9 @@ class GapIsolabilityTest : public QObject {
     const auto random = planCheck(gapPlan(cube()), &scene);
     FT_VERIFY_OK(ordered);
     FT_VERIFY_OK(random);
-    QVERIFY(r2(*ordered, "grid_scale", "gain_drift") > kSame);
-    QVERIFY(r2(*random, "grid_scale", "gain_drift") < 0.5);
-    QVERIFY(r2(*random, "jig_tilt", "gain_drift") < 0.05);
+    QVERIFY(r2(ordered->isolability, "grid_scale", "gain_drift") > kSame);
+    QVERIFY(r2(random->isolability, "grid_scale", "gain_drift") < 0.5);
+    QVERIFY(r2(random->isolability, "jig_tilt", "gain_drift") < 0.05);
   }
 
   void tableIsWholeAndSorted() {
@@ -132,11 +132,11 @@ class GapIsolabilityTest : public QObject {
   void advisesWhatHelps() {
     const auto once = planCheck(gapPlan(cube()), nullptr);
     FT_VERIFY_OK(once);
-    FT_VERIFY_MATCH(holdsAll(allOf(once->warnings), {"One orientation only", "anew at ten places"}));
+    FT_VERIFY_MATCH(holdsAll(allOf(once->isolability.warnings), {"One orientation only", "anew at ten places"}));
     const auto turned = planCheck(gapPlan(cube(3)), nullptr);
     FT_VERIFY_OK(turned);
-    QVERIFY(allOf(turned->warnings).find("One orientation only") == std::string::npos);
-    QVERIFY(allOf(turned->warnings).find("anew at ten places") == std::string::npos);
+    QVERIFY(allOf(turned->isolability.warnings).find("One orientation only") == std::string::npos);
+    QVERIFY(allOf(turned->isolability.warnings).find("anew at ten places") == std::string::npos);
   }
 
   void refusesAHandfulAndStops() {

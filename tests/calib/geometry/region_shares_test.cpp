@@ -39,9 +39,17 @@ class RegionSharesTest : public QObject {
     FT_VERIFY_MATCH(near(shares[0], 1.0 / 16.0, 2e-3));
   }
 
-  void placesThatEncloseNothingShareAlike() {
+  /// On a line they are of its length.
+  void placesOnALine() {
     const std::vector<Eigen::Vector3d> on_a_line = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {5, 0, 0}};
-    for (const double share : regionShares(on_a_line)) FT_VERIFY_MATCH(near(share, 0.25, 1e-12));
+    const std::vector<double> shares = regionShares(on_a_line);
+    const std::vector<double> lengths = {0.5 / 5.0, 1.0 / 5.0, 2.0 / 5.0, 1.5 / 5.0};
+    for (std::size_t i = 0; i < lengths.size(); ++i) FT_VERIFY_MATCH(near(shares[i], lengths[i], 2e-3));
+  }
+
+  void placesThatEncloseNothingShareAlike() {
+    const std::vector<Eigen::Vector3d> at_one_point(4, {0.1, 0.2, 0.3});
+    for (const double share : regionShares(at_one_point)) FT_VERIFY_MATCH(near(share, 0.25, 1e-12));
   }
 };
 

@@ -10,6 +10,7 @@
 #include <QLineEdit>
 #include <QListWidget>
 #include <QPushButton>
+#include <QRegularExpression>
 #include <QSpinBox>
 #include <QTabWidget>
 #include <QTableView>
@@ -75,6 +76,7 @@ class WindowSaysTest : public testing::WindowDriver {
   void cleanup() { window_.reset(); }
   void everyStepHasItsKey();
   void aZeroPitchIsAnsweredAtTheField();
+  void whatOrientationsWillTellIsSaid();
   void numbersAreTakenWithPointOrComma();
   void aSessionShowsItsOwnPlan();
   void theSimulatedTrackerHasOneName();
@@ -178,6 +180,21 @@ void WindowSaysTest::everyStepHasItsKey() {
     QVERIFY(button->isChecked());
     QVERIFY2(button->toolTip().contains(QStringLiteral("Alt+%1").arg(number)), qPrintable(button->toolTip()));
   }
+}
+
+void WindowSaysTest::whatOrientationsWillTellIsSaid() {
+  click("step_plan");
+  auto* summary = find<QLabel>("planSummary");
+  QVERIFY2(summary->text().contains(QStringLiteral("One orientation: a correction holds")),
+           qPrintable(summary->text()));
+  type("orientations", QStringLiteral("12"));
+  QTest::keyClick(find<QWidget>("orientations"), Qt::Key_Tab);
+  // The covering radius of the tetrahedron's rotations is 90 degrees.
+  const QRegularExpressionMatch far =
+      QRegularExpression(QStringLiteral("at most about (\\d+) degrees")).match(summary->text());
+  QVERIFY2(far.hasMatch() && far.captured(1).toInt() >= 86 && far.captured(1).toInt() <= 90,
+           qPrintable(summary->text()));
+  picture("orientations");
 }
 
 void WindowSaysTest::aZeroPitchIsAnsweredAtTheField() {
