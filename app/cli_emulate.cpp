@@ -9,6 +9,7 @@
 
 #include "acquisition/devices/registry.h"
 #include "acquisition/emulators/emulator_faults.h"
+#include "acquisition/emulators/pose_source.h"
 #include "app/cli.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
@@ -26,6 +27,7 @@ struct EmulateOptions {
   std::string replay;
   std::string faults;
   std::uint64_t seed = 1;
+  int sensors = 1;
   std::optional<double> duration_s;
 };
 
@@ -40,6 +42,7 @@ Read<acquisition::Emulation> readEmulation(const EmulateOptions& options, std::v
   emulation.pty_link = options.pty_link;
   emulation.tcp_port = options.port;
   emulation.seed = options.seed;
+  emulation.sensors = options.sensors;
   const auto faults = acquisition::parseFaults(options.faults);
   if (!faults) return wrongUsage(faults.error());
   emulation.faults = *faults;
@@ -113,6 +116,9 @@ void addEmulateCommand(CommandLine& line) {
   command->add_option("--replay", options->replay, "Sample table to play instead, at the times it was recorded")
       ->type_name("CSV");
   command->add_option("--faults", options->faults, faultsHelp())->type_name("LIST");
+  command->add_option("--sensors", options->sensors, "Sensors on the jig, 4 cm apart along its y (default 1)")
+      ->type_name("N")
+      ->check(CLI::Range(1, static_cast<int>(acquisition::kMostSensors)));
   command->add_option("--seed", options->seed, "Seed of noise and faults (default 1)")->type_name("N");
   command->add_option("--duration", options->duration_s, "End by itself after so many seconds")
       ->type_name("S")

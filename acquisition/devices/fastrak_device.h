@@ -1,63 +1,58 @@
 #pragma once
 
-#include <QElapsedTimer>
-#include <QTimer>
-#include <functional>
-#include <memory>
-#include <optional>
+#include <array>
+#include <string>
 #include <vector>
 
-#include "acquisition/devices/fastrak_startup.h"
-#include "acquisition/devices/sample_clock.h"
-#include "acquisition/devices/tracker_device.h"
-#include "acquisition/transports/transport.h"
+#include "acquisition/devices/line_device.h"
+#include "acquisition/protocols/fastrak.h"
+#include "calib/simulation/scene.h"
 
 namespace fieldtrue::acquisition {
 
-/// A Polhemus Fastrak on any line. Sensor n of its samples is station n + 1; times count from start().
-class FastrakDevice : public TrackerDevice {
+/// How a Fastrak is to be set up.
+struct FastrakSetup : LineSetup {
+  FastrakSetup() {
+    id = "fastrak";
+    make = "Polhemus Fastrak";
+    name = "Fastrak";
+  }
+  bool tells_version = true;         ///< Whether its version belongs to its name.
+  double rate_hz = kFastrakRate_hz;  ///< Shared by the stations; other than 120 only for an emulated tracker.
+  std::vector<int> stations;         ///< Empty = those plugged in.
+  std::string hemisphere = "+x";     ///< "+x" ... "-z" or "tracked".
+  std::string filter = "off";        ///< "off", "low", "medium", "heavy".
+  bool raw_frame = true;             ///< Resets alignment and boresight.
+};
+
+/// The output list the driver asks for: position, quaternion, stylus, tail mark.
+inline constexpr std::array<int, 4> kFastrakDriverItems = {2, 11, 16, 1};
+
+/// The settings of a Fastrak as data, for registry, forms and command line.
+std::vector<Setting> fastrakSettings();
+/// A Fastrak at an address. @error kBadInput
+Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const simulation::Scene& scene);
+
+/// Brings a Fastrak from any state to binary records in centimetres with filters and compensation as asked. Works on
+/// units that stream already, and looks for another rate where the line has one.
+class FastrakStartup : public TrackerStartup {
   Q_OBJECT
  public:
-  using TransportFactory = std::function<Result<std::unique_ptr<Transport>>()>;
-  /// @param make_line called by start(), in the device's thread
-  /// @param clock_speed the tracker's seconds per second; other than 1 only for an emulated tracker
-  FastrakDevice(FastrakSetup setup, TransportFactory make_line, double clock_speed = 1.0, QObject* parent = nullptr);
-  ~FastrakDevice() override;
-
-  void start() override;
-  void stop() override;
-  TableMetadata describe() const override;
+  FastrakStartup(Transport& line, const FastrakSetup& setup);
+  void run() override;
+  StreamPlan stream() const override;
+  std::string farewell() const override;
 
  private:
-  void beginStartup();
-  void startupFinished();
-  void readReady();
-  void watch();
-  void running();
-  void noteStatus(const Sample& sample);
-  void failWith(const QString& text);
-  void closeLine();
-  double now_s() const;
-  double rate_hz() const;
-  QString summary() const;
+  void statusCame(const FastrakStatus& status);
+  std::vector<FastrakCommand> commands() const;
+  std::vector<FastrakCommand> filterCommands() const;
+  LineStep readBack(char letter, const char* name);
+  bool noteRefusal(const std::string& heard);
+  void verify();
+  void settled(const FastrakStatus& status);
 
-  FastrakSetup setup_;
-  TransportFactory make_line_;
-  double clock_speed_;
-  std::unique_ptr<Transport> line_;
-  std::unique_ptr<FastrakStartup> startup_;
-  std::unique_ptr<LineExchange> farewell_;
-  std::optional<FastrakIdentity> identity_;
-  std::optional<FastrakParser> parser_;
-  std::vector<SampleClock> clocks_;
-  HemisphereWatch hemisphere_;
-  std::array<std::string, kFastrakStations> last_status_;
-  QElapsedTimer clock_;
-  QTimer watch_;
-  int quiet_ticks_ = 0;
-  std::uint64_t records_seen_ = 0;
-  std::uint64_t bytes_at_last_record_ = 0;
-  bool running_ = false;
+  FastrakSetup fastrak_;
 };
 
 }  // namespace fieldtrue::acquisition

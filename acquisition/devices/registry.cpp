@@ -1,12 +1,11 @@
 // A new tracker:
-// 1. acquisition/protocols/<id>: bytes to samples and commands to bytes, pure functions, no I/O.
-// 2. acquisition/emulators/<id>: the device side, so that it can be tested without hardware.
-// 3. acquisition/devices/<id>_device: a TrackerDevice over a Transport.
+// 1. acquisition/protocols/<id>: commands to bytes, and a StreamParser that turns bytes into readings; no I/O.
+// 2. acquisition/emulators/<id>: the device side over EmulatedUnit, so that it can be tested without hardware.
+// 3. acquisition/devices/<id>_device: its settings, and the TrackerStartup that brings it to a stream; LineDevice has
+// the
+//    line, the clock, the watching and the farewell.
 // 4. One row below. Menus, command line and the contract test read the table.
 #include "acquisition/devices/registry.h"
-
-#include <algorithm>
-#include <charconv>
 
 #include "acquisition/devices/fastrak_device.h"
 #include "acquisition/devices/simulated_device.h"
@@ -16,38 +15,10 @@
 namespace fieldtrue::acquisition {
 namespace {
 
-Result<Settings> readSettings(const std::string& owner, const std::vector<Setting>& declared, const std::string& text) {
-  if (text.empty()) return resolveSettings(owner, declared, {});
-  FT_TRY(auto parsed, parseMethodText(owner + ":" + text));
-  return resolveSettings(owner, declared, parsed.given);
-}
-
 Result<std::unique_ptr<TrackerDevice>> makeSimulated(const std::string& address, const simulation::Scene& scene) {
-  FT_TRY(auto settings, readSettings("simulated", simulatedSettings(), address));
+  FT_TRY(auto settings, readDeviceSettings("simulated", simulatedSettings(), address));
   FT_TRY(auto setup, simulatedSetup(settings));
   return SimulatedDevice::make(scene, setup);
-}
-
-int baudOf(const std::string& line) {
-  int baud = FastrakSetup{}.baud;
-  const std::size_t at = line.rfind('@');
-  if (at != std::string::npos) std::from_chars(line.data() + at + 1, line.data() + line.size(), baud);
-  return baud;
-}
-
-Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const simulation::Scene&) {
-  const std::size_t comma = std::min(address.find(','), address.size());
-  const std::string line = address.substr(0, comma);
-  FT_TRY(auto settings,
-         readSettings("fastrak", fastrakSettings(), address.substr(std::min(comma + 1, address.size()))));
-  // Made once now, so that an address that cannot be read is refused here and not when the device is started.
-  FT_TRY_VOID(makeTransport(line));
-  FastrakSetup setup;
-  setup.where = line;
-  setup.device_text = "fastrak:" + line.substr(0, line.rfind('@'));
-  setup.baud = baudOf(line);
-  applyFastrakSettings(settings, setup);
-  return std::make_unique<FastrakDevice>(std::move(setup), [line] { return makeTransport(line); });
 }
 
 }  // namespace

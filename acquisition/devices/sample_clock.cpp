@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "acquisition/protocols/fastrak_items.h"
+#include "acquisition/protocols/sample_status.h"
 #include "calib/core/error.h"
 
 namespace fieldtrue::acquisition {
@@ -29,12 +29,32 @@ double SampleClock::stamp(double arrival_s, std::size_t later_in_bunch) {
   return last_s_ = std::max(predicted_s + kTimeGain * late_s, last_s_ + 0.1 * nominal_s_);
 }
 
+double UnitClock::stamp(double arrival_s, double unit_s) {
+  constexpr double kEarly_s = 0.25;  // Nothing arrives before it was made; more is another clock.
+  constexpr double kLate_s = 5.0;    // A computer may be busy for so long.
+  constexpr double kLateGain = 0.001;
+  constexpr double kMostLate_s =
+      0.02;                           // So the clock follows 0.5 % of drift at 240 Hz, and a busy second moves it 5 ms.
+  constexpr double kMostShare = 0.5;  // Of a step between two readings, by which earlier arrivals pull them back.
+  const double step_s = unit_s - last_unit_s_;
+  const double late_s = arrival_s - unit_s - offset_s_;
+  jumped_ = started_ && (step_s < 0.0 || late_s < -kEarly_s || late_s > kLate_s);
+  if (!started_ || jumped_) {
+    jump_s_ = started_ ? -late_s : 0.0;
+    offset_s_ = arrival_s - unit_s;
+    started_ = true;
+  } else if (step_s > 0.0) {
+    offset_s_ += late_s > 0.0 ? kLateGain * std::min(late_s, kMostLate_s) : std::max(late_s, -kMostShare * step_s);
+  }
+  last_unit_s_ = unit_s;
+  return unit_s + offset_s_;
+}
+
 void HemisphereWatch::check(Sample& sample) {
   constexpr double kNear_m = 0.05;
   constexpr int kForgetReadings = 60;
   constexpr double kSamePlace = 0.2;
-  if (sample.sensor < 0 || sample.sensor >= static_cast<int>(tracks_.size())) return;
-  Track& track = tracks_[static_cast<std::size_t>(sample.sensor)];
+  Track& track = tracks_[sample.sensor];
   track.known = track.known && ++track.readings_since <= kForgetReadings;
   if (!sample.status.empty()) return;
   const Eigen::Vector3d p = sample.tracker_from_sensor.position_m;

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
+#include <map>
 
 #include "calib/core/calibration_table.h"
 
@@ -26,6 +26,26 @@ class SampleClock {
   bool started_ = false;
 };
 
+/// Gives readings the tracker's own clock's spacing and the computer's time: follows the least delayed arrivals, so
+/// that a busy computer does not move them, and notices when the tracker's clock jumps.
+class UnitClock {
+ public:
+  /// @param arrival_s when the reading's bytes were read, never less than before
+  /// @param unit_s the tracker's clock at the reading; the same for readings taken together
+  /// @return time of the reading [s], never less than before but after a jump
+  double stamp(double arrival_s, double unit_s);
+  /// Whether the last reading's clock did not go on where the one before it was.
+  bool jumped() const { return jumped_; }
+  double jump_s() const { return jump_s_; }
+
+ private:
+  double offset_s_ = 0.0;
+  double last_unit_s_ = 0.0;
+  double jump_s_ = 0.0;
+  bool started_ = false;
+  bool jumped_ = false;
+};
+
 /// Recognises readings that jump to the place mirrored through the transmitter, which no hand can reach between two
 /// readings: the tracker has lost its hemisphere.
 class HemisphereWatch {
@@ -40,7 +60,7 @@ class HemisphereWatch {
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< With the mirroring undone.
     int readings_since = 0;
   };
-  std::array<Track, 4> tracks_;
+  std::map<int, Track> tracks_;  ///< By sensor.
 };
 
 }  // namespace fieldtrue::acquisition

@@ -17,7 +17,7 @@ FastrakSetup driverSetup(double speed, double rate_hz) {
   setup.may_reset = false;
   setup.rate_hz = rate_hz;
   const auto scaled = [speed](int ms) { return std::max(2, static_cast<int>(ms / std::max(1.0, speed))); };
-  FastrakTimings& t = setup.timings;
+  LineTimings& t = setup.timings;
   t.settle_ms = scaled(t.settle_ms);
   t.clear_ms = scaled(t.clear_ms);
   t.command_ms = scaled(t.command_ms / 4);
@@ -66,9 +66,11 @@ Result<std::unique_ptr<SimulatedDevice>> SimulatedDevice::make(const simulation:
       new SimulatedDevice(scene, setup, driverSetup(setup.speed, scene.tracker.rate_hz)));
 }
 
-SimulatedDevice::SimulatedDevice(const simulation::Scene& scene, const SimulatedSetup& setup, FastrakSetup driver)
-    : FastrakDevice(
-          std::move(driver), [this] { return plugIn(); }, setup.speed),
+SimulatedDevice::SimulatedDevice(const simulation::Scene& scene, const SimulatedSetup& setup,
+                                 const FastrakSetup& driver)
+    : LineDevice(
+          driver, [driver](Transport& line) { return std::make_unique<FastrakStartup>(line, driver); },
+          [this] { return plugIn(); }, setup.speed),
       scene_(scene),
       simulated_(setup) {}
 
@@ -84,7 +86,7 @@ Result<std::unique_ptr<Transport>> SimulatedDevice::plugIn() {
   options.faults = simulated_.faults;
   options.seed = simulated_.seed;
   options.identity = "simulated: " + scene_.name;
-  auto emulator = makeFastrakEmulator(std::move(jig), std::move(device_end), options, simulated_.speed);
+  auto emulator = emulatorOnLine<FastrakEmulatorCore>(std::move(jig), std::move(device_end), options, simulated_.speed);
   emulator->setParent(this);
   FT_TRY_VOID(emulator->start());
   emulator_ = emulator.release();
@@ -98,7 +100,7 @@ void SimulatedDevice::guideTo(const Pose& reference_from_sensor) {
 }
 
 TableMetadata SimulatedDevice::describe() const {
-  TableMetadata metadata = FastrakDevice::describe();
+  TableMetadata metadata = LineDevice::describe();
   metadata.tracker = "simulated tracker in " + scene_.name;
   metadata.transmitter_model = "dipole";
   // How the emulated line was set up says nothing of this tracker, and names another.

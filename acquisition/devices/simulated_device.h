@@ -4,7 +4,8 @@
 #include <optional>
 
 #include "acquisition/devices/fastrak_device.h"
-#include "acquisition/emulators/fastrak_emulator.h"
+#include "acquisition/emulators/fastrak_emulator_core.h"
+#include "acquisition/emulators/simulated_jig.h"
 #include "calib/simulation/scene.h"
 
 namespace fieldtrue::acquisition {
@@ -18,7 +19,7 @@ struct SimulatedSetup {
 
 /// The simulated tracker: a real Fastrak driver over an emulated Fastrak in a scene, with an operator who carries the
 /// jig where guideTo says. Sample times are the tracker's seconds.
-class SimulatedDevice : public FastrakDevice {
+class SimulatedDevice : public LineDevice {
   Q_OBJECT
  public:
   /// @error of the scene
@@ -29,7 +30,7 @@ class SimulatedDevice : public FastrakDevice {
   TableMetadata describe() const override;
 
  private:
-  SimulatedDevice(const simulation::Scene& scene, const SimulatedSetup& setup, FastrakSetup driver);
+  SimulatedDevice(const simulation::Scene& scene, const SimulatedSetup& setup, const FastrakSetup& driver);
   Result<std::unique_ptr<Transport>> plugIn();
 
   simulation::Scene scene_;

@@ -68,7 +68,7 @@ FastrakEmulatorCore::Setup FastrakEmulatorCore::factorySetup() const {
   setup.identity = options_.identity;
   for (int station = 1; station <= kFastrakStations; ++station) {
     const auto index = static_cast<std::size_t>(station - 1);
-    setup.active[index] = (source_->sensors() >> index & 1u) != 0;
+    setup.active[index] = plugged(station - 1);
     setup.items[index] = {2, 4, 1};
     for (const auto& row : numberSettings()) {
       if (row.of_station) setup.numbers[{row.letter, station}] = row.defaults;
@@ -184,10 +184,7 @@ void FastrakEmulatorCore::sendStatus(const FastrakCommand&, std::vector<Emulated
 
 void FastrakEmulatorCore::setContinuous(const FastrakCommand& command, std::vector<EmulatedOutput>&) {
   const bool on = command.letter == 'C';
-  if (on && !setup_.continuous) {
-    stream_start_s_ = now_s_;
-    cycle_ = 0;
-  }
+  if (on && !setup_.continuous) beginStream();
   setup_.continuous = on;
 }
 
@@ -223,7 +220,7 @@ void FastrakEmulatorCore::setActive(const FastrakCommand& command, std::vector<E
   const std::string& value = command.fields.front();
   if (value != "0" && value != "1") return refuse(command, kOutOfRange, out);
   const auto index = static_cast<std::size_t>(*station - 1);
-  setup_.active[index] = value == "1" && (source_->sensors() >> index & 1u) != 0;
+  setup_.active[index] = value == "1" && plugged(*station - 1);
 }
 
 void FastrakEmulatorCore::setBoresight(const FastrakCommand& command, std::vector<EmulatedOutput>& out) {
@@ -290,7 +287,7 @@ void FastrakEmulatorCore::restart(const FastrakCommand& command, std::vector<Emu
     return;
   }
   setup_ = command.letter == 'W' ? factorySetup() : saved_;
-  if (command.letter == kFastrakReinitialise) silent_until_s_ = now_s_ + options_.reset_silence_s;
+  if (command.letter == kFastrakReinitialise) beginSilence();
   paused_ = false;
   memory_ = {};
 }

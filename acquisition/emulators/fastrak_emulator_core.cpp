@@ -18,14 +18,10 @@ bool within(const Eigen::Vector3d& v, const std::vector<double>& max_then_min) {
          (v.array() >= vectorAt(max_then_min, 3).array()).all();
 }
 
-/// True in one second of every four, never in the first three of a stream.
-bool faultySecond(double time_s) { return std::fmod(time_s, 4.0) >= 3.0; }
-
 }  // namespace
 
-FastrakEmulatorCore::FastrakEmulatorCore(std::unique_ptr<PoseSource> source, FastrakEmulatorOptions options)
-    : source_(std::move(source)), options_(std::move(options)), random_(options_.seed) {
-  FT_CHECK(source_ != nullptr);
+FastrakEmulatorCore::FastrakEmulatorCore(std::unique_ptr<PoseSource> source, const FastrakEmulatorOptions& options)
+    : EmulatedUnit(std::move(source), options) {
   setup_ = saved_ = factorySetup();
   setup_.continuous = options_.faults.already_streaming;
 }
@@ -46,29 +42,13 @@ const std::vector<double>& FastrakEmulatorCore::numbers(char letter, int station
   return setup_.numbers.at({letter, station});
 }
 
-void FastrakEmulatorCore::receive(std::string_view bytes, double time_s, std::vector<EmulatedOutput>& out) {
-  now_s_ = time_s;
-  if (time_s < silent_until_s_) return;
+void FastrakEmulatorCore::hear(std::string_view bytes, std::vector<EmulatedOutput>& out) {
   std::vector<FastrakCommand> commands;
   reader_.add(bytes, commands);
   for (const auto& command : commands) {
     obey(command, out);
-    if (now_s_ < silent_until_s_) return;
+    if (silent()) return;
   }
-}
-
-bool FastrakEmulatorCore::tick(double time_s, std::vector<EmulatedOutput>& out, int most_cycles) {
-  now_s_ = time_s;
-  if (!setup_.continuous || paused_ || time_s < silent_until_s_) return false;
-  const std::vector<int> sensors = activeSensors();
-  if (sensors.empty()) return false;
-  for (int i = 0; i < most_cycles; ++i) {
-    const auto due_s = source_->due_s(cycle_, static_cast<int>(sensors.size()));
-    if (!due_s || stream_start_s_ + *due_s > time_s) return false;
-    send(source_->read(cycle_, sensors, stream_start_s_ + *due_s), false, out);
-    ++cycle_;
-  }
-  return true;
 }
 
 std::vector<int> FastrakEmulatorCore::activeSensors() const {
@@ -79,32 +59,12 @@ std::vector<int> FastrakEmulatorCore::activeSensors() const {
   return sensors;
 }
 
-Sample FastrakEmulatorCore::misread(Sample sample, double streaming_s) {
-  std::uniform_real_distribution<double> unit(0.0, 1.0);
-  const EmulatorFaults& faults = options_.faults;
-  Eigen::Vector3d& position_m = sample.tracker_from_sensor.position_m;
-  if (faults.error_status && faultySecond(streaming_s)) {
-    sample.status = "k";
-    position_m += Eigen::Vector3d(0.2, -0.1, 0.15);
-  }
-  if (faults.outliers && unit(random_) < 0.01) {
-    std::normal_distribution<double> normal;
-    const Eigen::Vector3d direction(normal(random_), normal(random_), normal(random_));
-    position_m += (0.1 + 0.2 * unit(random_)) * direction.normalized();
-  }
-  return sample;
-}
-
 Pose FastrakEmulatorCore::reported(int station, const Pose& tracker_from_sensor) const {
   const auto index = static_cast<std::size_t>(station - 1);
-  Pose pose = tracker_from_sensor;
-  const Eigen::Vector3d hemisphere = vectorAt(numbers('H', station), 0);
-  // A dipole's field is the same at p and -p: the tracker picks the side it was told.
-  if (hemisphere.norm() > 0.0 && pose.position_m.dot(hemisphere) < 0.0) pose.position_m = -pose.position_m;
-  pose = inverse(setup_.tracker_from_aligned[index]) * pose;
+  Pose pose = inverse(setup_.tracker_from_aligned[index]) *
+              inHemisphere(tracker_from_sensor, vectorAt(numbers('H', station), 0));
   pose.position_m += pose.orientation * (vectorAt(numbers('N', station), 0) * metresPer(setup_.unit));
   if (const auto& zero = setup_.boresight[index]) {
-    constexpr double kRadPerDeg = 0.017453292519943295769;
     pose.orientation =
         pose.orientation * zero->conjugate() * rotationFromEuler(vectorAt(numbers('G', station), 0) * kRadPerDeg);
   }
@@ -129,20 +89,18 @@ FastrakLayout FastrakEmulatorCore::layout(int station) const {
 void FastrakEmulatorCore::send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out) {
   for (const Sample& read : samples) {
     const int station = read.sensor + 1;
-    const Sample sample = misread(read, read.time_s - stream_start_s_);
-    Pose pose = source_->recorded() ? sample.tracker_from_sensor : reported(station, sample.tracker_from_sensor);
-    if (options_.faults.hemisphere_flip && faultySecond(read.time_s - stream_start_s_))
-      pose.position_m = -pose.position_m;
+    const Sample sample = misread(read);
+    const Pose pose = flipped(
+        source_->recorded() ? sample.tracker_from_sensor : reported(station, sample.tracker_from_sensor), read.time_s);
     Memory& memory = memory_[static_cast<std::size_t>(read.sensor)];
     const double increment_m = numbers('I', station)[0] * metresPer(setup_.unit);
     const bool moved =
         !memory.last_sent_m || (pose.position_m - *memory.last_sent_m).norm() >= increment_m || increment_m <= 0.0;
     if (!every && !moved) continue;
-    FastrakRecord record = recordOfPose(station, errorOf(sample, station, pose), pose);
-    record.relative_m = pose.position_m - memory.last_position_m.value_or(pose.position_m);
+    FastrakRecord sent = recordOfPose(station, errorOf(sample, station, pose), pose);
+    sent.relative_m = pose.position_m - memory.last_position_m.value_or(pose.position_m);
     memory.last_position_m = memory.last_sent_m = pose.position_m;
-    out.push_back({encodeRecord(record, layout(station), setup_.unit), true});
-    ++records_;
+    record(encodeRecord(sent, layout(station), setup_.unit), out);
   }
 }
 

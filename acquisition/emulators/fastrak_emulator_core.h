@@ -4,46 +4,41 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
-#include "acquisition/emulators/emulated_tracker.h"
-#include "acquisition/emulators/emulator_faults.h"
-#include "acquisition/emulators/pose_source.h"
+#include "acquisition/emulators/emulated_unit.h"
 #include "acquisition/protocols/fastrak.h"
 
 namespace fieldtrue::acquisition {
 
-struct FastrakEmulatorOptions {
-  double reset_silence_s = 10.0;  ///< After ^Y.
-  std::string version = "G1.02";
-  std::string identity = "Fieldtrue Fastrak emulator";
-  EmulatorFaults faults;
-  std::uint64_t seed = 1;
+struct FastrakEmulatorOptions : EmulatedUnitOptions {
+  FastrakEmulatorOptions() {
+    version = "G1.02";
+    identity = "Fieldtrue Fastrak emulator";
+  }
 };
 
 /// A Fastrak without its line: interprets the commands of the manual and keeps their state. Hemisphere, alignment,
 /// boresight, tip offset, increment and envelopes act on the readings; filters, mounting frame, stylus mode and line
 /// rate are kept and read back only.
-class FastrakEmulatorCore : public EmulatedTracker {
+class FastrakEmulatorCore : public EmulatedUnit {
  public:
-  FastrakEmulatorCore(std::unique_ptr<PoseSource> source, FastrakEmulatorOptions options = {});
+  FastrakEmulatorCore(std::unique_ptr<PoseSource> source, const FastrakEmulatorOptions& options = {});
 
-  void receive(std::string_view bytes, double time_s, std::vector<EmulatedOutput>& out) override;
-  bool tick(double time_s, std::vector<EmulatedOutput>& out, int most_cycles = 256) override;
   bool streaming() const override { return setup_.continuous; }
 
-  PoseSource& source() { return *source_; }
   FastrakStatus status() const;
   bool stationActive(int station) const { return setup_.active[static_cast<std::size_t>(station - 1)]; }
   const std::vector<int>& outputList(int station) const { return setup_.items[static_cast<std::size_t>(station - 1)]; }
   /// Numbers of a setting as last set, e.g. 'H' of station 2; station 0 for settings of the whole tracker ('x', 'v').
   const std::vector<double>& numbers(char letter, int station) const;
-  /// Data records sent so far.
-  std::uint64_t records() const { return records_; }
 
  private:
+  void hear(std::string_view bytes, std::vector<EmulatedOutput>& out) override;
+  std::vector<int> activeSensors() const override;
+  void send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out) override;
+
   struct Setup {
     FastrakFormat format = FastrakFormat::kAscii;
     FastrakUnit unit = FastrakUnit::kInch;
@@ -85,25 +80,13 @@ class FastrakEmulatorCore : public EmulatedTracker {
   void realign(int station);
   void changeUnit(FastrakUnit unit);
 
-  std::vector<int> activeSensors() const;
-  Sample misread(Sample sample, double streaming_s);
   Pose reported(int station, const Pose& tracker_from_sensor) const;
   char errorOf(const Sample& sample, int station, const Pose& pose) const;
-  void send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out);
   FastrakLayout layout(int station) const;
 
-  std::unique_ptr<PoseSource> source_;
-  FastrakEmulatorOptions options_;
   Setup setup_, saved_;
   FastrakCommandReader reader_;
-  std::mt19937_64 random_;
   std::array<Memory, kFastrakStations> memory_;
-  double now_s_ = 0.0;
-  double stream_start_s_ = 0.0;
-  double silent_until_s_ = 0.0;
-  std::uint64_t cycle_ = 0;
-  std::uint64_t records_ = 0;
-  bool paused_ = false;
 };
 
 }  // namespace fieldtrue::acquisition

@@ -8,10 +8,10 @@ namespace fieldtrue::acquisition {
 
 StandingSource::StandingSource(std::vector<Pose> tracker_from_sensor, double rate_hz)
     : poses_(std::move(tracker_from_sensor)), rate_hz_(rate_hz) {
-  FT_CHECK(!poses_.empty() && poses_.size() <= 4);
+  FT_CHECK(!poses_.empty() && poses_.size() <= kMostSensors);
 }
 
-unsigned StandingSource::sensors() const { return (1u << poses_.size()) - 1u; }
+unsigned StandingSource::sensors() const { return static_cast<unsigned>((std::uint64_t{1} << poses_.size()) - 1u); }
 
 std::optional<double> StandingSource::due_s(std::uint64_t cycle, int active) const {
   return static_cast<double>(cycle) * active / rate_hz_;
@@ -45,7 +45,7 @@ ReplaySource::ReplaySource(const SampleTable& table) {
 unsigned ReplaySource::sensors() const {
   unsigned map = 0;
   for (const auto& row : rows_) {
-    if (row.sensor >= 0 && row.sensor < 4) map |= 1u << row.sensor;
+    if (row.sensor >= 0 && row.sensor < static_cast<int>(kMostSensors)) map |= 1u << row.sensor;
   }
   return map;
 }

@@ -10,6 +10,8 @@
 
 namespace fieldtrue::acquisition {
 
+inline constexpr std::size_t kMostSensors = 32;  ///< Of one source.
+
 /// Where an emulated tracker's readings come from.
 class PoseSource {
  public:
@@ -31,7 +33,7 @@ class PoseSource {
 /// Sensors that stand where they are put.
 class StandingSource : public PoseSource {
  public:
-  /// @param tracker_from_sensor one for each sensor, at most four
+  /// @param tracker_from_sensor one for each sensor, at most kMostSensors
   explicit StandingSource(std::vector<Pose> tracker_from_sensor, double rate_hz = 120.0);
   void put(std::size_t sensor, const Pose& tracker_from_sensor) { poses_.at(sensor) = tracker_from_sensor; }
   unsigned sensors() const override;

@@ -75,10 +75,16 @@ bool VirtualOperator::standing(double time_s) const {
   return !moved_ || (held_s >= 0.0 && std::exp(-held_s / habits_.settle_s) * habits_.tremor_m < kStill_m);
 }
 
-SimulatedJig::SimulatedJig(simulation::TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed)
+SimulatedJig::SimulatedJig(simulation::TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed,
+                           int sensors)
     : simulator_(std::move(simulator)),
       operator_(simulator_.scene().rig, habits, restingPose(simulator_.scene()), seed),
-      leg_s_(habits.travel_s + stand_s_) {}
+      sensors_(sensors),
+      leg_s_(habits.travel_s + stand_s_) {
+  FT_CHECK(sensors_ >= 1 && sensors_ <= static_cast<int>(kMostSensors));
+}
+
+unsigned SimulatedJig::sensors() const { return static_cast<unsigned>((std::uint64_t{1} << sensors_) - 1u); }
 
 void SimulatedJig::guideTo(const Pose& reference_from_sensor, double time_s) {
   tour_.clear();
@@ -106,9 +112,16 @@ std::vector<Sample> SimulatedJig::read(std::uint64_t, std::span<const int> senso
 }
 
 std::vector<Sample> SimulatedJig::readNow(std::span<const int> sensors, double time_s) {
-  if (std::find(sensors.begin(), sensors.end(), 0) == sensors.end()) return {};
+  constexpr double kApart_m = 0.04;
   walk(time_s);
-  return {simulator_.measure(operator_.poseAt(time_s), time_s, 0)};
+  const Pose reference_from_jig = operator_.poseAt(time_s);
+  std::vector<Sample> samples;
+  for (const int sensor : sensors) {
+    if (sensor >= sensors_) continue;
+    const Pose jig_from_sensor{{0.0, kApart_m * sensor, 0.0}, Eigen::Quaterniond::Identity()};
+    samples.push_back(simulator_.measure(reference_from_jig * jig_from_sensor, time_s, sensor));
+  }
+  return samples;
 }
 
 }  // namespace fieldtrue::acquisition

@@ -49,14 +49,16 @@ class VirtualOperator {
 /// The tracker of a scene with a jig in the hands of a virtual operator.
 class SimulatedJig : public PoseSource {
  public:
-  SimulatedJig(simulation::TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed);
+  /// @param sensors on the jig, 4 cm apart along its y; the operator carries the first to the places
+  SimulatedJig(simulation::TrackerSimulator simulator, const OperatorHabits& habits, std::uint64_t seed,
+               int sensors = 1);
   void guideTo(const Pose& reference_from_sensor, double time_s);
   /// Lets the operator walk through places in a circle, standing a while at each, as long as nobody guides.
   void wander(std::vector<Pose> places, double stand_s);
   const VirtualOperator& virtualOperator() const { return operator_; }
   const simulation::Scene& scene() const { return simulator_.scene(); }
 
-  unsigned sensors() const override { return 1; }
+  unsigned sensors() const override;
   std::optional<double> due_s(std::uint64_t cycle, int active) const override;
   std::vector<Sample> read(std::uint64_t cycle, std::span<const int> sensors, double time_s) override;
   std::vector<Sample> readNow(std::span<const int> sensors, double time_s) override;
@@ -66,6 +68,7 @@ class SimulatedJig : public PoseSource {
 
   simulation::TrackerSimulator simulator_;
   VirtualOperator operator_;
+  int sensors_;
   std::vector<Pose> tour_;
   double stand_s_ = 3.0;
   double leg_s_ = 4.0;

@@ -1,9 +1,6 @@
 #include "acquisition/protocols/fastrak_items.h"
 
 #include <algorithm>
-#include <cmath>
-
-#include "calib/core/units.h"
 
 namespace fieldtrue::acquisition {
 namespace {
@@ -128,82 +125,19 @@ Result<FastrakLayout> fastrakLayout(std::span<const int> items, FastrakFormat fo
 
 FastrakRecord recordOfPose(int station, char error, const Pose& tracker_from_sensor, bool stylus_pressed) {
   FastrakRecord record;
+  static_cast<PoseNumbers&>(record) = numbersOfPose(tracker_from_sensor);
   record.station = station;
   record.error = error;
-  record.position_m = tracker_from_sensor.position_m;
   record.relative_m = Eigen::Vector3d::Zero();
-  const Eigen::Quaterniond q = canonical(tracker_from_sensor.orientation);
-  record.euler_deg = eulerFromRotation_rad(q) * kDegPerRad;
-  const Eigen::Matrix3d matrix = q.toRotationMatrix();
-  for (Eigen::Index row = 0; row < 3; ++row) {
-    record.direction_cosines[static_cast<std::size_t>(row)] = matrix.row(row).transpose();
-  }
-  record.quaternion_wxyz = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
   record.stylus_pressed = stylus_pressed;
   return record;
 }
 
-namespace {
-
-/// Readings at or beyond this are markers of a missing reading (-3.7e28 in recordings), not lengths or angles.
-constexpr double kMissingAbove = 1e9;
-
-bool isReading(const auto& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() < kMissingAbove; }
-
-enum class OrientationCheck { kGood, kMissing, kDamaged, kNone };
-
-OrientationCheck orientationOf(const FastrakRecord& record, Eigen::Quaterniond& orientation) {
-  constexpr double kTolerance = 0.02;
-  if (record.quaternion_wxyz) {
-    const Eigen::Vector4d& q = *record.quaternion_wxyz;
-    if (!isReading(q)) return OrientationCheck::kMissing;
-    if (std::abs(q.norm() - 1.0) > kTolerance) return OrientationCheck::kDamaged;
-    orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-    return OrientationCheck::kGood;
-  }
-  const auto& rows = record.direction_cosines;
-  if (rows[0] && rows[1] && rows[2]) {
-    Eigen::Matrix3d matrix;
-    for (Eigen::Index i = 0; i < 3; ++i) matrix.row(i) = rows[static_cast<std::size_t>(i)]->transpose();
-    if (!matrix.allFinite() || matrix.cwiseAbs().maxCoeff() >= kMissingAbove) return OrientationCheck::kMissing;
-    if ((matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).norm() > 2.0 * kTolerance ||
-        matrix.determinant() < 0.0) {
-      return OrientationCheck::kDamaged;
-    }
-    orientation = Eigen::Quaterniond(matrix).normalized();
-    return OrientationCheck::kGood;
-  }
-  if (record.euler_deg) {
-    constexpr double kRadPerDeg = 0.017453292519943295769;
-    if (!isReading(*record.euler_deg)) return OrientationCheck::kMissing;
-    if (record.euler_deg->cwiseAbs().maxCoeff() > 360.0) return OrientationCheck::kDamaged;
-    orientation = rotationFromEuler(*record.euler_deg * kRadPerDeg);
-    return OrientationCheck::kGood;
-  }
-  return OrientationCheck::kNone;
-}
-
-}  // namespace
-
 Sample toSample(const FastrakRecord& record, double time_s) {
-  constexpr double kFarthest_m = 50.0;
-  Sample sample;
+  Sample sample =
+      sampleOfNumbers(record, record.station - 1, record.error == ' ' ? std::string() : std::string(1, record.error));
   sample.time_s = time_s;
-  sample.sensor = record.station - 1;
-  if (record.error != ' ') sample.status.assign(1, record.error);
-  const auto unusable = [&sample](const char* status) {
-    if (sample.status.empty()) sample.status = status;
-    sample.tracker_from_sensor = Pose{};
-    return sample;
-  };
-  const OrientationCheck check = orientationOf(record, sample.tracker_from_sensor.orientation);
-  if (check == OrientationCheck::kMissing) return unusable(kStatusMissing);
-  if (record.position_m) {
-    if (!isReading(*record.position_m)) return unusable(kStatusMissing);
-    if (record.position_m->norm() > kFarthest_m) return unusable(kStatusDamaged);
-    sample.tracker_from_sensor.position_m = *record.position_m;
-  }
-  return check == OrientationCheck::kDamaged ? unusable(kStatusDamaged) : sample;
+  return sample;
 }
 
 }  // namespace fieldtrue::acquisition

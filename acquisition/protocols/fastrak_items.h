@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "acquisition/protocols/pose_numbers.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 
@@ -23,14 +24,10 @@ inline constexpr double kFastrakRate_hz = 120.0;  ///< Shared by the active stat
 double metresPer(FastrakUnit unit);
 
 /// What one data record carried. Quantities that are not in the output list are empty.
-struct FastrakRecord {
-  int station = 1;                                                  ///< 1..4.
-  char error = ' ';                                                 ///< Blank = good.
-  std::optional<Eigen::Vector3d> position_m;                        ///< Tracker frame.
-  std::optional<Eigen::Vector3d> relative_m;                        ///< Since the last record.
-  std::optional<Eigen::Vector3d> euler_deg;                         ///< Azimuth, elevation, roll.
-  std::array<std::optional<Eigen::Vector3d>, 3> direction_cosines;  ///< Rows X, Y, Z of the matrix tracker_from_sensor.
-  std::optional<Eigen::Vector4d> quaternion_wxyz;                   ///< As sent, not normalised.
+struct FastrakRecord : PoseNumbers {
+  int station = 1;                            ///< 1..4.
+  char error = ' ';                           ///< Blank = good.
+  std::optional<Eigen::Vector3d> relative_m;  ///< Since the last record.
   std::optional<bool> stylus_pressed;
 };
 
@@ -85,12 +82,6 @@ std::string encodeRecord(const FastrakRecord& record, const FastrakLayout& layou
 /// A record with every form of a pose filled in.
 /// @param tracker_from_sensor as the device reports it
 FastrakRecord recordOfPose(int station, char error, const Pose& tracker_from_sensor, bool stylus_pressed = false);
-
-/// Status texts of samples that carry no error letter of the tracker's own.
-inline constexpr const char* kStatusMissing = "missing";  ///< The record holds the marker of a missing reading.
-/// The numbers cannot be a pose: bytes were changed on the line.
-inline constexpr const char* kStatusDamaged = "damaged";
-inline constexpr const char* kStatusFlipped = "flipped";  ///< Mirrored through the transmitter: wrong hemisphere.
 
 /// The record as a sample: sensor = station - 1, orientation from the quaternion, else the cosines, else the angles.
 /// The status is the error letter, `missing` or `damaged`; a sample without a usable pose has the identity pose.

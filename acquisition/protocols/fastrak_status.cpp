@@ -129,12 +129,8 @@ std::string errorMeaning(char letter) {
   return "error letter " + std::string(1, letter) + ", which the manual does not list";
 }
 
-std::string statusMeaning(const std::string& status) {
-  if (status.empty()) return {};
-  if (status == kStatusMissing) return "the tracker sent no reading";
-  if (status == kStatusDamaged) return "the record was damaged on the line";
-  if (status == kStatusFlipped) return "mirrored through the transmitter: the hemisphere is set wrong";
-  return status.size() == 1 ? errorMeaning(status[0]) : status;
+std::string fastrakStatusMeaning(const std::string& status) {
+  return status.size() == 1 ? errorMeaning(status[0]) : commonStatusMeaning(status);
 }
 
 std::optional<std::string> findReadBack(std::string_view bytes, char letter, int station) {

@@ -46,7 +46,7 @@ std::string refusalMeaning(int code);
 /// Meaning in words of the error letter of a data record; empty for a blank (good).
 std::string errorMeaning(char letter);
 /// Meaning in words of a sample's status: error letters, `missing`, `damaged`, `flipped`.
-std::string statusMeaning(const std::string& status);
+std::string fastrakStatusMeaning(const std::string& status);
 
 /// A reading-back reply (`2`, station, letter, text), e.g. for `I1`: its text without blanks at the ends.
 std::optional<std::string> findReadBack(std::string_view bytes, char letter, int station);

@@ -81,9 +81,10 @@ void DeviceRegistryTest::everyRow() {
 
 void DeviceRegistryTest::goodTexts_data() {
   QTest::addColumn<QByteArray>("text");
-  for (const char* text : {"simulated", "simulated:speed=4,seed=2,travel_s=1", "simulated:fault=outliers",
-                           "fastrak:/dev/ttyUSB0", "fastrak:/dev/ttyUSB0@19200,hemisphere=-x,stations=13",
-                           "fastrak:tcp:localhost:4000,filter=low,raw_frame=false"}) {
+  for (const char* text :
+       {"simulated", "simulated:speed=4,seed=2,travel_s=1", "simulated:fault=outliers", "fastrak:/dev/ttyUSB0",
+        "fastrak:/dev/ttyUSB0@19200,hemisphere=-x,stations=13", "fastrak:/dev/ttyUSB0,stations=1+3",
+        "fastrak:tcp:localhost:4000,filter=low,raw_frame=false"}) {
     QTest::newRow(text) << QByteArray(text);
   }
 }
@@ -105,6 +106,8 @@ void DeviceRegistryTest::badTexts_data() {
   row("fastrak:", {"/dev/ttyUSB0@115200"});
   row("fastrak:/dev/ttyUSB0@fast", {"fast", "baud"});
   row("fastrak:/dev/ttyUSB0,hemisphere=up", {"hemisphere", "up"});
+  row("fastrak:/dev/ttyUSB0,stations=15", {"stations", "1 to 4", "1+2", "15"});
+  row("fastrak:/dev/ttyUSB0,stations=1+", {"stations", "1+"});
   row("fastrak:/dev/ttyUSB0,color=red", {"color", "hemisphere"});
   row("simulated:speed=0", {"speed", "0.1"});
   row("simulated:travel=1", {"travel", "travel_s"});

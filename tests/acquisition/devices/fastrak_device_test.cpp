@@ -19,8 +19,8 @@ namespace {
 
 const Pose kPose{{0.254, -0.127, 0.0635}, Eigen::Quaterniond(0.943714, -0.189308, 0.038135, 0.268536).normalized()};
 
-FastrakTimings quick() {
-  FastrakTimings timings;
+LineTimings quick() {
+  LineTimings timings;
   timings.settle_ms = 20;
   timings.clear_ms = 5;
   timings.command_ms = 1;
@@ -46,23 +46,23 @@ FastrakSetup quickSetup(const QString& where = "the line") {
 struct Bench {
   std::unique_ptr<QTemporaryDir> folder = std::make_unique<QTemporaryDir>();
   std::unique_ptr<EmulatorRunner> emulator;
-  std::unique_ptr<FastrakDevice> device;
+  std::unique_ptr<LineDevice> device;
   std::unique_ptr<DeviceProbe> probe;
 
   FastrakEmulatorCore& core() { return dynamic_cast<FastrakEmulatorCore&>(emulator->tracker()); }
 };
 
 Bench makeBench(const QByteArray& carrier, std::vector<Pose> poses, EmulatorFaults faults = {}, double speed = 1.0,
-                FastrakSetup setup = quickSetup()) {
+                const FastrakSetup& setup = quickSetup()) {
   Bench bench;
   FastrakEmulatorOptions options;
   options.faults = faults;
   options.reset_silence_s = 0.1;
   auto source = std::make_unique<StandingSource>(std::move(poses));
-  FastrakDevice::TransportFactory make_line;
+  LineDevice::TransportFactory make_line;
   if (carrier == "in process") {
     auto ends = LoopbackTransport::pair();
-    bench.emulator = makeFastrakEmulator(std::move(source), std::move(ends.second), options, speed);
+    bench.emulator = emulatorOnLine<FastrakEmulatorCore>(std::move(source), std::move(ends.second), options, speed);
     auto host = std::make_shared<std::unique_ptr<Transport>>(std::move(ends.first));
     make_line = [host]() -> Result<std::unique_ptr<Transport>> { return std::move(*host); };
   } else {
@@ -80,7 +80,7 @@ Bench makeBench(const QByteArray& carrier, std::vector<Pose> poses, EmulatorFaul
     const std::string address = bench.emulator->endpoint().address().toStdString();
     make_line = [address] { return makeTransport(address); };
   }
-  bench.device = std::make_unique<FastrakDevice>(std::move(setup), std::move(make_line), speed);
+  bench.device = makeLineDevice<FastrakStartup>(setup, std::move(make_line), speed);
   bench.probe = std::make_unique<DeviceProbe>(*bench.device);
   return bench;
 }
@@ -191,7 +191,7 @@ void FastrakDeviceTest::severalStations() {
     FT_VERIFY_MATCH(near(samples[i].tracker_from_sensor.position_m, poses[i % 3].position_m, 1e-7));
   }
   QCOMPARE(*bench.device->describe().rate_hz, 40.0);
-  QCOMPARE(bench.device->describe().other.at("fastrak_stations"), std::string("123"));
+  QCOMPARE(bench.device->describe().other.at("fastrak_stations"), std::string("1+2+3"));
 }
 
 namespace {
@@ -273,24 +273,26 @@ void FastrakDeviceTest::faults() {
 
 void FastrakDeviceTest::findsTheRate() {
   auto ends = LoopbackTransport::pair();
-  auto emulator = makeFastrakEmulator(std::make_unique<StandingSource>(std::vector{kPose}), std::move(ends.second));
+  auto emulator = emulatorOnLine<FastrakEmulatorCore>(std::make_unique<StandingSource>(std::vector{kPose}),
+                                                      std::move(ends.second), FastrakEmulatorOptions{});
   FT_VERIFY_OK(emulator->start());
   auto inner = std::make_shared<std::unique_ptr<LoopbackTransport>>(std::move(ends.first));
   FastrakSetup setup = quickSetup("/dev/ttyUSB0");
   setup.timings.reply_ms = 100;
-  FastrakDevice device(setup, [inner]() -> Result<std::unique_ptr<Transport>> {
+  const auto device = makeLineDevice<FastrakStartup>(setup, [inner]() -> Result<std::unique_ptr<Transport>> {
     return std::make_unique<RatedLine>(std::move(*inner), 19200, 115200);
   });
-  DeviceProbe probe(device);
-  device.start();
+  DeviceProbe probe(*device);
+  device->start();
   QTRY_VERIFY2_WITH_TIMEOUT(probe.state == DeviceState::kRunning, qPrintable(probe.last_text), 10000);
   FT_VERIFY_MATCH(holdsAll(probe.last_text.toStdString(), {"found at 19200 baud", "fastrak:/dev/ttyUSB0@19200"}));
 }
 
 void FastrakDeviceTest::portDoesNotExist() {
-  FastrakDevice device(quickSetup("/dev/ttyUSB77"), [] { return makeTransport("/dev/ttyUSB77"); });
-  DeviceProbe probe(device);
-  device.start();
+  const auto device =
+      makeLineDevice<FastrakStartup>(quickSetup("/dev/ttyUSB77"), [] { return makeTransport("/dev/ttyUSB77"); });
+  DeviceProbe probe(*device);
+  device->start();
   QCOMPARE(probe.state, DeviceState::kFailed);
   FT_VERIFY_MATCH(holdsAll(probe.last_text.toStdString(), {"/dev/ttyUSB77", "does not exist"}));
 }
@@ -306,11 +308,11 @@ void FastrakDeviceTest::portIsBusy() {
 
 void FastrakDeviceTest::nothingPluggedIn() {
   FastrakSetup setup = quickSetup();
-  setup.stations = "34";
+  setup.stations = {3, 4};
   Bench bench = makeBench("in process", {kPose}, {}, 1.0, setup);
   bench.device->start();
   QTRY_COMPARE(bench.probe->state, DeviceState::kFailed);
-  FT_VERIFY_MATCH(holdsAll(bench.probe->last_text.toStdString(), {"no receiver", "station 34"}));
+  FT_VERIFY_MATCH(holdsAll(bench.probe->last_text.toStdString(), {"no receiver", "station 3+4"}));
 }
 
 void FastrakDeviceTest::resetsATrackerThatDoesNotAnswer() {

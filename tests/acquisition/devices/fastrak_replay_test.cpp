@@ -78,9 +78,9 @@ void FastrakReplayTest::everyRecordOfARealHandArrives() {
   const std::string line = (*emulator)->endpoint().address().toStdString();
   FastrakSetup setup;
   setup.where = line;
-  FastrakDevice device(setup, [line] { return makeTransport(line); });
-  DeviceProbe probe(device);
-  device.start();
+  const auto device = makeLineDevice<FastrakStartup>(setup, [line] { return makeTransport(line); });
+  DeviceProbe probe(*device);
+  device->start();
   QTRY_VERIFY2_WITH_TIMEOUT(!probe.samples.empty(), qPrintable(probe.last_text), 15000);
   QElapsedTimer clock;
   clock.start();

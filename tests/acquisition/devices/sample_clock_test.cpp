@@ -18,6 +18,9 @@ class SampleClockTest : public QObject {
   void growsAlways();
   void startsAnewAfterAGap();
   void bridgesAStallOfTheReader();
+  void followsTheTrackersClock();
+  void isNotMovedByABusyComputer();
+  void noticesAJump();
   void seesTheHemisphereFlip();
   void doesNotMistakeMotionForAFlip();
 };
@@ -74,6 +77,53 @@ void SampleClockTest::bridgesAStallOfTheReader() {
   for (; i < 100; ++i) clock.stamp(i * 0.01);
   // Nobody read for two seconds; the 200 readings made meanwhile are read at once.
   for (; i < 300; ++i) FT_VERIFY_MATCH(near(clock.stamp(2.99, static_cast<std::size_t>(299 - i)), i * 0.01, 0.005));
+}
+
+void SampleClockTest::followsTheTrackersClock() {
+  // A crystal that is 200 ppm fast, started long ago; bytes arrive 3 to 19 ms after the reading, four at once.
+  constexpr double kFast = 1.0002;
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> delay_s(0.003, 0.019);
+  UnitClock clock;
+  double last_s = 0.0, arrival_s = 0.0;
+  for (int i = 0; i < 240 * 600; ++i) {
+    const double made_s = i / 240.0;
+    if (i % 4 == 0) arrival_s = std::max(arrival_s, made_s + 3.0 / 240.0 + delay_s(random));
+    const double stamped_s = clock.stamp(arrival_s, 5000.0 + made_s * kFast);
+    QVERIFY(!clock.jumped());
+    QVERIFY(i == 0 || stamped_s > last_s);
+    // Never later than it came, and within the delays of when it was made.
+    if (i > 240) FT_VERIFY_MATCH(near(stamped_s - made_s, 0.015, 0.015));
+    last_s = stamped_s;
+  }
+}
+
+void SampleClockTest::isNotMovedByABusyComputer() {
+  UnitClock clock;
+  for (int i = 0; i < 2400; ++i) {
+    const double made_s = i / 240.0;
+    // For one second nobody reads.
+    const double arrival_s = made_s > 5.0 && made_s < 6.0 ? 6.0 : made_s;
+    FT_VERIFY_MATCH(near(clock.stamp(arrival_s, made_s), made_s, 0.006));
+    QVERIFY(!clock.jumped());
+  }
+}
+
+void SampleClockTest::noticesAJump() {
+  UnitClock clock;
+  clock.stamp(10.0, 100.0);
+  clock.stamp(10.1, 100.1);
+  QVERIFY(!clock.jumped());
+  // Readings taken together have one stamp.
+  FT_VERIFY_MATCH(near(clock.stamp(10.1, 100.1), 10.1, 1e-6));
+  FT_VERIFY_MATCH(near(clock.stamp(10.2, 0.0), 10.2, 1e-9));
+  QVERIFY(clock.jumped());
+  FT_VERIFY_MATCH(near(clock.jump_s(), -100.2, 1e-3));
+  clock.stamp(10.3, 0.1);
+  QVERIFY(!clock.jumped());
+  clock.stamp(10.4, 7.0);
+  QVERIFY(clock.jumped());
+  FT_VERIFY_MATCH(near(clock.jump_s(), 6.8, 1e-3));
 }
 
 void SampleClockTest::seesTheHemisphereFlip() {

@@ -235,7 +235,7 @@ void FastrakRecordsTest::missingReadings() {
   const Sample sample = toSample(*decoded, 0.0);
   QCOMPARE(QByteArray::fromStdString(sample.status), status);
   QVERIFY(sample.tracker_from_sensor.position_m.allFinite());
-  QVERIFY(!statusMeaning(sample.status).empty());
+  QVERIFY(!fastrakStatusMeaning(sample.status).empty());
 }
 
 void FastrakRecordsTest::writesWhatItReads_data() {
@@ -345,8 +345,8 @@ void FastrakRecordsTest::meanings() {
   for (const char letter : std::string("abcdefgjklmstuvwxyAZ?")) QVERIFY2(!errorMeaning(letter).empty(), &letter);
   FT_VERIFY_MATCH(holdsAll(errorMeaning('k'), {"too low", "far"}));
   FT_VERIFY_MATCH(holdsAll(errorMeaning('j'), {"saturated", "close"}));
-  FT_VERIFY_MATCH(holdsAll(statusMeaning("flipped"), {"hemisphere"}));
-  QCOMPARE(statusMeaning(""), std::string());
+  FT_VERIFY_MATCH(holdsAll(fastrakStatusMeaning("flipped"), {"hemisphere"}));
+  QCOMPARE(fastrakStatusMeaning(""), std::string());
 }
 
 void FastrakRecordsTest::readsBack() {

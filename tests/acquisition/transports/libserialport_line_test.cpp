@@ -125,22 +125,22 @@ void LibserialportLineTest::driverReadsThroughIt() {
   FastrakSetup setup;
   setup.where = name_;
   setup.baud = baud;
-  FastrakDevice device(
+  const auto device = makeLineDevice<FastrakStartup>(
       setup, [this, baud]() -> Result<std::unique_ptr<Transport>> { return throughLibserialport(name_, baud); });
   std::vector<Sample> samples;
   DeviceState state = DeviceState::kClosed;
   QString text;
-  connect(&device, &TrackerDevice::samplesReceived, this,
+  connect(device.get(), &TrackerDevice::samplesReceived, this,
           [&](const auto& more) { samples.insert(samples.end(), more.begin(), more.end()); });
-  connect(&device, &TrackerDevice::stateChanged, this, [&](DeviceState now, const QString& why) {
+  connect(device.get(), &TrackerDevice::stateChanged, this, [&](DeviceState now, const QString& why) {
     state = now;
     text = why;
   });
-  device.start();
+  device->start();
   QTRY_VERIFY2_WITH_TIMEOUT(samples.size() >= 60, qPrintable(text), 15000);
   QVERIFY2(state == DeviceState::kRunning, qPrintable(text));
   for (const auto& sample : samples) FT_VERIFY_MATCH(near(sample.tracker_from_sensor, kPose, 1e-7, 2e-6));
-  device.stop();
+  device->stop();
   QTRY_COMPARE(state, DeviceState::kClosed);
   QVERIFY(!emulator_->tracker().streaming());
 }

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <QElapsedTimer>
+#include <QTimer>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "acquisition/devices/line_address.h"
+#include "acquisition/devices/sample_clock.h"
+#include "acquisition/devices/tracker_device.h"
+#include "acquisition/devices/tracker_startup.h"
+#include "acquisition/transports/transport.h"
+
+namespace fieldtrue::acquisition {
+
+/// A tracker on any line: opens it, has the tracker set up, turns its bytes into samples with times, watches that they
+/// keep coming and that they are not mirrored, and takes leave. What differs from tracker to tracker is its startup.
+/// Sensor n of its samples is station n + 1; times count from start().
+class LineDevice : public TrackerDevice {
+  Q_OBJECT
+ public:
+  using TransportFactory = std::function<Result<std::unique_ptr<Transport>>()>;
+  using StartupFactory = std::function<std::unique_ptr<TrackerStartup>(Transport& line)>;
+  /// @param make_line called by start(), in the device's thread
+  /// @param clock_speed the tracker's seconds per second; other than 1 only for an emulated tracker
+  LineDevice(LineSetup setup, StartupFactory make_startup, TransportFactory make_line, double clock_speed = 1.0,
+             QObject* parent = nullptr);
+  ~LineDevice() override;
+
+  void start() override;
+  void stop() override;
+  TableMetadata describe() const override;
+
+ private:
+  void beginStartup();
+  void startupFinished();
+  void readReady();
+  void askAgain();
+  Sample stamped(Reading& reading, double arrival_s, std::size_t later_in_bunch);
+  void watch();
+  void running();
+  void noteStatus(const Sample& sample);
+  void noteJump();
+  void failWith(const QString& text);
+  void closeLine();
+  void say(const std::string& bytes);
+  double now_s() const;
+  QString summary() const;
+
+  LineSetup setup_;
+  StartupFactory make_startup_;
+  TransportFactory make_line_;
+  double clock_speed_;
+  std::unique_ptr<Transport> line_;
+  std::unique_ptr<TrackerStartup> startup_;
+  std::unique_ptr<LineExchange> farewell_;
+  std::optional<TrackerIdentity> identity_;
+  StreamPlan stream_;
+  std::string end_;                    ///< What ends its stream.
+  std::map<int, SampleClock> clocks_;  ///< By sensor, where the tracker has no clock of its own.
+  UnitClock unit_clock_;
+  HemisphereWatch hemisphere_;
+  std::map<int, std::string> last_status_;  ///< By sensor.
+  QElapsedTimer clock_;
+  QTimer watch_;
+  int quiet_ticks_ = 0;
+  bool heard_since_tick_ = false;
+  bool noise_since_reading_ = false;
+  std::uint64_t answers_ = 0;
+  std::uint64_t answers_at_tick_ = 0;
+  bool running_ = false;
+};
+
+/// A tracker whose startup is constructed from a line and the setup.
+template <class Startup, class Setup>
+std::unique_ptr<LineDevice> makeLineDevice(const Setup& setup, LineDevice::TransportFactory make_line,
+                                           double clock_speed = 1.0) {
+  return std::make_unique<LineDevice>(
+      setup, [setup](Transport& line) { return std::make_unique<Startup>(line, setup); }, std::move(make_line),
+      clock_speed);
+}
+
+/// The same from what a person wrote, for a row of the registry.
+/// @param setup the tracker's defaults
+/// @param apply Result<void>(const Settings&, Setup&): takes over the settings
+/// @error kBadInput for a line or a setting that cannot be read
+template <class Startup, class Setup, class Apply>
+Result<std::unique_ptr<TrackerDevice>> deviceAtAddress(const std::string& address, const std::vector<Setting>& declared,
+                                                       Setup setup, Apply apply) {
+  FT_TRY(const LineAddress read, readLineAddress(address, declared, setup));
+  FT_TRY_VOID(apply(read.settings, setup));
+  return makeLineDevice<Startup>(setup, [line = read.line] { return makeTransport(line); });
+}
+
+}  // namespace fieldtrue::acquisition

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+namespace fieldtrue::acquisition {
+
+/// Status texts of samples that carry no error code of the tracker's own.
+inline constexpr const char* kStatusMissing = "missing";  ///< The tracker sent a mark of a missing reading.
+/// The numbers cannot be a pose: bytes were changed on the line.
+inline constexpr const char* kStatusDamaged = "damaged";
+inline constexpr const char* kStatusFlipped = "flipped";  ///< Mirrored through the transmitter: wrong hemisphere.
+
+/// Meaning in words of a status every tracker can have; the status itself where it is none of them.
+std::string commonStatusMeaning(const std::string& status);
+
+}  // namespace fieldtrue::acquisition
