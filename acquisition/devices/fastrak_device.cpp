@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "calib/core/declare.h"
+#include "acquisition/devices/polhemus_settings.h"
 
 namespace fieldtrue::acquisition {
 namespace {
@@ -34,28 +34,11 @@ class FastrakReadings : public StreamParser {
 
 }  // namespace
 
-std::vector<Setting> fastrakSettings() {
-  return {
-      stationsSetting(kFastrakStations),
-      hemisphereSetting(),
-      declare::choice(
-          "filter", "Filter", {"off", "low", "medium", "heavy"}, "off",
-          "The tracker's own smoothing; off for a calibration, because smoothed readings are not independent."),
-      declare::flag("raw_frame", "Raw frame", true,
-                    "Reset alignment and boresight, so that poses are in the transmitter's own frame."),
-      declare::flag("may_reset", "May re-initialise", true,
-                    "Restart the tracker (about 12 s) when it does not answer."),
-  };
-}
+std::vector<Setting> fastrakSettings() { return polhemusSettings(kFastrakStations); }
 
 Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const simulation::Scene&) {
-  const auto apply = [](const Settings& settings, FastrakSetup& setup) -> Result<void> {
-    FT_TRY(setup.stations, readStations(settings, setup.id, kFastrakStations));
-    setup.hemisphere = choiceSetting(settings, "hemisphere");
-    setup.filter = choiceSetting(settings, "filter");
-    setup.raw_frame = boolSetting(settings, "raw_frame");
-    setup.may_reset = boolSetting(settings, "may_reset");
-    return {};
+  const auto apply = [](const Settings& settings, FastrakSetup& setup) {
+    return applyPolhemusSettings(settings, kFastrakStations, setup);
   };
   return deviceAtAddress<FastrakStartup>(address, fastrakSettings(), FastrakSetup{}, apply);
 }

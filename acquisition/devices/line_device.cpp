@@ -78,7 +78,7 @@ void LineDevice::startupFinished() {
   stream_ = startup_->stream();
   FT_CHECK(stream_.parser != nullptr && identity_->rate_hz > 0.0);
   clocks_.clear();
-  unit_clock_ = {};
+  unit_clock_ = UnitClock(clock_speed_);
   hemisphere_ = {};
   last_status_.clear();
   quiet_ticks_ = 0;

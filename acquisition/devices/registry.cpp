@@ -8,8 +8,10 @@
 #include "acquisition/devices/registry.h"
 
 #include "acquisition/devices/fastrak_device.h"
+#include "acquisition/devices/liberty_device.h"
 #include "acquisition/devices/simulated_device.h"
 #include "acquisition/emulators/fastrak_emulator.h"
+#include "acquisition/emulators/liberty_emulator.h"
 #include "acquisition/transports/serial_ports.h"
 
 namespace fieldtrue::acquisition {
@@ -37,7 +39,21 @@ std::span<const DeviceKind> deviceKinds() {
        .source = "3SPACE Fastrak manual OPM00PI002 rev. G",
        .settings = fastrakSettings(),
        .make = makeFastrak,
-       .emulate = makeFastrakEmulator}};
+       .emulate = makeFastrakEmulator},
+      {.id = "liberty",
+       .label = "Polhemus Liberty",
+       .address_help = "the line, then settings: liberty:/dev/ttyUSB0@115200, liberty:tcp:localhost:4000,stations=1+2",
+       .source = "Liberty manual URM03PH156 rev. H",
+       .settings = libertySettings(),
+       .make = makeLiberty,
+       .emulate = makeLibertyEmulator},
+      {.id = "patriot",
+       .label = "Polhemus Patriot",
+       .address_help = "the line, then settings: patriot:/dev/ttyUSB0@115200, patriot:tcp:localhost:4000,hemisphere=-x",
+       .source = "Patriot manual URM03PH170 rev. G",
+       .settings = patriotSettings(),
+       .make = makePatriot,
+       .emulate = makePatriotEmulator}};
   return kKinds;
 }
 

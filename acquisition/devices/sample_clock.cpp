@@ -38,7 +38,7 @@ double UnitClock::stamp(double arrival_s, double unit_s) {
   constexpr double kMostShare = 0.5;  // Of a step between two readings, by which earlier arrivals pull them back.
   const double step_s = unit_s - last_unit_s_;
   const double late_s = arrival_s - unit_s - offset_s_;
-  jumped_ = started_ && (step_s < 0.0 || late_s < -kEarly_s || late_s > kLate_s);
+  jumped_ = started_ && (step_s < 0.0 || late_s < -kEarly_s * speed_ || late_s > kLate_s * speed_);
   if (!started_ || jumped_) {
     jump_s_ = started_ ? -late_s : 0.0;
     offset_s_ = arrival_s - unit_s;

@@ -30,6 +30,8 @@ class SampleClock {
 /// that a busy computer does not move them, and notices when the tracker's clock jumps.
 class UnitClock {
  public:
+  /// @param speed the tracker's seconds per second; other than 1 only for an emulated tracker
+  explicit UnitClock(double speed = 1.0) : speed_(speed) {}
   /// @param arrival_s when the reading's bytes were read, never less than before
   /// @param unit_s the tracker's clock at the reading; the same for readings taken together
   /// @return time of the reading [s], never less than before but after a jump
@@ -39,6 +41,7 @@ class UnitClock {
   double jump_s() const { return jump_s_; }
 
  private:
+  double speed_;
   double offset_s_ = 0.0;
   double last_unit_s_ = 0.0;
   double jump_s_ = 0.0;

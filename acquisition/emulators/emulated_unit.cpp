@@ -42,7 +42,7 @@ EmulatedUnit::EmulatedUnit(std::unique_ptr<PoseSource> source, EmulatedUnitOptio
 }
 
 void EmulatedUnit::receive(std::string_view bytes, double time_s, Out& out) {
-  now_s_ = time_s;
+  now_s_ = reading_s_ = time_s;
   if (!silent()) hear(bytes, out);
 }
 
@@ -54,7 +54,8 @@ bool EmulatedUnit::tick(double time_s, Out& out, int most_cycles) {
   for (int i = 0; i < most_cycles; ++i) {
     const auto due_s = source_->due_s(cycle_, sharing(sensors.size()));
     if (!due_s || stream_start_s_ + *due_s > time_s) return false;
-    send(source_->read(cycle_, sensors, stream_start_s_ + *due_s), false, out);
+    reading_s_ = stream_start_s_ + *due_s;
+    send(source_->read(cycle_, sensors, reading_s_), false, out);
     ++cycle_;
   }
   return true;
@@ -76,7 +77,7 @@ Sample EmulatedUnit::misread(Sample sample) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   const EmulatorFaults& faults = options_.faults;
   Eigen::Vector3d& position_m = sample.tracker_from_sensor.position_m;
-  if (faults.error_status && faultySecond(sample.time_s - stream_start_s_)) {
+  if (faults.error_status && faultySecond(reading_s_ - stream_start_s_)) {
     sample.status = "k";
     position_m += Eigen::Vector3d(0.2, -0.1, 0.15);
   }
@@ -88,8 +89,8 @@ Sample EmulatedUnit::misread(Sample sample) {
   return sample;
 }
 
-Pose EmulatedUnit::flipped(Pose pose, double time_s) const {
-  if (options_.faults.hemisphere_flip && faultySecond(time_s - stream_start_s_)) pose.position_m = -pose.position_m;
+Pose EmulatedUnit::flipped(Pose pose) const {
+  if (options_.faults.hemisphere_flip && faultySecond(reading_s_ - stream_start_s_)) pose.position_m = -pose.position_m;
   return pose;
 }
 

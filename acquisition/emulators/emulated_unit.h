@@ -59,11 +59,12 @@ class EmulatedUnit : public EmulatedTracker {
   /// The reading with the faults of readings in it; its pose is what the tracker would find without a hemisphere.
   Sample misread(Sample sample);
   /// The last fault of a pose, after the tracker's own settings acted on it.
-  Pose flipped(Pose pose, double time_s) const;
+  Pose flipped(Pose pose) const;
 
   std::unique_ptr<PoseSource> source_;
   EmulatedUnitOptions options_;
   double now_s_ = 0.0;
+  double reading_s_ = 0.0;  ///< When the readings that are being sent were made, by the tracker's clock.
   bool paused_ = false;
 
  private:

@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <charconv>
 
 #include "acquisition/emulators/fastrak_emulator_core.h"
+#include "acquisition/protocols/command_text.h"
 #include "acquisition/protocols/plain_number.h"
 
 namespace fieldtrue::acquisition {
@@ -40,14 +40,6 @@ const NumberSetting& numberSetting(char letter) {
   const auto row = std::find_if(rows.begin(), rows.end(), [letter](const auto& s) { return s.letter == letter; });
   FT_CHECK(row != rows.end());
   return *row;
-}
-
-std::optional<double> toNumber(const std::string& text) {
-  double value = 0.0;
-  const char* first = text.data() + (text.starts_with('+') ? 1 : 0);
-  const auto [end, error] = std::from_chars(first, text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
 }
 
 std::string column(double value, int decimals) { return fixedText(value, decimals, 7); }
@@ -201,7 +193,7 @@ void FastrakEmulatorCore::setOutputList(const FastrakCommand& command, std::vect
   wanted.resize(std::max(command.fields.size(), command.fields.front().empty() ? items.size() : 0));
   for (std::size_t i = 0; i < command.fields.size(); ++i) {
     if (command.fields[i].empty()) continue;
-    const auto number = toNumber(command.fields[i]);
+    const auto number = fieldNumber(command.fields[i]);
     if (!number) return refuse(command, kNotNumeric, out);
     wanted[i] = static_cast<int>(*number);
   }
@@ -255,7 +247,7 @@ void FastrakEmulatorCore::setNumbers(const FastrakCommand& command, std::vector<
   std::vector<double> wanted = values;
   for (std::size_t i = 0; i < command.fields.size(); ++i) {
     if (command.fields[i].empty()) continue;
-    const auto number = toNumber(command.fields[i]);
+    const auto number = fieldNumber(command.fields[i]);
     if (!number) return refuse(command, kNotNumeric, out);
     wanted[i] = *number;
   }

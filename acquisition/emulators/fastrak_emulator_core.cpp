@@ -90,8 +90,8 @@ void FastrakEmulatorCore::send(const std::vector<Sample>& samples, bool every, s
   for (const Sample& read : samples) {
     const int station = read.sensor + 1;
     const Sample sample = misread(read);
-    const Pose pose = flipped(
-        source_->recorded() ? sample.tracker_from_sensor : reported(station, sample.tracker_from_sensor), read.time_s);
+    const Pose pose =
+        flipped(source_->recorded() ? sample.tracker_from_sensor : reported(station, sample.tracker_from_sensor));
     Memory& memory = memory_[static_cast<std::size_t>(read.sensor)];
     const double increment_m = numbers('I', station)[0] * metresPer(setup_.unit);
     const bool moved =

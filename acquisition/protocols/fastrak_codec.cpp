@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -8,6 +7,7 @@
 #include <utility>
 
 #include "acquisition/protocols/fastrak_items.h"
+#include "acquisition/protocols/little_endian.h"
 #include "acquisition/protocols/plain_number.h"
 
 namespace fieldtrue::acquisition {
@@ -51,18 +51,6 @@ std::optional<double> parseExtended(std::string_view text) {
   if (!isDigit(text[10]) || !isDigit(text[11])) return std::nullopt;
   const int exponent = (text[10] - '0') * 10 + (text[11] - '0');
   return *mantissa * std::pow(10.0, sign == '-' ? -exponent : exponent);
-}
-
-double littleEndianFloat(const char* bytes) {
-  const auto at = [bytes](int i) {
-    return static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[i])) << (8 * i);
-  };
-  return static_cast<double>(std::bit_cast<float>(at(0) | at(1) | at(2) | at(3)));
-}
-
-void appendLittleEndianFloat(std::string& out, double value) {
-  auto word = std::bit_cast<std::uint32_t>(static_cast<float>(value));
-  for (int i = 0; i < 4; ++i, word >>= 8) out += static_cast<char>(word & 0xFFu);
 }
 
 /// 14 bits of a two's complement word, seven in each byte, low byte first.

@@ -4,8 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "acquisition/protocols/plain_number.h"
-#include "calib/core/trimmed.h"
+#include "acquisition/protocols/command_text.h"
 
 namespace fieldtrue::acquisition {
 namespace {
@@ -52,22 +51,6 @@ constexpr FastrakCommandKind kKinds[] = {
     {'X', kFreeText, "identification"},
 };
 
-/// Up to four decimals, no exponent, no trailing zeros.
-std::string number(double value) {
-  std::string result = fixedText(value, 4);
-  result.erase(result.find_last_not_of('0') + 1);
-  if (result.back() == '.') result.pop_back();
-  return result == "-0" ? "0" : result;
-}
-
-std::vector<std::string> numbers(std::initializer_list<Eigen::Vector3d> vectors) {
-  std::vector<std::string> fields;
-  for (const auto& v : vectors) {
-    for (const double x : v) fields.push_back(number(x));
-  }
-  return fields;
-}
-
 FastrakCommand atOnce(char letter) { return {letter, std::nullopt, {}, {}}; }
 
 FastrakCommand forStation(char letter, int station, std::vector<std::string> fields = {}) {
@@ -77,25 +60,6 @@ FastrakCommand forStation(char letter, int station, std::vector<std::string> fie
 
 FastrakCommand withFields(char letter, std::vector<std::string> fields) {
   return {letter, std::nullopt, std::move(fields), {}};
-}
-
-std::string joined(const std::vector<std::string>& fields, bool leading_comma) {
-  std::string out;
-  for (std::size_t i = 0; i < fields.size(); ++i) {
-    if (i > 0 || leading_comma) out += ',';
-    out += fields[i];
-  }
-  return out;
-}
-
-std::vector<std::string> split(std::string_view text) {
-  std::vector<std::string> fields;
-  for (std::size_t start = 0; start <= text.size();) {
-    const std::size_t comma = std::min(text.find(',', start), text.size());
-    fields.emplace_back(trimmed(text.substr(start, comma - start)));
-    start = comma + 1;
-  }
-  return fields;
 }
 
 FastrakCommand commandOfLine(std::string_view line) {
@@ -109,7 +73,7 @@ FastrakCommand commandOfLine(std::string_view line) {
     return command;
   }
   if (command.text.empty()) return command;
-  command.fields = split(command.text);
+  command.fields = splitAtCommas(command.text);
   const std::string& first = command.fields.front();
   if (kind->grammar == kStation && first.size() == 1 && first[0] >= '0' && first[0] <= '9') {
     command.station = first[0] - '0';
@@ -134,7 +98,8 @@ std::string encode(const FastrakCommand& command) {
   std::string out(1, command.letter);
   if (kind->grammar == kAtOnce) return out;
   if (command.station) out += static_cast<char>('0' + *command.station);
-  out += joined(command.fields, command.station.has_value());
+  if (command.station && !command.fields.empty()) out += ',';
+  out += joinedByCommas(command.fields);
   return out + '\r';
 }
 
@@ -184,34 +149,36 @@ FastrakCommand outputList(int station, std::span<const int> items) {
 }
 FastrakCommand stationActive(int station, bool on) { return forStation('l', station, {on ? "1" : "0"}); }
 FastrakCommand hemisphere(int station, const Eigen::Vector3d& towards) {
-  return forStation('H', station, numbers({towards}));
+  return forStation('H', station, commandNumbers({towards}));
 }
 FastrakCommand boresight(int station) { return forStation('B', station); }
 FastrakCommand unBoresight(int station) { return forStation('b', station); }
 FastrakCommand boresightReference(int station, const Eigen::Vector3d& azimuth_elevation_roll_deg) {
-  return forStation('G', station, numbers({azimuth_elevation_roll_deg}));
+  return forStation('G', station, commandNumbers({azimuth_elevation_roll_deg}));
 }
 FastrakCommand alignment(int station, const Eigen::Vector3d& origin, const Eigen::Vector3d& on_x,
                          const Eigen::Vector3d& on_y) {
-  return forStation('A', station, numbers({origin, on_x, on_y}));
+  return forStation('A', station, commandNumbers({origin, on_x, on_y}));
 }
 FastrakCommand resetAlignment(int station) { return forStation('R', station); }
 FastrakCommand transmitterMounting(int station, const Eigen::Vector3d& azimuth_elevation_roll_deg) {
-  return forStation('r', station, numbers({azimuth_elevation_roll_deg}));
+  return forStation('r', station, commandNumbers({azimuth_elevation_roll_deg}));
 }
-FastrakCommand tipOffset(int station, const Eigen::Vector3d& tip) { return forStation('N', station, numbers({tip})); }
+FastrakCommand tipOffset(int station, const Eigen::Vector3d& tip) {
+  return forStation('N', station, commandNumbers({tip}));
+}
 FastrakCommand stylusButton(int station, bool point_mode) { return forStation('e', station, {point_mode ? "1" : "0"}); }
-FastrakCommand increment(int station, double distance) { return forStation('I', station, {number(distance)}); }
+FastrakCommand increment(int station, double distance) { return forStation('I', station, {commandNumber(distance)}); }
 FastrakCommand positionEnvelope(int station, const Eigen::Vector3d& max, const Eigen::Vector3d& min) {
-  return forStation('V', station, numbers({max, min}));
+  return forStation('V', station, commandNumbers({max, min}));
 }
 FastrakCommand angularEnvelope(int station, const Eigen::Vector3d& max_deg, const Eigen::Vector3d& min_deg) {
-  return forStation('Q', station, numbers({max_deg, min_deg}));
+  return forStation('Q', station, commandNumbers({max_deg, min_deg}));
 }
 
 namespace {
 FastrakCommand filter(char letter, const Filter& f) {
-  return withFields(letter, {number(f.f), number(f.low), number(f.high), number(f.factor)});
+  return withFields(letter, {commandNumber(f.f), commandNumber(f.low), commandNumber(f.high), commandNumber(f.factor)});
 }
 FastrakCommand macro(char letter, int level) {
   FT_CHECK(level >= 2 && level <= 5);

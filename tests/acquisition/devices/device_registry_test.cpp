@@ -81,10 +81,10 @@ void DeviceRegistryTest::everyRow() {
 
 void DeviceRegistryTest::goodTexts_data() {
   QTest::addColumn<QByteArray>("text");
-  for (const char* text :
-       {"simulated", "simulated:speed=4,seed=2,travel_s=1", "simulated:fault=outliers", "fastrak:/dev/ttyUSB0",
-        "fastrak:/dev/ttyUSB0@19200,hemisphere=-x,stations=13", "fastrak:/dev/ttyUSB0,stations=1+3",
-        "fastrak:tcp:localhost:4000,filter=low,raw_frame=false"}) {
+  for (const char* text : {"simulated", "simulated:speed=4,seed=2,travel_s=1", "simulated:fault=outliers",
+                           "fastrak:/dev/ttyUSB0", "fastrak:/dev/ttyUSB0@19200,hemisphere=-x,stations=13",
+                           "fastrak:/dev/ttyUSB0,stations=1+3", "fastrak:tcp:localhost:4000,filter=low,raw_frame=false",
+                           "liberty:/dev/ttyUSB0@115200,stations=1+16", "patriot:tcp:localhost:4000,stations=2"}) {
     QTest::newRow(text) << QByteArray(text);
   }
 }
@@ -101,13 +101,15 @@ void DeviceRegistryTest::badTexts_data() {
     QTest::newRow(text) << QByteArray(text) << fragments;
   };
   row("", {"simulated"});
-  row("isotrak:/dev/ttyUSB0", {"isotrak", "simulated", "fastrak"});
+  row("sonar:/dev/ttyUSB0", {"sonar", "simulated", "fastrak"});
   row("fastrak", {"/dev/ttyUSB0@115200"});
   row("fastrak:", {"/dev/ttyUSB0@115200"});
   row("fastrak:/dev/ttyUSB0@fast", {"fast", "baud"});
   row("fastrak:/dev/ttyUSB0,hemisphere=up", {"hemisphere", "up"});
   row("fastrak:/dev/ttyUSB0,stations=15", {"stations", "1 to 4", "1+2", "15"});
   row("fastrak:/dev/ttyUSB0,stations=1+", {"stations", "1+"});
+  row("liberty:/dev/ttyUSB0,stations=17", {"stations", "1 to 16", "17"});
+  row("patriot:/dev/ttyUSB0,stations=1+3", {"stations", "1 to 2", "1+3"});
   row("fastrak:/dev/ttyUSB0,color=red", {"color", "hemisphere"});
   row("simulated:speed=0", {"speed", "0.1"});
   row("simulated:travel=1", {"travel", "travel_s"});

@@ -1,0 +1,170 @@
+#pragma once
+
+#include <QTemporaryDir>
+#include <QTest>
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "acquisition/devices/line_device.h"
+#include "acquisition/emulators/emulated_unit.h"
+#include "acquisition/emulators/pty_endpoint.h"
+#include "calib/core/statistics.h"
+#include "tests/acquisition/devices/device_probe.h"
+#include "tests/support/matchers.h"
+
+namespace fieldtrue::testing {
+
+/// An emulated tracker on one of the carriers, with the device that drives it.
+struct LineBench {
+  std::unique_ptr<QTemporaryDir> folder = std::make_unique<QTemporaryDir>();
+  std::unique_ptr<acquisition::EmulatorRunner> emulator;
+  std::unique_ptr<acquisition::LineDevice> device;
+  std::unique_ptr<DeviceProbe> probe;
+};
+
+inline void addCarriers() {
+  QTest::addColumn<QByteArray>("carrier");
+  for (const char* carrier : {"in process", "pty", "tcp"}) QTest::newRow(carrier) << QByteArray(carrier);
+}
+
+/// Waits that suit a program that answers at once.
+inline acquisition::LineTimings quickTimings() {
+  acquisition::LineTimings timings;
+  timings.settle_ms = 20;
+  timings.clear_ms = 5;
+  timings.command_ms = 1;
+  timings.quiet_ms = 20;
+  timings.drain_most_ms = 300;
+  timings.reply_ms = 800;
+  timings.reset_ms = 300;
+  timings.lock_ms = 1000;
+  timings.silence_ms = 750;
+  timings.stop_quiet_ms = 30;
+  return timings;
+}
+
+/// A setup for a tracker that answers at once.
+template <class Setup>
+Setup quick(Setup setup, const QString& where = "the line") {
+  setup.where = where.toStdString();
+  setup.device_text = setup.id + ":" + where.toStdString();
+  setup.timings = quickTimings();
+  return setup;
+}
+
+/// @param carrier "in process", "pty" or "tcp"
+/// @param speed the tracker's seconds per second
+template <class Unit, class Startup, class Options, class Setup>
+LineBench makeLineBench(const QByteArray& carrier, std::unique_ptr<acquisition::PoseSource> source,
+                        const Options& options, const Setup& setup, double speed = 1.0) {
+  using namespace acquisition;
+  LineBench bench;
+  LineDevice::TransportFactory make_line;
+  if (carrier == "in process") {
+    auto ends = LoopbackTransport::pair();
+    bench.emulator = emulatorOnLine<Unit>(std::move(source), std::move(ends.second), options, speed);
+    auto host = std::make_shared<std::unique_ptr<Transport>>(std::move(ends.first));
+    make_line = [host]() -> Result<std::unique_ptr<Transport>> { return std::move(*host); };
+  } else {
+    std::unique_ptr<EmulatorEndpoint> endpoint;
+    if (carrier == "tcp") {
+      endpoint = std::make_unique<TcpEndpoint>(quint16{0});
+    } else {
+      endpoint = std::make_unique<PtyEndpoint>(bench.folder->filePath("tracker"));
+    }
+    bench.emulator = std::make_unique<EmulatorRunner>(std::make_unique<Unit>(std::move(source), options),
+                                                      std::move(endpoint), options.faults, speed);
+  }
+  FT_CHECK(bench.emulator->start().has_value());
+  if (!make_line) {
+    const std::string address = bench.emulator->endpoint().address().toStdString();
+    make_line = [address] { return makeTransport(address); };
+  }
+  bench.device = makeLineDevice<Startup>(setup, std::move(make_line), speed);
+  bench.probe = std::make_unique<DeviceProbe>(*bench.device);
+  return bench;
+}
+
+/// What a driver does when its tracker misbehaves.
+struct FaultCase {
+  std::string fault;
+  bool fails = false;            ///< It gives up; otherwise it goes on.
+  QList<QByteArray> says;        ///< Fragments of its sentences.
+  bool marks_readings = false;   ///< Some readings carry a status.
+  bool leaves_outliers = false;  ///< What the outlier test of the averaging must find.
+};
+
+/// The faults that every emulated tracker has.
+/// @param name what messages call it; @param id of its row; @param too_weak what is said of error k
+inline std::vector<FaultCase> commonFaults(const QByteArray& name, const QByteArray& id, const QByteArray& too_weak) {
+  return {
+      {"garbage_at_open", false, {name}},
+      {"lost_bytes", false, {name}},
+      {"split_writes", false, {name}},
+      {"error_status", false, {"Station 1", too_weak}, true},
+      {"hemisphere_flip", false, {"Station 1", "hemisphere"}, true},
+      {"wrong_baud", true, {"not " + name + " records", "try 19200", id + ":the line@19200"}},
+      {"unplug_after=100", true, {"closed"}},
+      {"silence", true, {"No answer", "switched on", "cable"}},
+      {"already_streaming", false, {name}},
+      {"slow_reply", false, {name}},
+      {"outliers", false, {name}, false, true},
+  };
+}
+
+/// Rows: every fault on every carrier. @param id of the tracker: every fault that it can have must be among them
+inline void addFaults(const std::vector<FaultCase>& cases) {
+  QTest::addColumn<int>("number");
+  QTest::addColumn<QByteArray>("carrier");
+  for (const char* carrier : {"pty", "tcp"}) {
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      QTest::addRow("%s, %s", cases[i].fault.c_str(), carrier) << static_cast<int>(i) << QByteArray(carrier);
+    }
+  }
+}
+
+/// The names of faults that no case tries.
+inline std::string untried(const std::vector<FaultCase>& cases) {
+  std::string names;
+  for (const auto& known : acquisition::emulatorFaults()) {
+    const bool tried = std::any_of(cases.begin(), cases.end(), [&](const FaultCase& c) {
+      return c.fault.substr(0, c.fault.find('=')) == known.id;
+    });
+    if (!tried) names += known.id + " ";
+  }
+  return names;
+}
+
+/// Runs a bench whose one sensor stands still, and holds the driver to the case: nothing wrong can be averaged, for
+/// what carries no status is right, or falls to the outlier test.
+inline void tryFault(LineBench& bench, const FaultCase& now, const Pose& pose, double tolerance_m,
+                     double tolerance_rad) {
+  using acquisition::DeviceState;
+  constexpr std::size_t kSamples = 700;
+  DeviceProbe& probe = *bench.probe;
+  bench.device->start();
+  QTRY_VERIFY2_WITH_TIMEOUT(now.fails ? probe.state == DeviceState::kFailed : probe.good().size() >= kSamples,
+                            qPrintable(probe.last_text), 20000);
+  QCOMPARE(probe.failures, now.fails ? 1 : 0);
+  FT_VERIFY_MATCH(holdsAll((now.fails ? probe.last_text : probe.texts.join('\n')).toStdString(), now.says));
+  if (now.fails) {
+    QVERIFY(!probe.last_text.contains('\n'));
+    QTest::qWait(50);
+    QCOMPARE(probe.failures, 1);
+  }
+  const auto good = probe.good();
+  if (good.empty()) return;
+  if (now.leaves_outliers) {
+    const auto statistics = averageSamples(good);
+    FT_VERIFY_OK(statistics);
+    QVERIFY(!statistics->rejections.empty());
+    FT_VERIFY_MATCH(near(statistics->mean, pose, tolerance_m, tolerance_rad));
+    return;
+  }
+  for (const auto& sample : good) FT_VERIFY_MATCH(near(sample.tracker_from_sensor, pose, tolerance_m, tolerance_rad));
+  if (now.marks_readings) QVERIFY(good.size() < probe.samples.size());
+}
+
+}  // namespace fieldtrue::testing
