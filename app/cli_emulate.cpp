@@ -43,7 +43,7 @@ Read<acquisition::Emulation> readEmulation(const EmulateOptions& options, std::v
   emulation.tcp_port = options.port;
   emulation.seed = options.seed;
   emulation.sensors = options.sensors;
-  const auto faults = acquisition::parseFaults(options.faults);
+  const auto faults = acquisition::parseFaults(options.faults, options.tracker);
   if (!faults) return wrongUsage(faults.error());
   emulation.faults = *faults;
   const auto scene = readSceneArgument(options.scene);
@@ -97,7 +97,8 @@ std::string emulatedKinds() {
 std::string faultsHelp() {
   std::string text = "Comma-separated faults to exercise a driver with:";
   for (const acquisition::EmulatorFault& fault : acquisition::emulatorFaults()) {
-    text += "\n  " + fault.id + (fault.needs_count ? "=N" : "") + "  " + fault.help;
+    text += "\n  " + fault.id + (fault.needs_count ? "=N" : "") + "  " + fault.help +
+            (fault.only_of.empty() ? "" : " (" + fault.only_of + ")");
   }
   return text;
 }

@@ -2,16 +2,17 @@
 // 1. acquisition/protocols/<id>: commands to bytes, and a StreamParser that turns bytes into readings; no I/O.
 // 2. acquisition/emulators/<id>: the device side over EmulatedUnit, so that it can be tested without hardware.
 // 3. acquisition/devices/<id>_device: its settings, and the TrackerStartup that brings it to a stream; LineDevice has
-// the
-//    line, the clock, the watching and the farewell.
+//    the line, the clock, the watching and the farewell.
 // 4. One row below. Menus, command line and the contract test read the table.
 #include "acquisition/devices/registry.h"
 
 #include "acquisition/devices/fastrak_device.h"
 #include "acquisition/devices/liberty_device.h"
+#include "acquisition/devices/openigtlink_device.h"
 #include "acquisition/devices/simulated_device.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/emulators/liberty_emulator.h"
+#include "acquisition/emulators/openigtlink_emulator.h"
 #include "acquisition/transports/serial_ports.h"
 
 namespace fieldtrue::acquisition {
@@ -53,7 +54,15 @@ std::span<const DeviceKind> deviceKinds() {
        .source = "Patriot manual URM03PH170 rev. G",
        .settings = patriotSettings(),
        .make = makePatriot,
-       .emulate = makePatriotEmulator}};
+       .emulate = makePatriotEmulator},
+      {.id = "openigtlink",
+       .label = "OpenIGTLink server",
+       .address_help = "host and port, then settings: openigtlink:localhost:18944,devices=Probe+Stylus",
+       .source = "openigtlink.org, protocol versions 1 to 3",
+       .settings = openigtlinkSettings(),
+       .usual_addresses = {"localhost:18944"},
+       .make = makeOpenigtlink,
+       .emulate = makeIgtlEmulator}};
   return kKinds;
 }
 

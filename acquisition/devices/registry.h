@@ -31,6 +31,7 @@ struct DeviceKind {
   std::string address_help;  ///< How to write the address.
   std::string source;
   std::vector<Setting> settings;
+  std::vector<std::string> usual_addresses;  ///< Offered in place of serial lines, where it is not on one.
   /// @param address after the first colon; @param scene only used by simulated devices
   Result<std::unique_ptr<TrackerDevice>> (*make)(const std::string& address, const simulation::Scene& scene) = nullptr;
   /// Its other side, on a pty or a TCP port, not yet started; null where nothing is emulated.

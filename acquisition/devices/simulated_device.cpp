@@ -32,7 +32,7 @@ std::vector<Setting> simulatedSettings() {
   Setting fault =
       declare::choice("fault", "Fault", {"none"}, "none", "What the emulated tracker does wrong on purpose.");
   for (const auto& row : emulatorFaults()) {
-    if (!row.needs_count) fault.choices.push_back(row.id);
+    if (!row.needs_count && row.isOf("fastrak")) fault.choices.push_back(row.id);
   }
   return {
       declare::number("speed", "Speed", {0.1, 100.0}, 1.0, "The tracker's seconds per second."),

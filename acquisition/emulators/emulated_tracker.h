@@ -21,6 +21,8 @@ class EmulatedTracker {
   /// Sends what is due by now, in order, at most that many cycles; what is left over is sent by the next call.
   /// @return true when more is due already
   virtual bool tick(double time_s, std::vector<EmulatedOutput>& out, int most_cycles = 256) = 0;
+  /// A host has connected, where the line tells so.
+  virtual void hostCame(double /*time_s*/) {}
   /// Whether records are sent without being asked for.
   virtual bool streaming() const = 0;
 };

@@ -33,6 +33,7 @@ void TcpEndpoint::accept() {
     host->deleteLater();
     if (host_ == host) host_ = nullptr;
   });
+  emit hostCame();
 }
 
 void TcpEndpoint::send(const QByteArray& bytes) {

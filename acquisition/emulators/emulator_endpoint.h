@@ -28,6 +28,8 @@ class EmulatorEndpoint : public QObject {
 
  signals:
   void received(const QByteArray& bytes);
+  /// A host has connected, where the line tells so (TCP).
+  void hostCame();
   /// Something the person who started the emulator should know.
   void notice(const QString& text);
 };

@@ -29,27 +29,41 @@ std::span<const EmulatorFault> emulatorFaults() {
        [](EmulatorFaults& f, std::uint64_t) { f.slow_reply = true; }},
       {"outliers", "one record in a hundred is 0.1 to 0.3 m off", false,
        [](EmulatorFaults& f, std::uint64_t) { f.outliers = true; }},
+      {"wrong_crc", "one message in ten has a CRC that does not fit", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.wrong_crc = true; }, "openigtlink"},
+      {"unknown_types", "images and messages of an unknown type come between the poses", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.unknown_types = true; }, "openigtlink"},
+      {"no_stamps", "messages carry no time", false, [](EmulatorFaults& f, std::uint64_t) { f.no_stamps = true; },
+       "openigtlink"},
+      {"waits_to_be_asked", "sends nothing until it is asked to", false,
+       [](EmulatorFaults& f, std::uint64_t) { f.waits_to_be_asked = true; }, "openigtlink"},
   };
   return kFaults;
 }
 
+bool EmulatorFault::isOf(const std::string& tracker) const {
+  return only_of.empty() || tracker.empty() || ("," + only_of + ",").find("," + tracker + ",") != std::string::npos;
+}
+
 namespace {
 
-std::string knownFaults() {
+std::string knownFaults(const std::string& tracker) {
   std::string names;
   for (const auto& fault : emulatorFaults()) {
+    if (!fault.isOf(tracker)) continue;
     names += (names.empty() ? "" : ", ") + fault.id + (fault.needs_count ? "=N" : "");
   }
   return names;
 }
 
-Result<void> applyFault(const std::string& text, EmulatorFaults& faults) {
+Result<void> applyFault(const std::string& text, const std::string& tracker, EmulatorFaults& faults) {
   const std::size_t equals = text.find('=');
   const std::string id = text.substr(0, equals);
   const auto rows = emulatorFaults();
-  const auto row = std::find_if(rows.begin(), rows.end(), [&id](const auto& fault) { return fault.id == id; });
+  const auto row =
+      std::find_if(rows.begin(), rows.end(), [&](const auto& fault) { return fault.id == id && fault.isOf(tracker); });
   if (row == rows.end()) {
-    return fail(ErrorCode::kBadInput, "\"" + id + "\" is not a fault; known are " + knownFaults());
+    return fail(ErrorCode::kBadInput, "\"" + id + "\" is not a fault; known are " + knownFaults(tracker));
   }
   std::uint64_t count = 0;
   if (row->needs_count) {
@@ -67,11 +81,11 @@ Result<void> applyFault(const std::string& text, EmulatorFaults& faults) {
 
 }  // namespace
 
-Result<EmulatorFaults> parseFaults(const std::string& list) {
+Result<EmulatorFaults> parseFaults(const std::string& list, const std::string& tracker) {
   EmulatorFaults faults;
   for (std::size_t start = 0; start < list.size();) {
     const std::size_t comma = std::min(list.find(',', start), list.size());
-    FT_TRY_VOID(applyFault(list.substr(start, comma - start), faults));
+    FT_TRY_VOID(applyFault(list.substr(start, comma - start), tracker, faults));
     start = comma + 1;
   }
   return faults;

@@ -20,6 +20,10 @@ EmulatorRunner::EmulatorRunner(std::unique_ptr<EmulatedTracker> tracker, std::un
   connect(&timer_, &QTimer::timeout, this, &EmulatorRunner::tick);
   connect(endpoint_, &EmulatorEndpoint::received, this, &EmulatorRunner::receive);
   connect(endpoint_, &EmulatorEndpoint::notice, this, &EmulatorRunner::notice);
+  connect(endpoint_, &EmulatorEndpoint::hostCame, this, [this] {
+    tracker_->hostCame(time_s());
+    if (tracker_->streaming() && !timer_.isActive()) timer_.start(kTick_ms);
+  });
 }
 
 Result<void> EmulatorRunner::start() {

@@ -191,9 +191,14 @@ void ConnectPage::onKind() {
 }
 
 void ConnectPage::refreshLines() {
-  const QString typed = address_->currentText();
+  const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
+  // Of another kind's addresses none is of use.
+  const QString typed = address_->findText(address_->currentText()) < 0 ? address_->currentText() : QString();
   address_->clear();
-  for (const acquisition::SerialLine& line : acquisition::serialLines()) {
+  for (const std::string& usual : kind.usual_addresses) address_->addItem(QString::fromStdString(usual));
+  const bool is_on_a_line = kind.usual_addresses.empty();
+  for (const acquisition::SerialLine& line :
+       is_on_a_line ? acquisition::serialLines() : std::vector<acquisition::SerialLine>()) {
     address_->addItem(QString::fromStdString(line.path));
     address_->setItemData(address_->count() - 1, QString::fromStdString(line.description), Qt::ToolTipRole);
   }

@@ -125,10 +125,11 @@ inline void addFaults(const std::vector<FaultCase>& cases) {
   }
 }
 
-/// The names of faults that no case tries.
-inline std::string untried(const std::vector<FaultCase>& cases) {
+/// The names of faults of a tracker that no case tries. @param id of its row
+inline std::string untried(const std::vector<FaultCase>& cases, const std::string& id) {
   std::string names;
   for (const auto& known : acquisition::emulatorFaults()) {
+    if (!known.isOf(id)) continue;
     const bool tried = std::any_of(cases.begin(), cases.end(), [&](const FaultCase& c) {
       return c.fault.substr(0, c.fault.find('=')) == known.id;
     });
