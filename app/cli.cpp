@@ -208,6 +208,7 @@ int main(int argc, char** argv) {
   fieldtrue::cli::addApplyCommand(line);
   fieldtrue::cli::addAcquireCommand(line);
   fieldtrue::cli::addEmulateCommand(line);
+  fieldtrue::cli::addFindCommand(line);
   fieldtrue::cli::addFitCommands(line);
   fieldtrue::cli::addDifferenceCommand(line);
   fieldtrue::cli::addResampleCommand(line);

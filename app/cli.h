@@ -96,6 +96,7 @@ void addFitCommands(CommandLine& line);        ///< fit, compare, report
 void addDifferenceCommand(CommandLine& line);  ///< difference
 void addAcquireCommand(CommandLine& line);     ///< acquire
 void addEmulateCommand(CommandLine& line);     ///< emulate
+void addFindCommand(CommandLine& line);        ///< find
 void addResampleCommand(CommandLine& line);    ///< resample
 void addGapCommands(CommandLine& line);        ///< diagnose, plan-check, blind
 void addListCommands(CommandLine& line);       ///< methods, effects, devices, formats

@@ -17,6 +17,16 @@ constexpr ReadBack kReadBacks[] = {
 
 bool isLine(const std::string& heard) { return heard.find('\n') != std::string::npos; }
 
+const std::vector<int> kFastrakRates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
+
+std::optional<ProbeAnswer> fastrakAnswer(std::string_view heard) {
+  const auto status = findStatus(heard);
+  if (!status) return std::nullopt;
+  ProbeAnswer answer{"Polhemus Fastrak", status->version, wantedStations({}, status->sensors), {}};
+  if (!status->identity.empty()) answer.model += " (" + status->identity + ")";
+  return answer;
+}
+
 /// Records of a Fastrak as readings.
 class FastrakReadings : public StreamParser {
  public:
@@ -33,6 +43,19 @@ class FastrakReadings : public StreamParser {
 };
 
 }  // namespace
+
+TrackerProbe fastrakProbe() {
+  TrackerProbe probe;
+  probe.rates = kFastrakRates;
+  probe.stop = encode(fastrak::continuous(false)) + "\r";
+  probe.ask = encode(fastrak::status());
+  probe.answer = fastrakAnswer;
+  probe.stream = [](std::string_view heard) -> std::optional<ProbeAnswer> {
+    return looksLikeFastrakStream(heard) ? std::optional<ProbeAnswer>(std::in_place) : std::nullopt;
+  };
+  probe.may_do = "A stream that runs is ended; a command half typed by another program is ended too.";
+  return probe;
+}
 
 std::vector<Setting> fastrakSettings() { return polhemusSettings(kFastrakStations); }
 
@@ -55,7 +78,7 @@ void FastrakStartup::run() {
   greeting.ask = encode(fastrak::status());
   greeting.answered = [](const std::string& heard) { return findStatus(heard).has_value(); };
   greeting.reset = encode(fastrak::reinitialise());
-  greeting.rates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
+  greeting.rates = kFastrakRates;
   greet(std::move(greeting), [this](const std::string& heard) { statusCame(*findStatus(heard)); });
 }
 

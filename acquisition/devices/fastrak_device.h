@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "acquisition/devices/line_device.h"
+#include "acquisition/devices/tracker_probe.h"
 #include "acquisition/protocols/fastrak.h"
 #include "calib/simulation/scene.h"
 
@@ -30,6 +31,8 @@ inline constexpr std::array<int, 4> kFastrakDriverItems = {2, 11, 16, 1};
 
 /// The settings of a Fastrak as data, for registry, forms and command line.
 std::vector<Setting> fastrakSettings();
+/// How a Fastrak is found on a line.
+TrackerProbe fastrakProbe();
 /// A Fastrak at an address. @error kBadInput
 Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const simulation::Scene& scene);
 

@@ -9,6 +9,7 @@ namespace fieldtrue::acquisition {
 namespace {
 
 constexpr char kHemisphereLetter = 'H';
+const std::vector<int> kLibertyRates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
 
 Result<std::unique_ptr<TrackerDevice>> makeOfRow(const std::string& address, const LibertyMake& row) {
   const auto apply = [&row](const Settings& settings, LibertySetup& setup) {
@@ -24,7 +25,48 @@ const LibertyMake* makeWithTag(const std::string& tag) {
   return nullptr;
 }
 
+/// Bits of the stations plugged in as their numbers, and who it is. Both must have come.
+std::optional<ProbeAnswer> libertyAnswer(std::string_view heard, const char* id) {
+  const LibertyMake& make = libertyMake(id);
+  const auto who = findLibertyFrame(heard, kLibertyWho);
+  const auto stations = findLibertyFrame(heard, kLibertyStations);
+  const auto plugged = stations ? libertyPlugged(*stations) : std::nullopt;
+  if (!who || who->tag != make.tag || !plugged) return std::nullopt;
+  return ProbeAnswer{make.make, libertyIdentity(*who), wantedStations({}, *plugged), {}};
+}
+
+std::optional<ProbeAnswer> libertyStream(std::string_view heard, const char* id) {
+  const auto record = findLibertyFrame(heard, 'C');
+  const bool is_this = record && record->tag == libertyMake(id).tag;
+  return is_this ? std::optional<ProbeAnswer>(std::in_place) : std::nullopt;
+}
+
+/// How one of them is found; which it is, its tag tells.
+TrackerProbe probeOfMake() {
+  TrackerProbe probe;
+  probe.rates = kLibertyRates;
+  probe.stop = "\r" + liberty::point();
+  probe.ask = liberty::binary(true) + liberty::who() + liberty::stations();
+  probe.reply_ms = 600;
+  probe.may_do = "A stream that runs is ended, and its output is binary until it is told otherwise.";
+  return probe;
+}
+
 }  // namespace
+
+TrackerProbe libertyProbe() {
+  TrackerProbe probe = probeOfMake();
+  probe.answer = [](std::string_view heard) { return libertyAnswer(heard, "liberty"); };
+  probe.stream = [](std::string_view heard) { return libertyStream(heard, "liberty"); };
+  return probe;
+}
+
+TrackerProbe patriotProbe() {
+  TrackerProbe probe = probeOfMake();
+  probe.answer = [](std::string_view heard) { return libertyAnswer(heard, "patriot"); };
+  probe.stream = [](std::string_view heard) { return libertyStream(heard, "patriot"); };
+  return probe;
+}
 
 std::vector<Setting> libertySettings() { return polhemusSettings(libertyMake("liberty").most_stations); }
 std::vector<Setting> patriotSettings() { return polhemusSettings(libertyMake("patriot").most_stations); }
@@ -48,7 +90,7 @@ void LibertyStartup::run() {
   greeting.ask = liberty::binary(true) + liberty::who();
   greeting.answered = [](const std::string& heard) { return findLibertyFrame(heard, kLibertyWho).has_value(); };
   greeting.reset = liberty::reinitialise();
-  greeting.rates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
+  greeting.rates = kLibertyRates;
   greet(std::move(greeting), [this](const std::string& heard) { whoCame(*findLibertyFrame(heard, kLibertyWho)); });
 }
 

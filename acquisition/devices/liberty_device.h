@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "acquisition/devices/line_device.h"
+#include "acquisition/devices/tracker_probe.h"
 #include "acquisition/protocols/liberty.h"
 #include "calib/simulation/scene.h"
 
@@ -26,6 +27,10 @@ struct LibertySetup : LineSetup {
 
 /// The output list the driver asks for: time stamp, position, quaternion, tail mark.
 inline constexpr std::array<int, 4> kLibertyDriverItems = {8, 2, 7, 1};
+
+/// How a Liberty or a Patriot is found on a line.
+TrackerProbe libertyProbe();
+TrackerProbe patriotProbe();
 
 std::vector<Setting> libertySettings();
 std::vector<Setting> patriotSettings();

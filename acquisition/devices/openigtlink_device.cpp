@@ -31,6 +31,16 @@ std::string joined(const std::vector<std::string>& parts, const char* between) {
 
 std::string request(const char* type, const std::string& body) { return encodeIgtl(type, "", 0, body); }
 
+std::optional<ProbeAnswer> igtlAnswer(std::string_view heard) {
+  IgtlSurvey survey;
+  survey.add(heard, 0.0);
+  if (survey.summary().empty()) return std::nullopt;
+  ProbeAnswer answer;
+  answer.model = "OpenIGTLink server";
+  for (const IgtlSource& source : survey.choose({}).sources) answer.sensor_names.push_back(source.name);
+  return answer;
+}
+
 /// `HOST:PORT,settings` as the other lines are written.
 std::string lineAddressOf(const std::string& address) {
   constexpr std::string_view kTcp = "tcp:";
@@ -53,6 +63,14 @@ IgtlSetup::IgtlSetup() {
   timings.settle_ms = 20;
   timings.drain_most_ms = 0;
   timings.silence_ms = 3000;
+}
+
+TrackerProbe openigtlinkProbe() {
+  TrackerProbe probe;
+  probe.ask = request("GET_STATUS", {});
+  probe.answer = probe.stream = igtlAnswer;
+  probe.may_do = "Nothing: it is listened to, and at the usual port asked for its state.";
+  return probe;
 }
 
 std::vector<Setting> openigtlinkSettings() {

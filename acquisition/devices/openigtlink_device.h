@@ -6,6 +6,7 @@
 
 #include "acquisition/devices/line_device.h"
 #include "acquisition/devices/openigtlink_survey.h"
+#include "acquisition/devices/tracker_probe.h"
 #include "calib/core/settings.h"
 #include "calib/simulation/scene.h"
 
@@ -23,6 +24,8 @@ struct IgtlSetup : LineSetup {
 };
 
 std::vector<Setting> openigtlinkSettings();
+/// How a server is found: by what it sends, or by its answer to a question for its state.
+TrackerProbe openigtlinkProbe();
 /// @param address HOST, HOST:PORT or tcp:HOST:PORT, then settings; the port is 18944 where none is given. @error
 /// kBadInput
 Result<std::unique_ptr<TrackerDevice>> makeOpenigtlink(const std::string& address, const simulation::Scene& scene);

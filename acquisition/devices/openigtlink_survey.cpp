@@ -100,7 +100,10 @@ std::string IgtlSurvey::summary() const {
   for (const Heard& heard : heard_) {
     add_part(std::string(nameOf(heard.source.type)) + " of " + quoted(heard.source.name));
   }
-  for (const auto& [type, count] : parser_.passedOver()) add_part(type + " (" + std::to_string(count) + ")");
+  for (const auto& [type, count] : parser_.passedOver()) {
+    // A question is a client's; a line that echoes is no server.
+    if (!type.starts_with("GET_")) add_part(type + " (" + std::to_string(count) + ")");
+  }
   if (parser_.wrong_crcs() > 0) add_part(std::to_string(parser_.wrong_crcs()) + " messages with a wrong CRC");
   if (trouble_) {
     add_part("the word " + quoted(trouble_->name.empty() ? std::to_string(trouble_->code) : trouble_->name) +

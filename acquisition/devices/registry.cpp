@@ -3,7 +3,8 @@
 // 2. acquisition/emulators/<id>: the device side over EmulatedUnit, so that it can be tested without hardware.
 // 3. acquisition/devices/<id>_device: its settings, and the TrackerStartup that brings it to a stream; LineDevice has
 //    the line, the clock, the watching and the farewell.
-// 4. One row below. Menus, command line and the contract test read the table.
+// 4. One row below, with the probe by which it is found on a line. Menus, command line and the contract test read the
+// table.
 #include "acquisition/devices/registry.h"
 
 #include "acquisition/devices/fastrak_device.h"
@@ -39,6 +40,7 @@ std::span<const DeviceKind> deviceKinds() {
        .address_help = "the line, then settings: fastrak:/dev/ttyUSB0@115200, fastrak:tcp:localhost:4000,hemisphere=-x",
        .source = "3SPACE Fastrak manual OPM00PI002 rev. G",
        .settings = fastrakSettings(),
+       .probe = fastrakProbe(),
        .make = makeFastrak,
        .emulate = makeFastrakEmulator},
       {.id = "liberty",
@@ -46,6 +48,7 @@ std::span<const DeviceKind> deviceKinds() {
        .address_help = "the line, then settings: liberty:/dev/ttyUSB0@115200, liberty:tcp:localhost:4000,stations=1+2",
        .source = "Liberty manual URM03PH156 rev. H",
        .settings = libertySettings(),
+       .probe = libertyProbe(),
        .make = makeLiberty,
        .emulate = makeLibertyEmulator},
       {.id = "patriot",
@@ -53,6 +56,7 @@ std::span<const DeviceKind> deviceKinds() {
        .address_help = "the line, then settings: patriot:/dev/ttyUSB0@115200, patriot:tcp:localhost:4000,hemisphere=-x",
        .source = "Patriot manual URM03PH170 rev. G",
        .settings = patriotSettings(),
+       .probe = patriotProbe(),
        .make = makePatriot,
        .emulate = makePatriotEmulator},
       {.id = "openigtlink",
@@ -61,6 +65,7 @@ std::span<const DeviceKind> deviceKinds() {
        .source = "openigtlink.org, protocol versions 1 to 3",
        .settings = openigtlinkSettings(),
        .usual_addresses = {"localhost:18944"},
+       .probe = openigtlinkProbe(),
        .make = makeOpenigtlink,
        .emulate = makeIgtlEmulator}};
   return kKinds;

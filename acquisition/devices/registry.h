@@ -2,11 +2,13 @@
 
 #include <QString>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "acquisition/devices/tracker_device.h"
+#include "acquisition/devices/tracker_probe.h"
 #include "acquisition/emulators/emulation.h"
 #include "acquisition/emulators/emulator_runner.h"
 #include "calib/core/error.h"
@@ -31,7 +33,10 @@ struct DeviceKind {
   std::string address_help;  ///< How to write the address.
   std::string source;
   std::vector<Setting> settings;
-  std::vector<std::string> usual_addresses;  ///< Offered in place of serial lines, where it is not on one.
+  std::vector<std::string> usual_addresses = {};  ///< Offered in place of serial lines, where it is not on one.
+  /// How it is found on a line; none where it cannot be.
+  std::optional<TrackerProbe> probe = std::nullopt;
+  std::vector<KnownUsb> usb = {};  ///< Adapters and sockets that are its own: it is asked first there.
   /// @param address after the first colon; @param scene only used by simulated devices
   Result<std::unique_ptr<TrackerDevice>> (*make)(const std::string& address, const simulation::Scene& scene) = nullptr;
   /// Its other side, on a pty or a TCP port, not yet started; null where nothing is emulated.

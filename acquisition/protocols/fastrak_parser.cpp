@@ -77,6 +77,22 @@ std::size_t FastrakParser::consume(std::string_view bytes, std::vector<FastrakRe
   return at;
 }
 
+bool looksLikeFastrakStream(std::string_view bytes) {
+  constexpr std::size_t kHeads = 6, kShortest = 4, kLongest = 254;
+  const auto is_head = [bytes](std::size_t at) {
+    return bytes[at] == '0' && bytes[at + 1] >= '1' && bytes[at + 1] <= '4' && isErrorLetter(bytes[at + 2]);
+  };
+  for (std::size_t first = 0; first <= kLongest; ++first) {
+    for (std::size_t length = kShortest; length <= kLongest; ++length) {
+      if (first + kHeads * length > bytes.size()) break;
+      std::size_t heads = 0;
+      while (heads < kHeads && is_head(first + heads * length)) ++heads;
+      if (heads == kHeads) return true;
+    }
+  }
+  return false;
+}
+
 void FastrakParser::add(std::string_view bytes, std::vector<FastrakRecord>& out) {
   bytes_ += bytes.size();
   if (buffer_.empty()) {

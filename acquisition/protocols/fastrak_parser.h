@@ -52,4 +52,7 @@ class FastrakParser {
   std::uint64_t bytes_ = 0, records_ = 0, dropped_bytes_ = 0, losses_of_lock_ = 0;
 };
 
+/// Whether the bytes are a Fastrak's records, whatever output list it was told: six heads at equal distances.
+bool looksLikeFastrakStream(std::string_view bytes);
+
 }  // namespace fieldtrue::acquisition

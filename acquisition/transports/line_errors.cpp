@@ -15,15 +15,10 @@
 #include <vector>
 
 #include "acquisition/transports/line_driver.h"
+#include "acquisition/transports/line_holders.h"
 
 namespace fieldtrue::acquisition {
 namespace {
-
-std::string processName(long pid) {
-  std::ifstream in("/proc/" + std::to_string(pid) + "/comm");
-  std::string name;
-  return std::getline(in, name) ? name + " (process " + std::to_string(pid) + ")" : "process " + std::to_string(pid);
-}
 
 /// Who holds a lock on the file, from /proc/locks; empty when nobody is found.
 std::string lockHolder(const struct stat& file) {
@@ -43,7 +38,10 @@ std::string lockHolder(const struct stat& file) {
   return {};
 }
 
-std::string busyText(const std::string& path, const std::string& holder) {
+std::string busyText(const std::string& path, std::string holder) {
+  for (const std::string& program : holder.empty() ? holdersOf(path) : std::vector<std::string>()) {
+    holder += (holder.empty() ? "" : " and ") + program;
+  }
   return path + " is busy: " + (holder.empty() ? std::string("another program") : holder) +
          " has it open; close that program and try again";
 }
@@ -71,9 +69,7 @@ Error lineOpenError(const std::string& path, int system_error) {
       return says("does not exist; check the cable and the name of the port");
     case EACCES:
     case EPERM:
-      return says(
-          "may not be opened by this user: add the user to the group dialout (sudo usermod -aG dialout $USER) and log "
-          "in again");
+      return says(permissionAdvice(path));
     case EBUSY:
       return {ErrorCode::kDevice, busyText(path, {})};
     case ENOTTY:

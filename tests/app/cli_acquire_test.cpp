@@ -18,20 +18,6 @@ using namespace fieldtrue::testing;
 
 namespace {
 
-/// Reads the process's output until a line matches.
-QRegularExpressionMatch waitForLine(QProcess& process, const QString& pattern, int timeout_ms = 60000) {
-  const QRegularExpression expression(pattern, QRegularExpression::MultilineOption);
-  QElapsedTimer timer;
-  timer.start();
-  QString text;
-  do {
-    text += QString::fromUtf8(process.readAllStandardOutput());
-    const auto match = expression.match(text);
-    if (match.hasMatch()) return match;
-  } while (timer.elapsed() < timeout_ms && (process.waitForReadyRead(1000) || process.state() == QProcess::Running));
-  return {};
-}
-
 CalibrationTable tableOf(const QString& path) {
   const auto reading = readNodeTable(std::filesystem::path(path.toStdString()));
   return reading ? reading->table : CalibrationTable{};

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <QCoreApplication>
+#include <QElapsedTimer>
 #include <QFile>
 #include <QProcess>
+#include <QRegularExpression>
 #include <QStringList>
 #include <QTest>
 #include <nlohmann/json.hpp>
@@ -47,6 +49,20 @@ inline CliRun runCli(const QStringList& arguments, const QByteArray& input = {},
 inline QByteArray readWhole(const QString& path) {
   QFile file(path);
   return file.open(QIODevice::ReadOnly) ? file.readAll() : QByteArray();
+}
+
+/// Reads the process's output until a line matches.
+inline QRegularExpressionMatch waitForLine(QProcess& process, const QString& pattern, int timeout_ms = 60000) {
+  const QRegularExpression expression(pattern, QRegularExpression::MultilineOption);
+  QElapsedTimer timer;
+  timer.start();
+  QString text;
+  do {
+    text += QString::fromUtf8(process.readAllStandardOutput());
+    const auto match = expression.match(text);
+    if (match.hasMatch()) return match;
+  } while (timer.elapsed() < timeout_ms && (process.waitForReadyRead(1000) || process.state() == QProcess::Running));
+  return {};
 }
 
 inline bool writeWhole(const QString& path, const QByteArray& bytes) {

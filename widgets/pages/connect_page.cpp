@@ -8,6 +8,7 @@
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QLineEdit>
+#include <QListWidget>
 #include <QPushButton>
 #include <QSettings>
 #include <QVBoxLayout>
@@ -82,8 +83,14 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   setup_label_ = new QLabel(tr("This set-up"), column);
   setup_ = makeSetup();
 
+  makeFinder();
+  auto* kind_row = new QHBoxLayout;
+  kind_row->addWidget(kind_, 1);
+  kind_row->addWidget(find_);
+
   auto* form = new QFormLayout;
-  form->addRow(tr("Tracker"), kind_);
+  form->addRow(tr("Tracker"), kind_row);
+  form->addRow(QString(), found_);
   form->addRow(QString(), kind_help_);
   form->addRow(address_label_, address_row);
   form->addRow(scene_label_, scene_);
@@ -135,6 +142,96 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   connect(&workbench_, &Workbench::statusChanged, this, &ConnectPage::onStatus);
   onKind();
   onStatus(workbench_.status());
+}
+
+ConnectPage::~ConnectPage() {
+  stopFinding();
+  search_thread_.quit();
+  search_thread_.wait();
+}
+
+void ConnectPage::makeFinder() {
+  find_ = new QPushButton(tr("Find my tracker"), this);
+  find_->setObjectName(QStringLiteral("findButton"));
+  find_->setToolTip(
+      tr("Listens on every serial line, then asks. A tracker that sends is stopped; the guide says what else "
+         "may happen to it."));
+  found_ = new QListWidget(this);
+  found_->setObjectName(QStringLiteral("foundTrackers"));
+  found_->setAccessibleName(tr("Trackers found"));
+  found_->setWordWrap(true);
+  found_->setMaximumHeight(fontMetrics().lineSpacing() * 7);
+  found_->hide();
+  search_thread_.setObjectName(QStringLiteral("search"));
+  connect(find_, &QPushButton::clicked, this, [this] { search_ ? stopFinding() : find(); });
+  connect(found_, &QListWidget::itemClicked, this, &ConnectPage::use);
+  connect(found_, &QListWidget::itemActivated, this, &ConnectPage::use);
+}
+
+void ConnectPage::find() {
+  std::vector<std::string> lines;
+  const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
+  const std::string typed = address_->currentText().section(QLatin1Char(','), 0, 0).trimmed().toStdString();
+  if (kind.probe && !typed.empty()) {
+    lines.push_back(kind.usual_addresses.empty() ? typed.substr(0, typed.rfind('@')) : "tcp:" + typed);
+  }
+  found_->clear();
+  found_->show();
+  find_->setText(tr("Stop searching"));
+  // The search has the lines.
+  connect_->setEnabled(false);
+  search_ = new acquisition::TrackerSearch(lines, true);
+  search_->moveToThread(&search_thread_);
+  connect(search_, &acquisition::TrackerSearch::lineDone, this, &ConnectPage::onLineDone);
+  connect(search_, &acquisition::TrackerSearch::finished, this, &ConnectPage::onFound);
+  connect(&search_thread_, &QThread::finished, search_, &QObject::deleteLater);
+  if (!search_thread_.isRunning()) search_thread_.start();
+  QMetaObject::invokeMethod(search_, &acquisition::TrackerSearch::start);
+}
+
+void ConnectPage::stopFinding() {
+  if (search_) QMetaObject::invokeMethod(search_, &acquisition::TrackerSearch::stop);
+}
+
+void ConnectPage::onLineDone(const acquisition::LineFinding& finding) {
+  QString text = QString::fromStdString(finding.tracker ? finding.tracker->device : finding.line) +
+                 QStringLiteral(": ") + QString::fromStdString(finding.text);
+  if (!finding.note.empty()) text += QLatin1Char(' ') + QString::fromStdString(finding.note);
+  auto* item = new QListWidgetItem(text, found_);
+  if (finding.tracker) {
+    item->setData(Qt::UserRole, QString::fromStdString(finding.tracker->device));
+    item->setToolTip(tr("Use this tracker"));
+  } else {
+    item->setFlags(Qt::NoItemFlags);
+  }
+}
+
+void ConnectPage::onFound() {
+  search_->deleteLater();
+  search_ = nullptr;
+  find_->setText(tr("Find my tracker"));
+  connect_->setEnabled(true);
+  const QListWidgetItem* only = nullptr;
+  int trackers = 0;
+  for (int row = 0; row < found_->count(); ++row) {
+    if (found_->item(row)->data(Qt::UserRole).isNull()) continue;
+    only = found_->item(row);
+    ++trackers;
+  }
+  if (trackers == 1) use(only);
+  if (found_->count() > 0) return;
+  auto* none =
+      new QListWidgetItem(tr("This computer has no serial line. Plug the adapter in, or type tcp:host:port."), found_);
+  none->setFlags(Qt::NoItemFlags);
+}
+
+void ConnectPage::use(const QListWidgetItem* item) {
+  const auto device = acquisition::parseDevice(item->data(Qt::UserRole).toString().toStdString());
+  if (!device || !kind_->isEnabled()) return;
+  const int index = kind_->findData(QString::fromStdString(device->kind));
+  if (index < 0) return;
+  kind_->setCurrentIndex(index);
+  address_->setCurrentText(QString::fromStdString(device->address));
 }
 
 QWidget* ConnectPage::makeSetup() {
@@ -239,6 +336,8 @@ void ConnectPage::onStatus(const acquisition::AcquisitionStatus& status) {
   for (QWidget* widget : {static_cast<QWidget*>(kind_), static_cast<QWidget*>(address_), static_cast<QWidget*>(scene_),
                           static_cast<QWidget*>(settings_)})
     widget->setEnabled(!running && !busy);
+  // A line that is connected is not asked who it is.
+  find_->setEnabled(search_ || (!running && !busy));
   next_->setEnabled(running);
   state_->setText(status.device == acquisition::DeviceState::kClosed ? tr("Not connected") : status.device_text);
   if (running && status.live) {

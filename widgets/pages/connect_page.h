@@ -1,13 +1,17 @@
 #pragma once
 
+#include <QThread>
 #include <QWidget>
 #include <vector>
 
+#include "acquisition/devices/tracker_search.h"
 #include "widgets/workbench/workbench.h"
 
 class QComboBox;
 class QLabel;
 class QLineEdit;
+class QListWidget;
+class QListWidgetItem;
 class QPushButton;
 
 namespace fieldtrue::widgets {
@@ -19,8 +23,15 @@ class ConnectPage : public QWidget {
   Q_OBJECT
  public:
   explicit ConnectPage(Workbench& workbench, QWidget* parent = nullptr);
+  ~ConnectPage() override;
 
  private:
+  void makeFinder();
+  void find();
+  void stopFinding();
+  void onLineDone(const acquisition::LineFinding& finding);
+  void onFound();
+  void use(const QListWidgetItem* item);
   void onKind();
   void refreshLines();
   void onStatus(const acquisition::AcquisitionStatus& status);
@@ -42,6 +53,10 @@ class ConnectPage : public QWidget {
   QLabel* setup_label_;
   QWidget* setup_;
   std::vector<QLineEdit*> setup_facts_;  ///< In the order of the facts that are asked for.
+  QPushButton* find_;
+  QListWidget* found_;
+  QThread search_thread_;
+  acquisition::TrackerSearch* search_ = nullptr;  ///< Runs in its thread; null while nothing is searched.
   QPushButton* connect_;
   QPushButton* next_;
   QLabel* state_;

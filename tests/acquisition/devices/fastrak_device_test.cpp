@@ -4,6 +4,7 @@
 
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "tests/acquisition/devices/line_bench.h"
+#include "tests/acquisition/devices/rated_line.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -32,37 +33,6 @@ const std::vector<FaultCase>& faultCases() {
   static const std::vector<FaultCase> kCases = commonFaults("Fastrak", "fastrak", "too low");
   return kCases;
 }
-
-/// A line whose bytes only make sense at one rate.
-class RatedLine : public BufferedTransport {
- public:
-  RatedLine(std::unique_ptr<LoopbackTransport> inner, int right_baud, int baud)
-      : inner_(std::move(inner)), right_baud_(right_baud), baud_(baud) {
-    connect(inner_.get(), &QIODevice::readyRead, this, [this] {
-      const QByteArray bytes = inner_->readAll();
-      received(baud_ == right_baud_ ? bytes : QByteArray(bytes.size(), '\xF8'));
-    });
-  }
-  Result<void> openLine() override {
-    openDevice();
-    return inner_->openLine();
-  }
-  bool setBaud(int baud) override {
-    baud_ = baud;
-    return true;
-  }
-
- protected:
-  qint64 writeData(const char* from, qint64 size) override {
-    inner_->write(baud_ == right_baud_ ? QByteArray(from, size) : QByteArray(size, '\xFE'));
-    return size;
-  }
-
- private:
-  std::unique_ptr<LoopbackTransport> inner_;
-  int right_baud_;
-  int baud_;
-};
 
 }  // namespace
 
