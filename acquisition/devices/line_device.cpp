@@ -26,6 +26,9 @@ LineDevice::LineDevice(LineSetup setup, StartupFactory make_startup, TransportFa
       clock_speed_(clock_speed) {
   watch_.setParent(this);
   connect(&watch_, &QTimer::timeout, this, &LineDevice::watch);
+  gap_.setParent(this);
+  gap_.setSingleShot(true);
+  connect(&gap_, &QTimer::timeout, this, [this] { say(stream_.ask_again); });
 }
 
 LineDevice::~LineDevice() {
@@ -97,7 +100,7 @@ void LineDevice::readReady() {
   std::vector<Reading> readings;
   stream_.parser->add({bytes.constData(), static_cast<std::size_t>(bytes.size())}, readings);
   noise_since_reading_ = readings.empty();
-  if (stream_.parser->answers() != answers_) askAgain();
+  if (stream_.parser->answers() != answers_) askAgain(readings.empty() ? stream_.ask_gap_ms : 0);
   if (readings.empty()) return;
   heard_since_tick_ = true;
   if (!running_) running();
@@ -115,8 +118,9 @@ void LineDevice::readReady() {
   emit samplesReceived(samples);
 }
 
-void LineDevice::askAgain() {
+void LineDevice::askAgain(int gap_ms) {
   answers_ = stream_.parser->answers();
+  if (gap_ms > 0) return gap_.start(gap_ms);
   say(stream_.ask_again);
 }
 
@@ -201,6 +205,7 @@ void LineDevice::failWith(const QString& text) {
 
 void LineDevice::closeLine() {
   watch_.stop();
+  gap_.stop();
   running_ = false;
   retire(this, farewell_);
   retire(this, startup_);
@@ -221,6 +226,7 @@ void LineDevice::stop() {
     return;
   }
   watch_.stop();
+  gap_.stop();
   running_ = false;
   retire(this, startup_);
   disconnect(line_.get(), &QIODevice::readyRead, this, nullptr);
@@ -244,6 +250,10 @@ TableMetadata LineDevice::describe() const {
   if (!identity_) return metadata;
   metadata.tracker = identity_->model;
   metadata.rate_hz = identity_->rate_hz;
+  metadata.quantum_m = identity_->quantum_m;
+  if (identity_->transmitter_model) metadata.transmitter_model = identity_->transmitter_model;
+  if (identity_->excitation) metadata.excitation = identity_->excitation;
+  if (metadata.excitation == "") metadata.excitation.reset();
   const std::string prefix = setup_.id + "_";
   metadata.other[prefix + "stations"] = stationsText(identity_->stations);
   for (const auto& [key, text] : identity_->facts) metadata.other[prefix + key] = text;

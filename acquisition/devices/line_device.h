@@ -38,7 +38,7 @@ class LineDevice : public TrackerDevice {
   void beginStartup();
   void startupFinished();
   void readReady();
-  void askAgain();
+  void askAgain(int gap_ms);
   Sample stamped(Reading& reading, double arrival_s, std::size_t later_in_bunch);
   void watch();
   void running();
@@ -66,6 +66,7 @@ class LineDevice : public TrackerDevice {
   std::map<int, std::string> last_status_;  ///< By sensor.
   QElapsedTimer clock_;
   QTimer watch_;
+  QTimer gap_;  ///< Until it is asked again.
   int quiet_ticks_ = 0;
   bool heard_since_tick_ = false;
   bool noise_since_reading_ = false;

@@ -8,10 +8,12 @@
 #include "acquisition/devices/registry.h"
 
 #include "acquisition/devices/fastrak_device.h"
+#include "acquisition/devices/flock_device.h"
 #include "acquisition/devices/liberty_device.h"
 #include "acquisition/devices/openigtlink_device.h"
 #include "acquisition/devices/simulated_device.h"
 #include "acquisition/emulators/fastrak_emulator.h"
+#include "acquisition/emulators/flock_emulator.h"
 #include "acquisition/emulators/liberty_emulator.h"
 #include "acquisition/emulators/openigtlink_emulator.h"
 #include "acquisition/transports/serial_ports.h"
@@ -59,6 +61,14 @@ std::span<const DeviceKind> deviceKinds() {
        .probe = patriotProbe(),
        .make = makePatriot,
        .emulate = makePatriotEmulator},
+      {.id = "flock",
+       .label = "Ascension Flock of Birds",
+       .address_help = "the line, then settings: flock:/dev/ttyUSB0@115200, flock:/dev/ttyUSB0,stations=1+2,range=144",
+       .source = "Flock of Birds installation and operation guide; VRPN's and VR Juggler's drivers",
+       .settings = flockSettings(),
+       .probe = flockProbe(),
+       .make = makeFlock,
+       .emulate = makeFlockEmulator},
       {.id = "openigtlink",
        .label = "OpenIGTLink server",
        .address_help = "host and port, then settings: openigtlink:localhost:18944,devices=Probe+Stylus",

@@ -52,7 +52,8 @@ void TrackerStartup::stopStream() {
 void TrackerStartup::ask(int tries) {
   const int most_ms = next_rate_ > 0 ? std::min(kRateReply_ms, setup_.timings.reply_ms) : setup_.timings.reply_ms;
   exchange_.ask(greeting_.ask, greeting_.answered, most_ms, [this, tries](const std::string& heard) {
-    if (greeting_.answered(heard)) return answered_(heard);
+    // A copy: what it calls may ask again.
+    if (const Heard then = answered_; greeting_.answered(heard)) return then(heard);
     // Something came: the answer was damaged, or the rate is wrong. Nothing came: asking again rarely helps.
     const int left = heard.empty() ? std::min(tries - 1, 1) : tries - 1;
     left > 0 && next_rate_ == 0 ? ask(left) : noAnswer();
@@ -85,11 +86,13 @@ void TrackerStartup::giveUp() {
   if (exchange_.bytesHeard() > 0) {
     const int other = setup_.baud == 19200 ? 115200 : 19200;
     const QString shown = QString::fromStdString(firstBytes(exchange_.lastHeard()));
-    emit failed(QString("Got bytes that are not %1 records on %2%3: the line's rate is probably wrong; try %4 (%5@%4), "
-                        "and check the rate switches at the back of the tracker")
-                    .arg(name(), where(), shown.isEmpty() ? QString() : " (" + shown + ")")
-                    .arg(other)
-                    .arg(QString::fromStdString(setup_.device_text)));
+    const QString switches = QString("the line's rate is probably wrong; try %1 (%2@%1), and check the rate switches at "
+                                     "the back of the tracker")
+                                 .arg(other)
+                                 .arg(QString::fromStdString(setup_.device_text));
+    emit failed(QString("Got bytes that are not %1 records on %2%3: %4")
+                    .arg(name(), where(), shown.isEmpty() ? QString() : " (" + shown + ")",
+                         greeting_.unreadable.isEmpty() ? switches : greeting_.unreadable));
     return;
   }
   if (setup_.may_reset && !greeting_.reset.empty() && !was_reset_) return reset();
@@ -132,7 +135,8 @@ void TrackerStartup::askFirmly(const std::string& ask, std::function<bool(const 
 
 void TrackerStartup::askOnce(int tries) {
   exchange_.ask(firm_.say, firm_.complete, firm_.wait_ms, [this, tries](const std::string& heard) {
-    if (firm_.complete(heard)) return answered_(heard);
+    // A copy: what it calls may ask again.
+    if (const Heard then = answered_; firm_.complete(heard)) return then(heard);
     if (tries > 1) return askOnce(tries - 1);
     emit failed(
         QString("The %1 on %2 stopped answering while it was set up; switch it off and on again").arg(name(), where()));

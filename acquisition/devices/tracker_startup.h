@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,8 @@ struct TrackerIdentity {
   int baud = 0;                              ///< At which it answered.
   std::map<std::string, std::string> facts;  ///< Stored with the session: "filter" -> "off", "units", "hemisphere" ...
   std::vector<std::string> refused;          ///< Commands it did not take, with the reason.
+  std::optional<double> quantum_m;           ///< Step of its positions, where it is of the size of the noise.
+  std::optional<std::string> transmitter_model, excitation;  ///< Where they differ from the setup's.
 };
 
 /// How a tracker that is set up streams.
@@ -58,6 +61,7 @@ struct StreamPlan {
   std::unique_ptr<StreamParser> parser;
   std::string begin;             ///< Said once the parser listens.
   std::string ask_again;         ///< Said after every answer, for trackers that do not send by themselves; else empty.
+  int ask_gap_ms = 0;            ///< Waited before asking again where an answer said nothing new.
   bool watches_mirrors = true;   ///< Whether its readings can be mirrored through the transmitter.
   const char* part = "Station";  ///< What messages call one of its sensors.
   /// The meaning of a sample's status in words.
@@ -73,6 +77,7 @@ struct Greeting {
   std::string reset;       ///< Restarts it; empty = it cannot be.
   std::vector<int> rates;  ///< Tried in this order where nothing answers and the line has a rate.
   QString rate_switches = "its rate switches say";  ///< "check that ... 115200": where its rate is set.
+  QString unreadable;  ///< What to do where only noise answers; empty = another rate and the switches.
 };
 
 /// One step of setting a tracker up.

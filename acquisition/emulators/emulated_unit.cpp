@@ -8,9 +8,6 @@
 namespace fieldtrue::acquisition {
 namespace {
 
-/// True in one second of every four, never in the first three of a stream.
-bool faultySecond(double time_s) { return std::fmod(time_s, 4.0) >= 3.0; }
-
 /// Five places in front of the transmitter, in the rig's frame.
 std::vector<Pose> walk(const simulation::Scene& scene) {
   std::vector<Pose> places;
@@ -93,6 +90,8 @@ Pose EmulatedUnit::flipped(Pose pose) const {
   if (options_.faults.hemisphere_flip && faultySecond(reading_s_ - stream_start_s_)) pose.position_m = -pose.position_m;
   return pose;
 }
+
+bool faultySecond(double streaming_s) { return std::fmod(streaming_s, 4.0) >= 3.0; }
 
 Pose inHemisphere(Pose tracker_from_sensor, const Eigen::Vector3d& towards) {
   Eigen::Vector3d& p_m = tracker_from_sensor.position_m;

@@ -75,6 +75,9 @@ class EmulatedUnit : public EmulatedTracker {
   std::uint64_t records_ = 0;
 };
 
+/// When faults that come and go are there: one second of every four, never in the first three of a stream.
+bool faultySecond(double streaming_s);
+
 /// A dipole's field is the same at p and -p: the tracker picks the side it was told.
 /// @param towards zero = it follows the sensor
 Pose inHemisphere(Pose tracker_from_sensor, const Eigen::Vector3d& towards);

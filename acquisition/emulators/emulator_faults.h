@@ -25,6 +25,11 @@ struct EmulatorFaults {
   bool unknown_types = false;
   bool no_stamps = false;
   bool waits_to_be_asked = false;
+  bool repeats = false;
+  bool stuck = false;
+  bool missing = false;
+  bool out_of_volume = false;
+  bool tool_unplugged = false;
 };
 
 /// One row of the fault table.

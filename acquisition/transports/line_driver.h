@@ -21,7 +21,7 @@ class LineDriver {
   virtual long write(const char* from, std::size_t size) = 0;
   virtual bool setBaud(int baud) = 0;  ///< False when the line has no baud rate or refuses it.
   virtual void setRequestToSend(bool on) = 0;
-  virtual void sendBreak(int milliseconds) = 0;
+  virtual void setBreak(bool on) = 0;
 };
 
 /// Through libserialport: real serial lines.

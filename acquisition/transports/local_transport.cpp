@@ -90,8 +90,8 @@ void LocalTransport::setRequestToSend(bool on) {
   if (driver_) driver_->setRequestToSend(on);
 }
 
-void LocalTransport::sendBreak(int milliseconds) {
-  if (driver_) driver_->sendBreak(milliseconds);
+void LocalTransport::setBreak(bool on) {
+  if (driver_) driver_->setBreak(on);
 }
 
 bool LocalTransport::setBaud(int baud) { return driver_ && driver_->setBaud(baud); }

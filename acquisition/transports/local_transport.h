@@ -21,7 +21,7 @@ class LocalTransport : public BufferedTransport {
   Result<void> openLine() override;
   void close() override;
   void setRequestToSend(bool on) override;
-  void sendBreak(int milliseconds) override;
+  void setBreak(bool on) override;
   bool setBaud(int baud) override;
 
  protected:

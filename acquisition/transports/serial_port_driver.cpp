@@ -62,11 +62,7 @@ class SerialPortDriver : public LineDriver {
 
   bool setBaud(int baud) override { return sp_set_baudrate(port_, baud) == SP_OK; }
   void setRequestToSend(bool on) override { sp_set_rts(port_, on ? SP_RTS_ON : SP_RTS_OFF); }
-  void sendBreak(int milliseconds) override {
-    sp_start_break(port_);
-    ::usleep(static_cast<useconds_t>(milliseconds) * 1000);
-    sp_end_break(port_);
-  }
+  void setBreak(bool on) override { on ? sp_start_break(port_) : sp_end_break(port_); }
 
  private:
   Result<void> configure(const std::string& path, int baud) {

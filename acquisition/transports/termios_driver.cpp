@@ -73,11 +73,7 @@ class TermiosDriver : public LineDriver {
     ::ioctl(descriptor_, on ? TIOCMBIS : TIOCMBIC, &line);
   }
 
-  void sendBreak(int milliseconds) override {
-    ::ioctl(descriptor_, TIOCSBRK);
-    ::usleep(static_cast<useconds_t>(milliseconds) * 1000);
-    ::ioctl(descriptor_, TIOCCBRK);
-  }
+  void setBreak(bool on) override { ::ioctl(descriptor_, on ? TIOCSBRK : TIOCCBRK); }
 
  private:
   Result<void> configure(const std::string& path, int baud) {

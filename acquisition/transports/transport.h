@@ -21,7 +21,7 @@ class Transport : public QIODevice {
   /// @error kDevice, one sentence: does not exist, busy (who has it, when known), no permission, cannot set the rate
   virtual Result<void> openLine() = 0;
   virtual void setRequestToSend(bool /*on*/) {}
-  virtual void sendBreak(int /*milliseconds*/) {}
+  virtual void setBreak(bool /*on*/) {}
   virtual bool setBaud(int /*baud*/) { return false; }  ///< False when the line has no baud rate (pty, TCP).
 
  signals:

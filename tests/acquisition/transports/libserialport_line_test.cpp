@@ -158,7 +158,8 @@ void LibserialportLineTest::setsTheLine() {
   QCOMPARE(::cfgetospeed(&settings), static_cast<speed_t>(B115200));
   line->setRequestToSend(true);
   line->setRequestToSend(false);
-  line->sendBreak(1);
+  line->setBreak(true);
+  line->setBreak(false);
   ::close(slave);
 }
 
