@@ -10,11 +10,13 @@
 #include "acquisition/devices/fastrak_device.h"
 #include "acquisition/devices/flock_device.h"
 #include "acquisition/devices/liberty_device.h"
+#include "acquisition/devices/ndi_device.h"
 #include "acquisition/devices/openigtlink_device.h"
 #include "acquisition/devices/simulated_device.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/emulators/flock_emulator.h"
 #include "acquisition/emulators/liberty_emulator.h"
+#include "acquisition/emulators/ndi_emulator.h"
 #include "acquisition/emulators/openigtlink_emulator.h"
 #include "acquisition/transports/serial_ports.h"
 
@@ -69,6 +71,14 @@ std::span<const DeviceKind> deviceKinds() {
        .probe = flockProbe(),
        .make = makeFlock,
        .emulate = makeFlockEmulator},
+      {.id = "ndi",
+       .label = "NDI Aurora, Polaris, Vega",
+       .address_help = "the line, then settings: ndi:/dev/ttyUSB0@115200, ndi:tcp:192.168.1.10:8765,rom=probe.rom",
+       .source = "NDI's combined API as the open ndicapi speaks it",
+       .settings = ndiSettings(),
+       .probe = ndiProbe(),
+       .make = makeNdi,
+       .emulate = makeNdiEmulator},
       {.id = "openigtlink",
        .label = "OpenIGTLink server",
        .address_help = "host and port, then settings: openigtlink:localhost:18944,devices=Probe+Stylus",

@@ -86,8 +86,9 @@ void TrackerStartup::giveUp() {
   if (exchange_.bytesHeard() > 0) {
     const int other = setup_.baud == 19200 ? 115200 : 19200;
     const QString shown = QString::fromStdString(firstBytes(exchange_.lastHeard()));
-    const QString switches = QString("the line's rate is probably wrong; try %1 (%2@%1), and check the rate switches at "
-                                     "the back of the tracker")
+    const QString switches = QString(
+                                 "the line's rate is probably wrong; try %1 (%2@%1), and check the rate switches at "
+                                 "the back of the tracker")
                                  .arg(other)
                                  .arg(QString::fromStdString(setup_.device_text));
     emit failed(QString("Got bytes that are not %1 records on %2%3: %4")
