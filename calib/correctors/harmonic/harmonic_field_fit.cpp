@@ -341,9 +341,13 @@ class Fitter {
   }
 
   FieldPosterior posterior() const {
-    std::vector<SourceBasis> bases;
-    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) bases.emplace_back(placeOf_m(k));
-    return posteriorOf(rowsAtField(), bases, chosen_.variances, center_m_, noise_factor_);
+    constexpr double kPlaceShare = 0.5;  // SD of where a source stands, of its distance to the places.
+    std::vector<SourcePrior> priors;
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) {
+      const double sd_m = kPlaceShare * box_.distance_m(placeOf_m(k));
+      priors.push_back({chosen_.variances[k], std::max(sd_m * sd_m, 1e-12)});
+    }
+    return posteriorOf(rowsAtField(), sources(), priors, center_m_, noise_factor_);
   }
 
   const FitData& data_;

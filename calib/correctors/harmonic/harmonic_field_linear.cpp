@@ -33,12 +33,15 @@ Eigen::Matrix3d excitationAt(const Eigen::Vector3d& at_m) {
   return at_m.isZero() ? Eigen::Matrix3d::Identity() : field::dipoleField(at_m, 1.0);
 }
 
-Eigen::MatrixXd allEffects(const PlaceDerivative& place, std::span<const SourceBasis> sources,
+Eigen::MatrixXd allEffects(const PlaceDerivative& place, std::span<const ChosenSource> sources,
                            const Eigen::Vector3d& about_m) {
-  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(sources.size());
-  Eigen::MatrixXd effects(3, n_amplitudes + 6);
-  for (std::size_t k = 0; k < sources.size(); ++k)
-    effects.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)) = effectOfSource(place, sources[k]);
+  const auto n_sources = kPerChosen * static_cast<Eigen::Index>(sources.size());
+  Eigen::MatrixXd effects(3, n_sources + 6);
+  for (std::size_t k = 0; k < sources.size(); ++k) {
+    auto columns = effects.middleCols<kPerChosen>(kPerChosen * static_cast<Eigen::Index>(k));
+    columns.leftCols<kPerSource>() = effectOfSource(place, sources[k].basis);
+    columns.rightCols<3>() = effectOfMove(place, sources[k]);
+  }
   effects.rightCols<6>() = effectOfMotion(place.at_m, about_m);
   return effects;
 }
@@ -50,6 +53,18 @@ SourceBasis::SourceBasis(const Eigen::Vector3d& source_at_m) : at_m(source_at_m)
   for (Eigen::Index e = 0; e < kPerSource; ++e) {
     const Eigen::Matrix3d response = symmetricTensors()[static_cast<std::size_t>(e)] * excitation;
     responses.col(e) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(response.data());
+  }
+}
+
+ChosenSource::ChosenSource(const FieldSource& source) : basis(source.at_m), response(source.response) {
+  response_moved.fill(Eigen::Matrix3d::Zero());
+  if (source.at_m.isZero()) return;
+  constexpr double kStep_m = 1e-4;
+  const Eigen::Matrix3d tensor = source.response * excitationAt(source.at_m).inverse();
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d step_m = kStep_m * Eigen::Vector3d::Unit(axis);
+    response_moved[static_cast<std::size_t>(axis)] =
+        tensor * (excitationAt(source.at_m + step_m) - excitationAt(source.at_m - step_m)) / (2.0 * kStep_m);
   }
 }
 
@@ -79,6 +94,23 @@ Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place
   return by_response * source.responses;
 }
 
+Eigen::Matrix3d effectOfMove(const PlaceDerivative& place, const ChosenSource& source) {
+  constexpr double kStep_m = 1e-4;
+  const Eigen::Vector3d from_source_m = place.at_m - source.basis.at_m;
+  const Eigen::Matrix3d field = field::dipoleField(from_source_m, 1.0);
+  Eigen::Matrix3d effect;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d step_m = kStep_m * Eigen::Vector3d::Unit(axis);
+    const Eigen::Matrix3d slope =
+        (field::dipoleField(from_source_m - step_m, 1.0) - field::dipoleField(from_source_m + step_m, 1.0)) /
+        (2.0 * kStep_m);
+    const Eigen::Matrix3d change =
+        slope * source.response + field * source.response_moved[static_cast<std::size_t>(axis)];
+    effect.col(axis) = place.by_field * change.reshaped();
+  }
+  return effect;
+}
+
 Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eigen::Vector3d& about_m) {
   const Eigen::Vector3d d = p_m - about_m;
   Eigen::Matrix3d cross;
@@ -93,25 +125,31 @@ double FieldPosterior::sd_m(const PlaceDerivative& place) const {
   return (effects * root.triangularView<Eigen::Upper>()).norm();
 }
 
-FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<SourceBasis>& sources,
-                           const std::vector<double>& prior_variance, const Eigen::Vector3d& about_m,
-                           double noise_factor) {
-  FT_CHECK(sources.size() == prior_variance.size());
-  const auto n_amplitudes = kPerSource * static_cast<Eigen::Index>(sources.size());
-  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(n_amplitudes + 6, n_amplitudes + 6);
+double FieldPosterior::sdOfMotion_m(const Eigen::Vector3d& p_m) const {
+  return (effectOfMotion(p_m, about_m) * root.bottomRightCorner<6, 6>().triangularView<Eigen::Upper>()).norm();
+}
+
+FieldPosterior posteriorOf(std::span<const PlaceRow> rows, std::span<const FieldSource> sources,
+                           std::span<const SourcePrior> priors, const Eigen::Vector3d& about_m, double noise_factor) {
+  FT_CHECK(sources.size() == priors.size());
+  const std::vector<ChosenSource> chosen(sources.begin(), sources.end());
+  const auto n_unknowns = kPerChosen * static_cast<Eigen::Index>(sources.size()) + 6;
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(n_unknowns, n_unknowns);
   for (const PlaceRow& row : rows) {
-    const Eigen::MatrixXd effects = row.whitening * allEffects(row.derivative, sources, about_m);
+    const Eigen::MatrixXd effects = row.whitening * allEffects(row.derivative, chosen, about_m);
     precision.noalias() += effects.transpose() * effects / noise_factor;
   }
-  for (std::size_t k = 0; k < prior_variance.size(); ++k)
-    precision.diagonal().segment<kPerSource>(kPerSource * static_cast<Eigen::Index>(k)).array() +=
-        1.0 / prior_variance[k];
+  for (std::size_t k = 0; k < priors.size(); ++k) {
+    auto diagonal = precision.diagonal().segment<kPerChosen>(kPerChosen * static_cast<Eigen::Index>(k)).array();
+    diagonal.head<kPerSource>() += 1.0 / priors[k].amplitude_variance;
+    diagonal.tail<3>() += 1.0 / priors[k].place_variance_m2;
+  }
   // The unknowns differ by many orders of magnitude: a unit diagonal first, and no direction without any precision.
   const Eigen::VectorXd scale = precision.diagonal().cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * precision * scale.asDiagonal();
   scaled.diagonal().array() += 1e-12;
   const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
-  FieldPosterior posterior{sources, about_m, Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())};
+  FieldPosterior posterior{chosen, about_m, Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())};
   llt.matrixU().solveInPlace(posterior.root);
   posterior.root = scale.asDiagonal() * posterior.root;
   return posterior;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -44,14 +45,30 @@ Eigen::Matrix<double, 3, kPerSource> effectOfSource(const PlaceDerivative& place
 /// d corrected / d (shift, turn about a point) of a motion done to the truth instead.
 Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eigen::Vector3d& about_m);
 
-/// Joint posterior of the amplitudes of some sources and of the rigid motion, for the SD of corrected positions.
+/// A source that was chosen: how a place errs with its amplitudes, and with where it stands.
+struct ChosenSource {
+  SourceBasis basis;
+  Eigen::Matrix3d response;
+  std::array<Eigen::Matrix3d, 3> response_moved;  ///< d response / d place, of each axis; the tensor stays.
+
+  explicit ChosenSource(const FieldSource& source);
+};
+
+/// d corrected / d place of a source.
+Eigen::Matrix3d effectOfMove(const PlaceDerivative& place, const ChosenSource& source);
+
+inline constexpr Eigen::Index kPerChosen = kPerSource + 3;
+
+/// Joint posterior of amplitudes and places of some sources and of the rigid motion, for the SD of corrected positions.
 struct FieldPosterior {
-  std::vector<SourceBasis> sources;
+  std::vector<ChosenSource> sources;
   Eigen::Vector3d about_m = Eigen::Vector3d::Zero();  ///< Of the motion's turn.
   Eigen::MatrixXd root;                               ///< Upper triangular W, covariance = W W^T.
 
   /// Root of the trace of the covariance of the corrected position [m].
   double sd_m(const PlaceDerivative& place) const;
+  /// The same of a place that the sources do not reach.
+  double sdOfMotion_m(const Eigen::Vector3d& p_m) const;
 };
 
 /// Positions to be explained at one linearisation.
@@ -61,10 +78,15 @@ struct PlaceRow {
   Eigen::Matrix3d whitening = Eigen::Matrix3d::Identity();  ///< Inverse Cholesky factor of its noise.
 };
 
-/// @param prior_variance of each source's amplitudes
+/// What is known of a source before the data: the variance of its amplitudes, and of where it stands about the place
+/// that was chosen, per axis.
+struct SourcePrior {
+  double amplitude_variance = 0.0;
+  double place_variance_m2 = 0.0;
+};
+
 /// @param noise_factor variance of the noise over what the rows' whitening says
-FieldPosterior posteriorOf(std::span<const PlaceRow> rows, const std::vector<SourceBasis>& sources,
-                           const std::vector<double>& prior_variance, const Eigen::Vector3d& about_m,
-                           double noise_factor);
+FieldPosterior posteriorOf(std::span<const PlaceRow> rows, std::span<const FieldSource> sources,
+                           std::span<const SourcePrior> priors, const Eigen::Vector3d& about_m, double noise_factor);
 
 }  // namespace fieldtrue::correctors

@@ -127,6 +127,8 @@ class HarmonicFieldTest : public QObject {
   void differentiatesTheSolution();
   void invertsTheTracker();
   void followsTheFieldWithASource();
+  void followsASourceThatMoves();
+  void believesNoShiftFarAboveTheLargestSeen();
   void addsAGroupByItsEvidence();
   void removesWhatMetalDoes();
   void isFarBetterThanASmoothFit();
@@ -197,6 +199,51 @@ void HarmonicFieldTest::followsTheFieldWithASource() {
       FT_VERIFY_MATCH(near(Eigen::Vector3d(effects.col(e)), expected, 1e-5 * effects.norm()));
     }
   }
+}
+
+// And against where the source stands, its tensor kept: the excitation there changes too.
+void HarmonicFieldTest::followsASourceThatMoves() {
+  RandomGeometry random(8);
+  const Eigen::Vector3d at_m(1.4, 1.1, -0.2);
+  TensorAmplitudes amplitudes;
+  for (Eigen::Index e = 0; e < kPerSource; ++e) amplitudes[e] = 0.01 * random.normal();
+  const auto source_at = [&](const Eigen::Vector3d& moved_m) { return sourceOf(moved_m, amplitudes); };
+  for (const Eigen::Vector3d& p_m : {Eigen::Vector3d(1.5, 0.3, 0.1), Eigen::Vector3d(0.9, -0.4, 0.3)}) {
+    const Eigen::Matrix3d effect =
+        effectOfMove(PlaceDerivative::of(DisturbedField({source_at(at_m)}), p_m), ChosenSource(source_at(at_m)));
+    constexpr double kStep_m = 1e-4;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d step_m = kStep_m * Eigen::Vector3d::Unit(axis);
+      const Eigen::Vector3d expected = (DisturbedField({source_at(at_m + step_m)}).truePosition_m(p_m) -
+                                        DisturbedField({source_at(at_m - step_m)}).truePosition_m(p_m)) /
+                                       (2.0 * kStep_m);
+      FT_VERIFY_MATCH(near(Eigen::Vector3d(effect.col(axis)), expected, 1e-4 * effect.norm()));
+    }
+  }
+}
+
+// Beyond the places towards the metal the model's sources have poles: no reading is moved by more than twice what the
+// worst place was seen to be wrong by, and the stated SD stays of that size.
+void HarmonicFieldTest::believesNoShiftFarAboveTheLargestSeen() {
+  const auto metal = cabinet();
+  const FitData data = roomData(metal.get(), 0.0, 1);
+  const auto model = fitPosition("harmonic_field", data);
+  FT_VERIFY_OK(model);
+  double largest_m = 0.0;
+  for (std::size_t i = 0; i < data.size(); ++i)
+    largest_m = std::max(largest_m, (data.p_true_m[i] - data.p_tracked_m[i]).norm());
+  double most_m = 0.0, most_sd_m = 0.0;
+  for (int i = 0; i <= 60; ++i)
+    for (int j = 0; j <= 20; ++j) {
+      const Eigen::Vector3d p_m(1.7 + 0.01 * i, 0.5 + 0.025 * j, 0.1);
+      const Eigen::Vector3d shift_m = (*model)->displacement_m(p_m);
+      QVERIFY(shift_m.allFinite());
+      most_m = std::max(most_m, shift_m.norm());
+      most_sd_m = std::max(most_sd_m, *(*model)->uncertainty_m(p_m));
+    }
+  QVERIFY2(most_m < 2.1 * largest_m, qPrintable(QString("%1 of %2").arg(most_m).arg(largest_m)));
+  QVERIFY2(most_m > largest_m, "the probes must reach where the shift is large");
+  QVERIFY(most_sd_m < 3.0 * largest_m);
 }
 
 // With six orthogonal columns of squared length s and the pull q on one of them the log evidence at prior variance v is
