@@ -14,7 +14,7 @@
 namespace fieldtrue::acquisition {
 namespace {
 
-constexpr std::array<std::uint16_t, 256> crcTable() {
+constexpr std::array<std::uint16_t, 256> crc16Table() {
   constexpr unsigned kPolynomial = 0xA001;
   std::array<std::uint16_t, 256> table{};
   for (unsigned i = 0; i < table.size(); ++i) {
@@ -24,7 +24,7 @@ constexpr std::array<std::uint16_t, 256> crcTable() {
   }
   return table;
 }
-constexpr std::array<std::uint16_t, 256> kCrcTable = crcTable();
+constexpr std::array<std::uint16_t, 256> kCrcTable = crc16Table();
 
 constexpr std::pair<char, int> kRateDigits[] = {{'0', 9600},   {'1', 14400},  {'2', 19200},
                                                 {'3', 38400},  {'4', 57600},  {'5', 115200},

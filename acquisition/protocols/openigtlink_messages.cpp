@@ -69,7 +69,7 @@ void appendTextField(std::string& out, std::string_view text, std::size_t width)
   out.append(width - std::min(width, text.size()), '\0');
 }
 
-constexpr std::array<std::uint64_t, 256> crcTable() {
+constexpr std::array<std::uint64_t, 256> crc64Table() {
   constexpr std::uint64_t kPolynomial = 0x42F0E1EBA9EA3693;
   std::array<std::uint64_t, 256> table{};
   for (std::uint64_t byte = 0; byte < table.size(); ++byte) {
@@ -223,7 +223,7 @@ std::optional<IgtlHeader> decodeIgtlHeader(std::string_view bytes) {
 }
 
 std::uint64_t igtlCrc(std::string_view bytes) {
-  static constexpr std::array<std::uint64_t, 256> kTable = crcTable();
+  static constexpr std::array<std::uint64_t, 256> kTable = crc64Table();
   std::uint64_t crc = 0;
   for (const char c : bytes) crc = crc << 8 ^ kTable[(crc >> 56 ^ static_cast<unsigned char>(c)) & 0xFF];
   return crc;
