@@ -32,7 +32,9 @@ std::vector<std::string> modesWithPosition() {
   return ids;
 }
 
-bool isModel(const std::string& heard) {
+const std::vector<int> kFlockRates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
+
+bool isModel(std::string_view heard) {
   return heard.size() == kModelBytes &&
          std::all_of(heard.begin(), heard.end(), [](unsigned char c) { return std::isprint(c) != 0; });
 }

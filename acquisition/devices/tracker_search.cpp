@@ -141,7 +141,15 @@ void LineSearch::askNext() {
 void LineSearch::ask(const DeviceKind& kind) {
   const TrackerProbe& probe = *kind.probe;
   if (probe.drops_rts) transport_->setRequestToSend(false);
-  if (probe.break_ms > 0) transport_->sendBreak(probe.break_ms);
+  if (probe.break_ms <= 0) return askAfterBreak(probe);
+  transport_->setBreak(true);
+  exchange_->tell({}, probe.break_ms, [this, &probe](const std::string&) {
+    transport_->setBreak(false);
+    askAfterBreak(probe);
+  });
+}
+
+void LineSearch::askAfterBreak(const TrackerProbe& probe) {
   exchange_->tell(probe.stop, probe.settle_ms, [this, &probe](const std::string&) {
     exchange_->drain(kQuiet_ms, kMostDrain_ms, [this, &probe](const std::string&) {
       const auto is_answer = [&probe](const std::string& heard) { return probe.answer(heard).has_value(); };

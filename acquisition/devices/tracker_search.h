@@ -60,6 +60,7 @@ class LineSearch : public QObject {
   void listened(const std::string& heard);
   void askNext();
   void ask(const DeviceKind& kind);
+  void askAfterBreak(const TrackerProbe& probe);
   void answered(const std::string& heard);
   void nextRate();
   void found(const DeviceKind& kind, ProbeAnswer answer);

@@ -292,12 +292,12 @@ void FlockEmulatorCore::sendRecord(int address, const Sample& read, Out& out) {
   const EmulatorFaults& faults = options_.faults;
   const Sample sample = misread(read);
   const bool saturated = !sample.status.empty();
-  const bool stuck = faults.stuck && read.time_s - stream_began_s_ > kStuckAfter_s;
+  const bool stuck = faults.stuck && reading_s_ - stream_began_s_ > kStuckAfter_s;
   if (saturated) note(kSaturated);
   if (bird.last_record.empty() && saturated) return;
   if (!saturated && (!stuck || bird.last_record.empty())) {
     const Pose pose = source_->recorded() ? sample.tracker_from_sensor : reported(bird, sample.tracker_from_sensor);
-    bird.last_record = encodeFlockRecord(address, flipped(pose, read.time_s), layout(bird));
+    bird.last_record = encodeFlockRecord(address, flipped(pose), layout(bird));
   }
   record(bird.last_record, out);
   if (faults.repeats) record(bird.last_record, out);

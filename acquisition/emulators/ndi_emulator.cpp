@@ -290,7 +290,7 @@ void NdiEmulatorCore::keep(const std::vector<Sample>& samples, std::uint32_t fra
     for (auto& [handle, port] : ports_) {
       if (port.sensor != sample.sensor) continue;
       port.latest = misread(sample);
-      port.latest.tracker_from_sensor = flipped(port.latest.tracker_from_sensor, sample.time_s);
+      port.latest.tracker_from_sensor = flipped(port.latest.tracker_from_sensor);
       port.frame = frame;
       port.was_seen = true;
     }

@@ -14,7 +14,7 @@
 namespace fieldtrue::acquisition {
 namespace {
 
-constexpr std::array<std::uint16_t, 256> crc16Table() {
+constexpr std::array<std::uint16_t, 256> ndiCrcTable() {
   constexpr unsigned kPolynomial = 0xA001;
   std::array<std::uint16_t, 256> table{};
   for (unsigned i = 0; i < table.size(); ++i) {
@@ -24,7 +24,7 @@ constexpr std::array<std::uint16_t, 256> crc16Table() {
   }
   return table;
 }
-constexpr std::array<std::uint16_t, 256> kCrcTable = crc16Table();
+constexpr std::array<std::uint16_t, 256> kNdiCrcTable = ndiCrcTable();
 
 constexpr std::pair<char, int> kRateDigits[] = {{'0', 9600},   {'1', 14400},  {'2', 19200},
                                                 {'3', 38400},  {'4', 57600},  {'5', 115200},
@@ -89,9 +89,9 @@ constexpr std::pair<unsigned, const char*> kSystemBits[] = {
 };
 
 /// Cuts pieces of fixed width from the front of a text; once it is too short or not as it must be, `good` is false.
-class Columns {
+class NdiColumns {
  public:
-  explicit Columns(std::string_view text) : rest_(text) {}
+  explicit NdiColumns(std::string_view text) : rest_(text) {}
   std::string_view take(std::size_t width) {
     good_ = good_ && rest_.size() >= width;
     if (!good_) return {};
@@ -133,13 +133,13 @@ constexpr double kQuaternionScale = 1e-4;
 constexpr double kPositionScale_mm = 1e-2;
 constexpr double kErrorScale_mm = 1e-4;
 
-void readTransform(Columns& columns, NdiTool& tool) {
+void readTransform(NdiColumns& columns, NdiTool& tool) {
   for (double& q : tool.quaternion_wxyz) q = columns.number(6, kQuaternionScale);
   for (double& x_mm : tool.position_mm) x_mm = columns.number(7, kPositionScale_mm);
   tool.error_mm = columns.number(6, kErrorScale_mm);
 }
 
-NdiTool readTool(Columns& columns) {
+NdiTool readTool(NdiColumns& columns) {
   NdiTool tool;
   tool.handle = static_cast<int>(columns.hex(2));
   if (columns.skip("UNOCCUPIED")) {
@@ -178,7 +178,7 @@ std::string transformText(const NdiTool& tool) {
 constexpr unsigned char kBxValid = 1, kBxMissing = 2, kBxDisabled = 4;
 
 template <class Number>
-void append(std::string& bytes, Number number) {
+void appendNumber(std::string& bytes, Number number) {
   static_assert(std::endian::native == std::endian::little);
   std::array<char, sizeof(Number)> raw{};
   std::memcpy(raw.data(), &number, raw.size());
@@ -186,9 +186,9 @@ void append(std::string& bytes, Number number) {
 }
 
 /// Takes little-endian numbers from the front; once there are too few bytes, `good` is false.
-class Bytes {
+class NdiBytes {
  public:
-  explicit Bytes(std::string_view bytes) : rest_(bytes) {}
+  explicit NdiBytes(std::string_view bytes) : rest_(bytes) {}
   template <class Number>
   Number take() {
     Number number{};
@@ -206,7 +206,7 @@ class Bytes {
   bool good_ = true;
 };
 
-NdiTool readBinaryTool(Bytes& bytes) {
+NdiTool readBinaryTool(NdiBytes& bytes) {
   NdiTool tool;
   tool.handle = bytes.take<std::uint8_t>();
   const auto state = bytes.take<std::uint8_t>();
@@ -239,7 +239,7 @@ std::optional<std::string_view> checkedLine(std::string_view line) {
 
 std::uint16_t ndiCrc(std::string_view bytes, std::uint16_t crc) {
   for (const char c : bytes) {
-    crc = static_cast<std::uint16_t>(crc >> 8 ^ kCrcTable[(crc ^ static_cast<unsigned char>(c)) & 0xFFu]);
+    crc = static_cast<std::uint16_t>(crc >> 8 ^ kNdiCrcTable[(crc ^ static_cast<unsigned char>(c)) & 0xFFu]);
   }
   return crc;
 }
@@ -310,7 +310,7 @@ std::string ndiErrorMeaning(int code) {
 }
 
 std::optional<std::vector<NdiHandle>> decodeNdiHandles(std::string_view text) {
-  Columns columns(text);
+  NdiColumns columns(text);
   std::vector<NdiHandle> handles(columns.hex(2));
   for (NdiHandle& handle : handles) {
     handle.handle = static_cast<int>(columns.hex(2));
@@ -328,7 +328,7 @@ std::string encodeNdiHandles(std::span<const NdiHandle> handles) {
 }
 
 std::optional<NdiToolInformation> decodeNdiToolInformation(std::string_view text) {
-  Columns columns(text);
+  NdiColumns columns(text);
   NdiToolInformation information;
   information.type = trimmed(columns.take(8));
   information.manufacturer = trimmed(columns.take(12));
@@ -364,7 +364,7 @@ std::string encodeNdiTx(const NdiFrame& frame) {
 }
 
 std::optional<NdiFrame> decodeNdiTx(std::string_view text) {
-  Columns columns(text);
+  NdiColumns columns(text);
   NdiFrame frame;
   const unsigned tools = columns.hex(2);
   for (unsigned i = 0; i < tools && columns.good(); ++i) frame.tools.push_back(readTool(columns));
@@ -381,25 +381,25 @@ std::string encodeNdiBx(const NdiFrame& frame) {
     data += static_cast<char>(valid ? kBxValid : seen ? kBxMissing : kBxDisabled);
     if (!seen) continue;
     if (valid) {
-      for (const double q : tool.quaternion_wxyz) append(data, static_cast<float>(q));
-      for (const double x_mm : tool.position_mm) append(data, static_cast<float>(x_mm));
-      append(data, static_cast<float>(tool.error_mm));
+      for (const double q : tool.quaternion_wxyz) appendNumber(data, static_cast<float>(q));
+      for (const double x_mm : tool.position_mm) appendNumber(data, static_cast<float>(x_mm));
+      appendNumber(data, static_cast<float>(tool.error_mm));
     }
-    append(data, static_cast<std::uint32_t>(tool.port_status));
-    append(data, tool.frame);
+    appendNumber(data, static_cast<std::uint32_t>(tool.port_status));
+    appendNumber(data, tool.frame);
   }
-  append(data, static_cast<std::uint16_t>(frame.system_status));
+  appendNumber(data, static_cast<std::uint16_t>(frame.system_status));
   std::string reply;
-  append(reply, kBxStart);
-  append(reply, static_cast<std::uint16_t>(data.size()));
-  append(reply, ndiCrc(reply));
+  appendNumber(reply, kBxStart);
+  appendNumber(reply, static_cast<std::uint16_t>(data.size()));
+  appendNumber(reply, ndiCrc(reply));
   reply += data;
-  append(reply, ndiCrc(data));
+  appendNumber(reply, ndiCrc(data));
   return reply;
 }
 
 std::optional<std::size_t> ndiBxLength(std::string_view bytes) {
-  Bytes header(bytes.substr(0, kNdiBxHeader));
+  NdiBytes header(bytes.substr(0, kNdiBxHeader));
   const auto start = header.take<std::uint16_t>();
   const auto length = header.take<std::uint16_t>();
   const auto crc = header.take<std::uint16_t>();
@@ -412,8 +412,8 @@ std::optional<NdiFrame> decodeNdiBx(std::string_view bytes) {
   const auto length = ndiBxLength(bytes);
   if (!length || *length != bytes.size()) return std::nullopt;
   const std::string_view data = bytes.substr(kNdiBxHeader, bytes.size() - kNdiBxHeader - sizeof(std::uint16_t));
-  if (Bytes(bytes.substr(kNdiBxHeader + data.size())).take<std::uint16_t>() != ndiCrc(data)) return std::nullopt;
-  Bytes content(data);
+  if (NdiBytes(bytes.substr(kNdiBxHeader + data.size())).take<std::uint16_t>() != ndiCrc(data)) return std::nullopt;
+  NdiBytes content(data);
   NdiFrame frame;
   const auto tools = content.take<std::uint8_t>();
   for (int i = 0; i < tools && content.good(); ++i) frame.tools.push_back(readBinaryTool(content));
