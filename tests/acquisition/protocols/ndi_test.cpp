@@ -3,6 +3,7 @@
 #include <QTest>
 #include <random>
 
+#include "acquisition/protocols/sample_status.h"
 #include "calib/core/units.h"
 #include "tests/acquisition/protocols/fastrak_bytes.h"
 #include "tests/support/matchers.h"
