@@ -21,6 +21,7 @@
 #include "calib/core/units.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/tables/line_reader.h"
+#include "calib/tables/table_sensors.h"
 
 /// apply: corrects the poses of a table of any length, row by row.
 namespace fieldtrue::cli {
@@ -147,6 +148,8 @@ class TableCorrector {
   std::size_t n_outside() const { return n_outside_; }
   std::size_t n_lost() const { return n_lost_; }
   std::size_t n_other_setup() const { return n_other_setup_; }
+  /// Rows of a sensor that has no correction of its own, where each has one.
+  std::size_t n_other_sensor() const { return n_other_sensor_; }
   const std::string& setupDifference() const { return setup_.difference(); }
   /// The correction takes orientation and the table has none.
   bool isPositionOnly() const { return corrector_.takesOrientation() && columns_ && !columns_->orientation; }
@@ -260,6 +263,8 @@ class TableCorrector {
       if (!marked) units_.add(read->position_m);
       poses_.push_back(*read);
       sensors_.push_back(sensorNumber(sensor));
+      const auto& apart = corrector_.parts().by_sensor;
+      if (!apart.empty() && !(sensors_.back() && apart.contains(*sensors_.back()))) ++n_other_sensor_;
     }
     rows_.push_back(std::move(row));
     return {};
@@ -270,11 +275,11 @@ class TableCorrector {
     corrector_.correct(poses_, corrected, sensors_);
     if (isPositionOnly())
       for (std::size_t i = 0; i < poses_.size(); ++i)
-        corrected[i].position_m = corrector_.correctPosition_m(poses_[i].position_m);
+        corrected[i].position_m = corrector_.correctPosition_m(poses_[i].position_m, sensors_[i]);
     for (const PendingRow& row : rows_) {
       out << row.text;
       if (row.pose) {
-        writeCorrected(out, poses_[*row.pose], corrected[*row.pose]);
+        writeCorrected(out, poses_[*row.pose], corrected[*row.pose], sensors_[*row.pose]);
       } else {
         out << ",,,,,,,,,0,";
         ++n_lost_;
@@ -288,7 +293,7 @@ class TableCorrector {
     sensors_.clear();
   }
 
-  void writeCorrected(std::ostream& out, const Pose& tracked, const Pose& corrected) {
+  void writeCorrected(std::ostream& out, const Pose& tracked, const Pose& corrected, std::optional<int> sensor) {
     for (const double value : corrected.position_m) out << ',' << formatNumber(value);
     if (columns_->orientation) {
       const Eigen::Quaterniond q = canonical(corrected.orientation);
@@ -297,10 +302,10 @@ class TableCorrector {
       out << ",,,,";
     }
     out << ',';
-    const auto uncertainty_m =
-        columns_->orientation ? corrector_.uncertaintyAt_m(tracked) : corrector_.uncertainty_m(tracked.position_m);
+    const auto uncertainty_m = columns_->orientation ? corrector_.uncertaintyAt_m(tracked, sensor)
+                                                     : corrector_.uncertainty_m(tracked.position_m, sensor);
     if (uncertainty_m) out << formatNumber(*uncertainty_m);
-    const bool covered = corrector_.covers(tracked.position_m);
+    const bool covered = corrector_.covers(tracked.position_m, sensor);
     if (!covered) ++n_outside_;
     out << ',' << (covered ? 1 : 0) << ',';
     if (columns_->orientation && !orientations_seen_.empty()) out << formatNumber(nearestOrientation_deg(tracked));
@@ -328,6 +333,7 @@ class TableCorrector {
   std::size_t n_outside_ = 0;
   std::size_t n_lost_ = 0;
   std::size_t n_other_setup_ = 0;
+  std::size_t n_other_sensor_ = 0;
 };
 
 struct ApplyOptions {
@@ -375,6 +381,11 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
     answer.remarks.push_back(options.in + " has no orientations (qw, qx, qy, qz), on which this correction depends: " +
                              "positions are corrected as for the mean of the " +
                              std::to_string(corrector->orientationsSeen().size()) + " orientations it was fitted on");
+  if (table.n_other_sensor() > 0)
+    answer.remarks.push_back(std::to_string(table.n_other_sensor()) + " of " + std::to_string(table.n_rows()) +
+                             " rows of " + options.in + " name none of the sensors that have a correction each (" +
+                             sensorsText(corrector->sensorsApart()) + "): they are corrected as sensor " +
+                             std::to_string(corrector->sensorsApart().front()));
   if (table.n_other_setup() > 0)
     answer.remarks.push_back(std::to_string(table.n_other_setup()) + " of " + std::to_string(table.n_rows()) +
                              " rows of " + options.in + " are of another set-up than the calibration (" +

@@ -23,6 +23,7 @@ struct ExportArguments {
   std::string format;
   std::string direction;
   std::string orientation;
+  std::optional<int> sensor;
   std::optional<double> bake_um;
   std::optional<double> max_deviation_um;
   double max_size_mib = 256.0;
@@ -98,6 +99,7 @@ Outcome runExport(const ExportArguments& arguments, const CommonOptions& common)
     return notPossible(path.string() + " exists already and was left as it is; choose another name, or add --force");
 
   auto corrector = calibration::Corrector::load(arguments.calibration);
+  if (corrector && arguments.sensor) corrector = corrector->ofSensor(*arguments.sensor);
   if (corrector && arguments.bake_um)
     corrector = corrector->baked(1e-6 * *arguments.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
@@ -155,6 +157,10 @@ void addExportCommand(CommandLine& line) {
       ->add_option("--orientation", arguments->orientation,
                    "Where the correction depends on how the sensor is turned: mean, or the orientation that counts")
       ->type_name("qw,qx,qy,qz");
+  command
+      ->add_option("--sensor", arguments->sensor,
+                   "The sensor whose correction is written, where each has its own; its mounting, where they share one")
+      ->type_name("N");
   command
       ->add_option("--bake-um", arguments->bake_um,
                    "Bake the position part to a lattice first, which deviates by at most so much inside the region")

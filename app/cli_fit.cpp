@@ -14,6 +14,7 @@
 #include "calib/core/units.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/learning_curve.h"
+#include "calib/evaluation/sensor_scores.h"
 #include "widgets/report/report.h"
 
 /// fit, compare, report: what is done with a table of nodes.
@@ -27,23 +28,25 @@ struct FitOptions {
   std::string position;
   std::string orientation = "none";
   std::string align;
+  std::string sensors = "auto";
   std::optional<double> bake_um;
   std::string out;
   std::vector<std::string> setup;
   TableArguments table;
 };
 
-/// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
-std::vector<Node> fitRows(const CalibrationTable& table) {
-  std::vector<Node> rows;
-  for (const Node& node : table.nodes) {
-    if (node.role == NodeRole::kFit) rows.push_back(node);
-  }
-  return rows;
+/// Validation rows stay unseen, skipped ones never count.
+Result<calibration::Corrector> fitRows(const CalibrationTable& table, calibration::CorrectorChoice choice,
+                                       const std::string& sensors, calibration::AlignMode align,
+                                       const RunControl& control) {
+  if (sensors == "auto") return evaluation::fitByEvidence(table, choice, align, control);
+  choice.separate_sensors = sensors == "separate";
+  return calibration::Corrector::fit(evaluation::fitRowsOf(table), table.metadata, choice, align, control);
 }
 
 Answer fitAnswer(const FitOptions& options, const calibration::Corrector& corrector, calibration::AlignMode align,
-                 std::size_t n_unused) {
+                 std::size_t n_rows) {
+  const std::size_t n_unused = n_rows - corrector.report().n_nodes;
   const calibration::FitReport& report = corrector.report();
   const calibration::CorrectorChoice& choice = corrector.choice();
   Answer answer;
@@ -54,6 +57,7 @@ Answer fitAnswer(const FitOptions& options, const calibration::Corrector& correc
       {"align", toText(align)},
       {"position", {{"method", choice.position_id}, {"settings", toJson(choice.position_settings)}}},
       {"orientation", {{"method", choice.orientation_id}, {"settings", toJson(choice.orientation_settings)}}},
+      {"sensors_apart", corrector.sensorsApart()},
       {"n_nodes", report.n_nodes},
       {"n_not_used", n_unused},
       {"in_sample",
@@ -78,13 +82,12 @@ Outcome runFit(const FitOptions& options, const CommonOptions& common) {
   for (const auto& [key, value] : *setup) table.metadata.setup[key] = value;
   const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(table.metadata));
   if (!align) return tl::unexpected(align.error());
-  const std::vector<Node> rows = fitRows(table);
-  auto corrector = calibration::Corrector::fit(rows, table.metadata, *choice, *align, runControl(common, "fitting"));
+  auto corrector = fitRows(table, *choice, options.sensors, *align, runControl(common, "fitting"));
   if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
   const auto saved = corrector->save(options.out);
   if (!saved) return notPossible(saved.error());
-  Answer answer = fitAnswer(options, *corrector, *align, table.nodes.size() - rows.size());
+  Answer answer = fitAnswer(options, *corrector, *align, table.nodes.size());
   answer.remarks = reading->notes;
   return answer;
 }
@@ -102,6 +105,12 @@ void addFit(CommandLine& line) {
       ->add_option("--align", options->align,
                    "none or rigid; default rigid unless the table says the alignment is known")
       ->type_name("MODE");
+  command
+      ->add_option("--sensors", options->sensors,
+                   "Where the table holds several: shared, one correction; separate, one for each; auto (default), one "
+                   "for each where that errs less on places left out")
+      ->type_name("HOW")
+      ->check(CLI::IsMember({"auto", "shared", "separate"}));
   addTableOptions(*command, options->table);
   addSetupOption(*command, options->setup, "What the table does not state of its set-up");
   command

@@ -10,14 +10,12 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view kSchemaName = "fieldtrue.ftcal/";
-constexpr int kSchemaVersion = 2;
+constexpr int kSchemaVersion = 3;
 constexpr std::string_view kChecksumKind = "fnv1a64:";
 
 }  // namespace
 
-std::string calibrationSchema(bool needs_version_2) {
-  return std::string(kSchemaName) + std::to_string(needs_version_2 ? kSchemaVersion : 1);
-}
+std::string calibrationSchema(int version) { return std::string(kSchemaName) + std::to_string(version); }
 
 std::string compactText(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
@@ -28,7 +26,8 @@ std::string checksumOf(json content) {
 
 void checkEnvelope(const JsonReader& content) {
   if (!content.schema(kSchemaName, kSchemaVersion, "a Fieldtrue calibration"))
-    content.fail("is not a Fieldtrue calibration; it needs the key schema with \"" + calibrationSchema(true) + "\".");
+    content.fail("is not a Fieldtrue calibration; it needs the key schema with \"" + calibrationSchema(kSchemaVersion) +
+                 "\".");
   if (const auto checksum = content.find("checksum"); !checksum || checksum->raw() != checksumOf(content.raw()))
     content.fail("is damaged: its content does not match its checksum; export the calibration again.");
 }

@@ -6,9 +6,10 @@
 
 namespace fieldtrue::calibration {
 
-/// The schema of a calibration file that needs what version 2 brought, `baked` in place of the position part's
-/// `parameters` or a position part that takes the whole pose, or of one that version 1 could hold.
-std::string calibrationSchema(bool needs_version_2);
+/// The schema of a calibration file. Version 2 brought `baked` in place of the position part's `parameters` and
+/// position parts that take the whole pose, version 3 a correction for each sensor; a file states the first that could
+/// hold it.
+std::string calibrationSchema(int version);
 
 /// Of the content without the checksum itself: keys sorted, no white space, so that re-indenting a file does no harm.
 std::string checksumOf(nlohmann::json content);

@@ -11,6 +11,7 @@
 #include "calib/correctors/base/readers.h"
 #include "calib/correctors/registry.h"
 #include "calib/geometry/spacing.h"
+#include "calib/tables/table_sensors.h"
 #include "calib/tables/table_setup.h"
 
 namespace fieldtrue::calibration {
@@ -85,27 +86,66 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
     FT_TRY(auto alignment, fitAlignment(nodes));
     parts.alignment = alignment;
   }
-  const correctors::FitData data = makeFitData(nodes, metadata, parts.alignment);
-  FT_TRY_VOID(correctors::checkPositions(data, "A calibration"));
-
-  FT_TRY(auto position, position_method->fit(data, choice.position_settings, control));
-  FT_TRY(auto orientation, orientation_method->fit(data, choice.orientation_settings, control));
-  parts.position = std::move(position);
-  parts.orientation = std::move(orientation);
-  parts.region = Region::around(data.p_tracked_m, data.dimension,
-                                kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
+  std::vector<std::string> notes{orientationNote(nodes)};
+  const auto fit_rows = [&](std::span<const Node> rows, const std::string& whose) -> Result<Correction> {
+    const correctors::FitData data = makeFitData(rows, metadata, parts.alignment);
+    FT_TRY_VOID(correctors::checkPositions(data, "A calibration"));
+    Correction correction;
+    FT_TRY(correction.position, position_method->fit(data, choice.position_settings, control));
+    FT_TRY(correction.orientation, orientation_method->fit(data, choice.orientation_settings, control));
+    correction.region = Region::around(data.p_tracked_m, data.dimension,
+                                       kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
+    for (const std::string& note : {correctors::planeNote(data, "nothing is claimed off it"),
+                                    correction.position->note(), correction.orientation->note()})
+      if (!note.empty()) notes.push_back(whose + note);
+    return correction;
+  };
+  const std::vector<int> sensors = sensorsOf(nodes);
+  const bool separate = choice.separate_sensors && sensors.size() > 1;
+  if (separate) {
+    for (const int sensor : sensors) {
+      const std::string whose = "Sensor " + std::to_string(sensor) + ": ";
+      auto correction = fit_rows(nodesOfSensor(nodes, sensor), whose);
+      if (!correction) return fail(correction.error().code, whose + correction.error().message);
+      parts.by_sensor[sensor] = *std::move(correction);
+    }
+    static_cast<Correction&>(parts) = parts.by_sensor.begin()->second;
+  } else {
+    FT_TRY(static_cast<Correction&>(parts), fit_rows(nodes, ""));
+  }
 
   Corrector corrector(std::move(parts));
   corrector.choice_ = choice;
+  corrector.choice_.separate_sensors = separate;
   corrector.align_ = align;
   corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
   corrector.setup_ = setupOf(corrector.table_);
   corrector.report_ = reportOf(nodes, corrector);
-  for (const std::string& note : {orientationNote(nodes), correctors::planeNote(data, "nothing is claimed off it"),
-                                  corrector.parts().position->note(), corrector.parts().orientation->note()}) {
-    std::vector<std::string>& notes = corrector.report_.notes;
-    if (!note.empty() && std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+  for (const std::string& note : notes) {
+    std::vector<std::string>& told = corrector.report_.notes;
+    if (!note.empty() && std::find(told.begin(), told.end(), note) == told.end()) told.push_back(note);
   }
+  return corrector;
+}
+
+Result<Corrector> Corrector::ofSensor(int sensor) const {
+  FT_TRY(auto alone, partsOf(sensor));
+  Corrector corrector(std::move(alone));
+  corrector.choice_ = choice_;
+  corrector.choice_.separate_sensors = false;
+  corrector.align_ = align_;
+  corrector.setup_ = setup_;
+  corrector.setup_["sensor"] = std::to_string(sensor);
+  corrector.table_ =
+      parts().by_sensor.empty() ? table_ : CalibrationTable{table_.metadata, nodesOfSensor(table_.nodes, sensor)};
+  corrector.report_ = reportOf(corrector.table_.nodes, corrector);
+  corrector.report_.notes = report_.notes;
+  return corrector;
+}
+
+Corrector Corrector::withNote(const std::string& note) const {
+  Corrector corrector = *this;
+  corrector.report_.notes.push_back(note);
   return corrector;
 }
 
@@ -129,13 +169,21 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
   if (isBaked())
     return fail(ErrorCode::kUnsupported,
                 "This calibration is baked already; bake anew from the one that was fitted, or fit it again");
-  std::vector<Eigen::Vector3d> places_m;
-  for (const Node& node : table_.nodes) places_m.push_back(node.tracker_from_sensor.position_m);
-  FT_TRY(auto lattice,
-         correctors::bakePosition(*parts().position, region(), places_m, orientationsSeen(), max_deviation_m, control));
+  const auto bake = [&](Correction& correction, std::span<const Node> rows) -> Result<void> {
+    std::vector<Eigen::Vector3d> places_m;
+    for (const Node& node : rows) places_m.push_back(node.tracker_from_sensor.position_m);
+    FT_TRY(correction.position, correctors::bakePosition(*correction.position, correction.region, places_m,
+                                                         orientationsSeen(), max_deviation_m, control));
+    correction.is_baked = true;
+    return {};
+  };
   Parts baked_parts = parts();
-  baked_parts.is_baked = true;
-  baked_parts.position = std::move(lattice);
+  for (auto& [sensor, correction] : baked_parts.by_sensor)
+    FT_TRY_VOID(bake(correction, nodesOfSensor(table_.nodes, sensor)));
+  if (baked_parts.by_sensor.empty())
+    FT_TRY_VOID(bake(baked_parts, table_.nodes));
+  else
+    static_cast<Correction&>(baked_parts) = baked_parts.by_sensor.begin()->second;
   Corrector corrector(std::move(baked_parts));
   corrector.choice_ = choice_;
   corrector.align_ = align_;
@@ -143,7 +191,9 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
   corrector.setup_ = setup_;
   corrector.report_ = reportOf(table_.nodes, corrector);
   corrector.report_.notes = report_.notes;
-  corrector.report_.notes.push_back(corrector.parts().position->note());
+  for (const auto& [sensor, correction] : corrector.parts().by_sensor)
+    corrector.report_.notes.push_back("Sensor " + std::to_string(sensor) + ": " + correction.position->note());
+  if (corrector.parts().by_sensor.empty()) corrector.report_.notes.push_back(corrector.parts().position->note());
   if (takesOrientation())
     corrector.report_.notes.push_back(
         "Baked with the sensor's orientation: within the bound at poses drawn in the region.");

@@ -23,6 +23,9 @@ struct CorrectorChoice {
   Settings position_settings;
   std::string orientation_id = "none";
   Settings orientation_settings;
+  /// Each sensor has a correction of its own, from its own rows, beyond the alignment that all share. Nothing else than
+  /// one correction where all rows are of one sensor.
+  bool separate_sensors = false;
 };
 
 /// Parses `method[:key=value,...]` for both parts and checks the settings.
@@ -52,11 +55,18 @@ class Corrector : public Evaluator {
   /// What it is good for, as far as its table stated it.
   const Setup& setup() const { return setup_; }
 
+  /// The calibration of one sensor, as if it alone had been fitted in the same alignment; of a correction that all
+  /// share the same with the mounting of this one. @error as partsOf
+  Result<Corrector> ofSensor(int sensor) const;
+
   /// What another program made.
   /// @param parts without an orientation part: none is corrected
   /// @param table rows that stand for it, where it takes them being true
   static Corrector imported(Parts parts, CorrectorChoice choice, CalibrationTable table,
                             std::vector<std::string> notes);
+
+  /// The same with a note more in its report.
+  Corrector withNote(const std::string& note) const;
 
   /// The same calibration with its position part baked to a dense lattice: 64 coefficients a sample whatever the method
   /// was, and it needs nothing else. Covers what it covered, up to a cell more at holes and edges of a local method.

@@ -38,6 +38,15 @@ FitReport reportFrom(const JsonReader& from) {
   return report;
 }
 
+/// What one correction holds, beside the method's id and settings.
+json correctionToJson(const Correction& correction) {
+  json to;
+  to["position"][correction.is_baked ? "baked" : "parameters"] = correction.position->parameters();
+  to["orientation"]["parameters"] = correction.orientation->parameters();
+  to["region"] = correction.region.toJson();
+  return to;
+}
+
 /// A method's id and settings.
 template <class Model>
 std::pair<std::string, Settings> methodFrom(
@@ -68,7 +77,9 @@ std::string Corrector::toText() const {
   json orientations = json::array();
   for (const Eigen::Quaterniond& q : orientationsSeen()) orientations.push_back(jsonOf(q));
   json content = {
-      {"schema", calibrationSchema(isBaked() || takesOrientation())},
+      {"schema", calibrationSchema(!parts().by_sensor.empty()        ? 3
+                                   : isBaked() || takesOrientation() ? 2
+                                                                     : 1)},
       {"software", "Fieldtrue " FIELDTRUE_VERSION},
       {"direction", "tracker_from_sensor as tracked -> reference_from_sensor as corrected"},
       {"units", "m, rad; quaternions w x y z"},
@@ -76,21 +87,17 @@ std::string Corrector::toText() const {
       {"alignment",
        {{"reference_from_tracker", jsonOf(alignment().reference_from_tracker)},
         {"sensor_from_mount_wxyz", jsonOf(alignment().sensor_from_mount)}}},
-      {"position",
-       {{"method", choice_.position_id},
-        {"settings", toJson(choice_.position_settings)},
-        {isBaked() ? "baked" : "parameters", parts().position->parameters()}}},
-      {"orientation",
-       {{"method", choice_.orientation_id},
-        {"settings", toJson(choice_.orientation_settings)},
-        {"parameters", parts().orientation->parameters()}}},
+      {"position", {{"method", choice_.position_id}, {"settings", toJson(choice_.position_settings)}}},
+      {"orientation", {{"method", choice_.orientation_id}, {"settings", toJson(choice_.orientation_settings)}}},
       {"inputs", takesOrientation() ? "pose" : "position"},
       {"orientations_seen", std::move(orientations)},
-      {"region", region().toJson()},
       {"setup", setupToJson(setup_)},
       {"report", reportToJson(report_)},
       {"table", fieldtrue::toJson(table_)},
   };
+  for (const auto& [sensor, correction] : parts().by_sensor)
+    content["by_sensor"][std::to_string(sensor)] = correctionToJson(correction);
+  if (parts().by_sensor.empty()) content.update(correctionToJson(parts()), true);
   for (const auto& [sensor, sensor_from_mount] : alignment().mounts)
     content["alignment"]["mounts_wxyz"][std::to_string(sensor)] = jsonOf(sensor_from_mount);
   content["checksum"] = checksumOf(content);
@@ -116,7 +123,8 @@ Corrector Corrector::fromJson(const JsonReader& content) {
   const auto orientation =
       methodFrom<correctors::OrientationModel>(content["orientation"], correctors::findOrientationMethod);
   Corrector corrector(evaluatorPartsFrom(content));
-  corrector.choice_ = {position.first, position.second, orientation.first, orientation.second};
+  corrector.choice_ = {position.first, position.second, orientation.first, orientation.second,
+                       !corrector.parts().by_sensor.empty()};
   corrector.align_ = content["align"].oneOf({"rigid", "none"}) == "rigid" ? AlignMode::kRigid : AlignMode::kNone;
   corrector.report_ = reportFrom(content["report"]);
   corrector.table_ = tableFrom(content["table"]);

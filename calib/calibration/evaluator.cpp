@@ -8,16 +8,17 @@
 
 #include "calib/correctors/baked/baked_position.h"
 #include "calib/correctors/readers.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::calibration {
 namespace {
 
-/// A key of the mountings: the sensor's number.
-int sensorFrom(const JsonReader& mounts, const std::string& key) {
+/// A key of what is told by sensor: the sensor's number.
+int sensorFrom(const JsonReader& by_sensor, const std::string& key) {
   int sensor = 0;
   const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), sensor);
   if (error != std::errc() || end != key.data() + key.size())
-    mounts.fail("has the key '" + key + "', which is not a sensor's number");
+    by_sensor.fail("has the key '" + key + "', which is not a sensor's number");
   return sensor;
 }
 
@@ -52,28 +53,76 @@ Evaluator::Evaluator(Parts parts)
 }
 
 Evaluator::Parts evaluatorPartsFrom(const JsonReader& content) {
-  const JsonReader position = content["position"], orientation = content["orientation"];
-  const auto read_position = position["method"].valueOf(correctors::findPositionReader(position["method"].text()));
-  const auto read_orientation =
-      orientation["method"].valueOf(correctors::findOrientationReader(orientation["method"].text()));
+  const JsonReader position_method = content["position"]["method"], turn_method = content["orientation"]["method"];
+  const auto read_position = position_method.valueOf(correctors::findPositionReader(position_method.text()));
+  const auto read_orientation = turn_method.valueOf(correctors::findOrientationReader(turn_method.text()));
+  const auto correction_from = [&](const JsonReader& from) {
+    const JsonReader position = from["position"];
+    Correction correction;
+    correction.is_baked = position.has("baked");
+    correction.position =
+        correction.is_baked ? correctors::readBaked(position["baked"]) : read_position(position["parameters"]);
+    correction.orientation = read_orientation(from["orientation"]["parameters"]);
+    correction.region = Region::fromJson(from["region"]);
+    return correction;
+  };
   Evaluator::Parts parts;
+  if (const auto by_sensor = content.find("by_sensor")) {
+    for (const auto& [sensor, raw] : by_sensor->object().items())
+      parts.by_sensor[sensorFrom(*by_sensor, sensor)] = correction_from((*by_sensor)[sensor]);
+    if (parts.by_sensor.empty()) by_sensor->fail("names no sensor");
+    static_cast<Correction&>(parts) = parts.by_sensor.begin()->second;
+  } else {
+    static_cast<Correction&>(parts) = correction_from(content);
+  }
   parts.alignment = alignmentFrom(content["alignment"]);
-  parts.is_baked = position.has("baked");
-  parts.position = parts.is_baked ? correctors::readBaked(position["baked"]) : read_position(position["parameters"]);
-  parts.orientation = read_orientation(orientation["parameters"]);
-  parts.region = Region::fromJson(content["region"]);
   return parts;
 }
 
+const Correction& Evaluator::of(std::optional<int> sensor) const {
+  const auto found = sensor ? parts_.by_sensor.find(*sensor) : parts_.by_sensor.end();
+  return found == parts_.by_sensor.end() ? parts_ : found->second;
+}
+
+std::vector<int> Evaluator::sensorsApart() const {
+  std::vector<int> sensors;
+  for (const auto& [sensor, correction] : parts_.by_sensor) sensors.push_back(sensor);
+  return sensors;
+}
+
+Result<Evaluator::Parts> Evaluator::partsOf(int sensor) const {
+  if (!parts_.by_sensor.empty() && !parts_.by_sensor.contains(sensor))
+    return fail(ErrorCode::kBadInput, "This calibration holds a correction for each of " + sensorsText(sensorsApart()) +
+                                          ", and none for sensor " + std::to_string(sensor));
+  Parts alone;
+  static_cast<Correction&>(alone) = of(sensor);
+  alone.alignment.reference_from_tracker = parts_.alignment.reference_from_tracker;
+  alone.alignment.sensor_from_mount = parts_.alignment.mountOf(sensor);
+  return alone;
+}
+
+bool Evaluator::takesOrientation() const {
+  return parts_.position->takesOrientation() ||
+         std::any_of(parts_.by_sensor.begin(), parts_.by_sensor.end(),
+                     [](const auto& one) { return one.second.position->takesOrientation(); });
+}
+
+bool Evaluator::turnTakesOrientation() const {
+  return parts_.orientation->takesOrientation() ||
+         std::any_of(parts_.by_sensor.begin(), parts_.by_sensor.end(),
+                     [](const auto& one) { return one.second.orientation->takesOrientation(); });
+}
+
 Pose Evaluator::correct(const Pose& tracker_from_sensor, std::optional<int> sensor) const {
+  const Correction& correction = of(sensor);
   const Eigen::Vector3d& p_tracked_m = tracker_from_sensor.position_m;
   Pose corrected;
   corrected.position_m = p_tracked_m;
-  if (parts_.position->covers(p_tracked_m))
-    corrected.position_m += parts_.position->displacementAt_m(tracker_from_sensor);
+  if (correction.position->covers(p_tracked_m))
+    corrected.position_m += correction.position->displacementAt_m(tracker_from_sensor);
   corrected.position_m = toReference_m(corrected.position_m);
-  const Eigen::Quaterniond q_true = parts_.orientation->covers(p_tracked_m)
-                                        ? parts_.orientation->correct(p_tracked_m, tracker_from_sensor.orientation)
+  const Eigen::Quaterniond q_true = correction.orientation->covers(p_tracked_m)
+                                        ? correction.orientation->correct(p_tracked_m, tracker_from_sensor.orientation)
                                         : tracker_from_sensor.orientation;
   corrected.orientation =
       parts_.alignment.reference_from_tracker.orientation * q_true * parts_.alignment.mountOf(sensor);
@@ -84,16 +133,20 @@ void Evaluator::correct(std::span<const Pose> tracker_from_sensor, std::span<Pos
                         std::span<const std::optional<int>> sensors) const {
   FT_CHECK(tracker_from_sensor.size() == reference_from_sensor.size());
   FT_CHECK(sensors.empty() || sensors.size() == tracker_from_sensor.size());
-  for (std::size_t start = 0; start < tracker_from_sensor.size(); start += kBlock) {
-    const std::size_t count = std::min(kBlock, tracker_from_sensor.size() - start);
-    correctBlock(tracker_from_sensor.subspan(start, count), reference_from_sensor.subspan(start, count),
+  const auto sensorAt = [&](std::size_t i) { return sensors.empty() ? std::nullopt : sensors[i]; };
+  for (std::size_t start = 0, count = 0; start < tracker_from_sensor.size(); start += count) {
+    const std::size_t most = std::min(kBlock, tracker_from_sensor.size() - start);
+    const Correction& correction = of(sensorAt(start));
+    count = 1;
+    while (count < most && &of(sensorAt(start + count)) == &correction) ++count;
+    correctBlock(correction, tracker_from_sensor.subspan(start, count), reference_from_sensor.subspan(start, count),
                  sensors.empty() ? sensors : sensors.subspan(start, count));
   }
 }
 
-void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::span<Pose> reference_from_sensor,
-                             std::span<const std::optional<int>> sensors) const {
-  const correctors::PositionModel& position = *parts_.position;
+void Evaluator::correctBlock(const Correction& correction, std::span<const Pose> tracker_from_sensor,
+                             std::span<Pose> reference_from_sensor, std::span<const std::optional<int>> sensors) const {
+  const correctors::PositionModel& position = *correction.position;
   std::array<Eigen::Vector3d, kBlock> covered_m;
   std::array<bool, kBlock> is_covered;
   std::size_t n_covered = 0;
@@ -111,8 +164,8 @@ void Evaluator::correctBlock(std::span<const Pose> tracker_from_sensor, std::spa
   for (std::size_t i = 0; i < tracker_from_sensor.size(); ++i) {
     const Pose& tracked = tracker_from_sensor[i];
     const Eigen::Vector3d p_true_m = is_covered[i] ? covered_m[next++] : tracked.position_m;
-    const Eigen::Quaterniond q_true = parts_.orientation->covers(tracked.position_m)
-                                          ? parts_.orientation->correct(tracked.position_m, tracked.orientation)
+    const Eigen::Quaterniond q_true = correction.orientation->covers(tracked.position_m)
+                                          ? correction.orientation->correct(tracked.position_m, tracked.orientation)
                                           : tracked.orientation;
     reference_from_sensor[i].position_m = toReference_m(p_true_m);
     reference_from_sensor[i].orientation = parts_.alignment.reference_from_tracker.orientation * q_true *
@@ -141,23 +194,26 @@ void Evaluator::correctPositions(std::span<const Eigen::Vector3d> p_tracked_m,
   }
 }
 
-Eigen::Vector3d Evaluator::correctPosition_m(const Eigen::Vector3d& p_tracked_m) const {
-  if (!parts_.position->covers(p_tracked_m)) return toReference_m(p_tracked_m);
-  const Eigen::Vector3d p_true_m = p_tracked_m + parts_.position->displacement_m(p_tracked_m);
+Eigen::Vector3d Evaluator::correctPosition_m(const Eigen::Vector3d& p_tracked_m, std::optional<int> sensor) const {
+  const correctors::PositionModel& position = *of(sensor).position;
+  if (!position.covers(p_tracked_m)) return toReference_m(p_tracked_m);
+  const Eigen::Vector3d p_true_m = p_tracked_m + position.displacement_m(p_tracked_m);
   return toReference_m(p_true_m);
 }
 
-std::optional<double> Evaluator::uncertainty_m(const Eigen::Vector3d& p_tracked_m) const {
-  return parts_.position->covers(p_tracked_m) ? parts_.position->uncertainty_m(p_tracked_m) : std::nullopt;
+std::optional<double> Evaluator::uncertainty_m(const Eigen::Vector3d& p_tracked_m, std::optional<int> sensor) const {
+  const correctors::PositionModel& position = *of(sensor).position;
+  return position.covers(p_tracked_m) ? position.uncertainty_m(p_tracked_m) : std::nullopt;
 }
 
-std::optional<double> Evaluator::uncertaintyAt_m(const Pose& tracker_from_sensor) const {
-  return parts_.position->covers(tracker_from_sensor.position_m) ? parts_.position->uncertaintyAt_m(tracker_from_sensor)
-                                                                 : std::nullopt;
+std::optional<double> Evaluator::uncertaintyAt_m(const Pose& tracker_from_sensor, std::optional<int> sensor) const {
+  const correctors::PositionModel& position = *of(sensor).position;
+  return position.covers(tracker_from_sensor.position_m) ? position.uncertaintyAt_m(tracker_from_sensor) : std::nullopt;
 }
 
-bool Evaluator::covers(const Eigen::Vector3d& p_tracked_m) const {
-  return parts_.region.contains(p_tracked_m) && parts_.position->covers(p_tracked_m);
+bool Evaluator::covers(const Eigen::Vector3d& p_tracked_m, std::optional<int> sensor) const {
+  const Correction& correction = of(sensor);
+  return correction.region.contains(p_tracked_m) && correction.position->covers(p_tracked_m);
 }
 
 Eigen::Matrix3d Evaluator::jacobian(const Eigen::Vector3d& p_tracked_m) const {

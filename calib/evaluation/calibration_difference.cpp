@@ -16,6 +16,7 @@
 #include "calib/evaluation/judged_calibration.h"
 #include "calib/evaluation/region/region_lattice.h"
 #include "calib/geometry/geometry.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::evaluation {
 
@@ -298,6 +299,11 @@ nlohmann::json setupDifferencesToJson(const Setup& first, const Setup& second) {
 
 Result<CalibrationDifference> compareCalibrations(const Corrector& first, const Corrector& second,
                                                   const RunControl& control) {
+  for (const Corrector* one : {&first, &second})
+    if (!one->sensorsApart().empty())
+      return fail(ErrorCode::kUnsupported, "A calibration holds a correction for each of " +
+                                               sensorsText(one->sensorsApart()) +
+                                               ": compare one sensor at a time, with difference --sensor N");
   const std::vector<Eigen::Vector3d> points_m = commonPoints(first, second);
   if (points_m.empty())
     return fail(ErrorCode::kUnsupported,

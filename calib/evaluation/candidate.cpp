@@ -1,8 +1,12 @@
 #include "calib/evaluation/candidate.h"
 
+#include <map>
+#include <utility>
+
 #include "calib/calibration/alignment.h"
 #include "calib/core/units.h"
 #include "calib/correctors/base/method.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::evaluation {
 namespace {
@@ -119,6 +123,33 @@ Result<std::vector<Candidate>> positionCandidates(const std::vector<MethodText>&
 Result<std::vector<Candidate>> orientationCandidates(const std::vector<MethodText>& methods) {
   return makeCandidates<correctors::OrientationModel>(methods, correctors::orientationMethods(),
                                                       correctors::findOrientationMethod);
+}
+
+Result<FittedCandidate> fitSensorsApart(const Candidate& candidate, std::span<const Node> rows,
+                                        const TableMetadata& metadata, const calibration::Alignment& alignment,
+                                        int dimension, const RunControl& control) {
+  std::map<int, FittedCandidate> fits;
+  for (const int sensor : sensorsOf(rows)) {
+    correctors::FitData data = calibration::makeFitData(nodesOfSensor(rows, sensor), metadata, alignment);
+    if (data.dimension == 2) data.dimension = dimension;
+    auto fitted = candidate.fit(data, control);
+    const std::string whose = "Sensor " + std::to_string(sensor) + ": ";
+    if (!fitted) return fail(fitted.error().code, whose + fitted.error().message);
+    if (!fitted->note.empty()) fitted->note = whose + fitted->note;
+    fits.emplace(sensor, *std::move(fitted));
+  }
+  if (fits.empty()) return fail(ErrorCode::kTooFewNodes, "There are no rows to fit");
+  FittedCandidate all;
+  for (const auto& [sensor, fitted] : fits)
+    if (!fitted.note.empty()) all.note += (all.note.empty() ? "" : " ") + fitted.note;
+  const auto shared = std::make_shared<const std::map<int, FittedCandidate>>(std::move(fits));
+  const auto of = [shared](const Node& node) -> const FittedCandidate& {
+    const auto found = shared->find(node.sensor);
+    return found == shared->end() ? shared->begin()->second : found->second;
+  };
+  all.score = [of](const Node& node, const calibration::Alignment& by) { return of(node).score(node, by); };
+  all.evaluate = [of](const Node& node) { return of(node).evaluate(node); };
+  return all;
 }
 
 RowScore alignedPositionScore(const Node& node, const calibration::Alignment& alignment) {

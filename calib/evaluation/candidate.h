@@ -47,6 +47,13 @@ struct Candidate {
 Result<std::vector<Candidate>> positionCandidates(const std::vector<MethodText>& methods);
 Result<std::vector<Candidate>> orientationCandidates(const std::vector<MethodText>& methods);
 
+/// One fit a sensor, from its rows alone, scored each at its own rows.
+/// @param dimension of all true positions: fewer rows that lie in a plane by chance are not fitted in it
+/// @error as the method's fit, naming the sensor
+Result<FittedCandidate> fitSensorsApart(const Candidate& candidate, std::span<const Node> rows,
+                                        const TableMetadata& metadata, const calibration::Alignment& alignment,
+                                        int dimension, const RunControl& control);
+
 /// The score of a row that only the alignment touches.
 RowScore alignedPositionScore(const Node& node, const calibration::Alignment& alignment);
 RowScore alignedOrientationScore(const Node& node, const calibration::Alignment& alignment);

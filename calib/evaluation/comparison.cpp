@@ -160,11 +160,20 @@ void noteUnranked(Comparison& comparison) {
         names + ". Compared with kfold:10, all are.");
 }
 
-/// The same control, telling its progress as a part of the whole.
-RunControl partOf(const RunControl& control, double from, double to) {
-  RunControl part = control;
-  part.progress = [&control, from, to](double fraction) { control.progress(from + (to - from) * fraction); };
-  return part;
+/// Whether sensors want a correction each, by the best position method.
+Result<void> addSplit(Comparison& comparison, const CalibrationTable& table, const ComparisonOptions& options,
+                      const RunControl& control) {
+  if (!comparison.best_position_row) return {};
+  const MethodScore& best = comparison.position[*comparison.best_position_row];
+  ComparisonOptions alike = options;
+  alike.validation = comparison.validation;
+  alike.align = comparison.align;
+  calibration::CorrectorChoice choice;
+  choice.position_id = best.method;
+  choice.position_settings = best.settings;
+  FT_TRY(comparison.split, splitOf(table, choice, alike, control));
+  if (comparison.split) comparison.notes.push_back(comparison.split->text);
+  return {};
 }
 
 }  // namespace
@@ -192,8 +201,7 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
   if (options.with_surroundings)
     FT_TRY_VOID(addSurroundings(comparison, table, job, partOf(control, scores_end, surroundings_end)));
   if (options.with_surroundings) {
-    FT_TRY(comparison.split, splitOf(comparison, table, options, partOf(control, surroundings_end, 1.0)));
-    if (comparison.split) comparison.notes.push_back(comparison.split->text);
+    FT_TRY_VOID(addSplit(comparison, table, options, partOf(control, surroundings_end, 1.0)));
     control.progress(1.0);
   }
   writeVerdictText(comparison);

@@ -43,6 +43,8 @@ struct ComparisonOptions {
   /// Coverage, fold-back, dependence on orientation and what limits the best method, beside the scores. Without them
   /// only the scores and the rule of application are found.
   bool with_surroundings = true;
+  /// Every method is fitted to each sensor's rows alone, beyond the alignment that all rows share.
+  bool separate_sensors = false;
   bool closed_form = true;  ///< False refits every fold of every method: the slow way, for checking the fast one.
 };
 
@@ -54,12 +56,12 @@ struct SensorScore {
   ErrorStats stats;                  ///< mm or deg.
 };
 
-/// Whether each sensor corrected by itself, from its own rows, errs less than with the correction that all share: RMS
-/// over the sensors of a place, both at places that the fits did not see.
+/// Whether each sensor corrected by itself, from its own rows beyond one alignment, errs less than with the correction
+/// that all share: RMS over the sensors of a place, both at places that the same fits did not see.
 struct SensorSplit {
-  double shared_mm = 0;
-  double separate_mm = 0;
-  PairedDifference separate_less_shared_mm;
+  double shared = 0;    ///< mm, or degrees of an orientation.
+  double separate = 0;  ///< The same unit.
+  PairedDifference separate_less_shared;
   bool is_better = false;  ///< Separate: the paired 90 % interval is below zero.
   std::string text;        ///< One sentence.
 };

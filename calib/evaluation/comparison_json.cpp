@@ -37,11 +37,11 @@ json sensorsToJson(const std::vector<SensorScore>& sensors) {
 }
 
 json splitToJson(const SensorSplit& split) {
-  return {{"shared_mm", split.shared_mm},
-          {"separate_mm", split.separate_mm},
-          {"separate_less_shared_mm", split.separate_less_shared_mm.difference},
-          {"low90", split.separate_less_shared_mm.low90},
-          {"high90", split.separate_less_shared_mm.high90},
+  return {{"shared_mm", split.shared},
+          {"separate_mm", split.separate},
+          {"separate_less_shared_mm", split.separate_less_shared.difference},
+          {"low90", split.separate_less_shared.low90},
+          {"high90", split.separate_less_shared.high90},
           {"separate_is_better", split.is_better},
           {"text", split.text}};
 }

@@ -71,7 +71,11 @@ void keepScores(const Run& run, std::size_t i, const Fold& fold, const calibrati
 /// One refit of one candidate.
 void refit(Run& run, std::size_t i, std::size_t k, const Fold& fold, const correctors::FitData& data,
            const calibration::Alignment& alignment) {
-  const auto model = run.job.candidates[i].fit(data, run.inner());
+  const Candidate& candidate = run.job.candidates[i];
+  const auto model = run.job.separate_sensors
+                         ? fitSensorsApart(candidate, rowsOf(run.job, fold.fitted), run.job.metadata, alignment,
+                                           run.scores.dimension, run.inner())
+                         : candidate.fit(data, run.inner());
   if (model)
     keepScores(run, i, fold, alignment, *model);
   else

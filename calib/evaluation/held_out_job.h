@@ -23,6 +23,7 @@ struct HeldOutJob {
   std::vector<std::size_t> scored;  ///< Rows that the folds score, ascending.
   std::vector<Candidate> candidates;
   bool has_orientation = false;
+  bool separate_sensors = false;   ///< @see ComparisonOptions
   std::vector<std::string> notes;  ///< On the rows.
 };
 

@@ -47,13 +47,15 @@ CandidateScores fitInSample(const HeldOutJob& job, const Candidate& candidate, c
     return scores;
   }
   const auto start = std::chrono::steady_clock::now();
-  const auto model = candidate.fit(data, control);
+  const std::vector<Node> fitted = rowsOf(job, job.fitted);
+  const auto model = job.separate_sensors
+                         ? fitSensorsApart(candidate, fitted, job.metadata, alignment, data.dimension, control)
+                         : candidate.fit(data, control);
   if (!model) {
     scores.skipped = model.error().message;
     return scores;
   }
   scores.fit_s = secondsSince(start);
-  const std::vector<Node> fitted = rowsOf(job, job.fitted);
   scores.eval_ns = evaluationTime_ns(*model, fitted);
   scores.in_sample_rms =
       rootMeanSquare(gatherByPlace(placesOf(fitted), fitted, scoreRows(fitted, alignment, model->score)).errors);

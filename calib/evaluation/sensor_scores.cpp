@@ -1,12 +1,14 @@
 #include "calib/evaluation/sensor_scores.h"
 
-#include <cmath>
+#include <algorithm>
+#include <iterator>
 #include <map>
-#include <optional>
+#include <utility>
 
 #include "calib/core/number_text.h"
 #include "calib/correctors/base/method_text.h"
 #include "calib/evaluation/base/figures.h"
+#include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/folds.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/tables/table_sensors.h"
@@ -15,37 +17,22 @@ namespace fieldtrue::evaluation {
 
 namespace {
 
-/// Sums of squared errors of each place over its sensors, and how many there are.
-class PlaceSquares {
- public:
-  void add(const SensorScore& score) {
-    for (std::size_t k = 0; k < score.places.size(); ++k) {
-      Sum& sum = of_place_[score.places[k]];
-      sum.squares += score.place_errors[k] * score.place_errors[k];
-      ++sum.count;
-    }
-  }
-  std::vector<double> rms() const {
-    std::vector<double> values;
-    for (const auto& [place, sum] : of_place_) values.push_back(std::sqrt(sum.squares / sum.count));
-    return values;
-  }
+std::string splitText(const SensorSplit& split, const char* unit, const Validation& validation) {
+  const std::string figures = "corrected by itself, each sensor leaves " + errorText(split.separate) + " " + unit +
+                              ", with the correction that all share " + errorText(split.shared) + " " + unit +
+                              " (difference " + significantText(split.separate_less_shared.low90) + " to " +
+                              significantText(split.separate_less_shared.high90) + " " + unit + "; " +
+                              toText(validation) + ")";
+  return (split.is_better ? "The sensors err differently: " : "The sensors share one correction: ") + figures + ".";
+}
 
- private:
-  struct Sum {
-    double squares = 0.0;
-    int count = 0;
-  };
-  std::map<int, Sum> of_place_;
-};
-
-std::string splitText(const SensorSplit& split) {
-  const std::string figures = "corrected by itself, each sensor leaves " + errorText(split.separate_mm) +
-                              " mm, with the correction that all share " + errorText(split.shared_mm) +
-                              " mm (difference " + significantText(split.separate_less_shared_mm.low90) + " to " +
-                              significantText(split.separate_less_shared_mm.high90) + " mm)";
-  return split.is_better ? "The sensors err differently: " + figures + "; fit each with --sensor N."
-                         : "The sensors share one correction: " + figures + ".";
+/// What the choice's position method leaves at each place, or its orientation method where position is left as it is.
+std::optional<MethodScore> judged(const CalibrationTable& table, const ComparisonOptions& options, bool by_position,
+                                  const RunControl& control) {
+  const auto compared = compareMethods(table, options, control);
+  if (!compared) return std::nullopt;
+  const std::vector<MethodScore>& scores = by_position ? compared->position : compared->orientation;
+  return scores.empty() || scores.front().skipped ? std::nullopt : std::optional(scores.front());
 }
 
 }  // namespace
@@ -74,37 +61,50 @@ std::vector<SensorScore> scoresBySensor(std::span<const Node> nodes, std::span<c
   return all;
 }
 
-Result<std::optional<SensorSplit>> splitOf(const Comparison& comparison, const CalibrationTable& table,
-                                           const ComparisonOptions& options, const RunControl& control) {
-  if (!comparison.best_position_row) return std::nullopt;
-  const MethodScore& best = comparison.position[*comparison.best_position_row];
-  if (best.sensors.empty()) return std::nullopt;
-  ComparisonOptions alone = options;
-  FT_TRY(const MethodText method, parseMethodText(correctors::methodText(best.method, best.settings)));
-  alone.position_methods = {method};
-  alone.orientation_methods = {{"none", {}}};
-  alone.validation = comparison.validation;
-  alone.align = comparison.align;
-  alone.with_surroundings = false;
-  PlaceSquares shared, separate;
-  for (const SensorScore& together : best.sensors) {
-    FT_TRY(const auto rows, rowsOfSensor(table, together.sensor));
-    const auto compared = compareMethods(rows, alone, control);
-    if (!compared && compared.error().code == ErrorCode::kCancelled) return tl::unexpected(compared.error());
-    // A sensor that cannot be corrected by itself leaves nothing to choose.
-    if (!compared || compared->position.front().skipped) return std::nullopt;
-    shared.add(together);
-    separate.add({together.sensor, compared->places, compared->position.front().place_errors, {}});
-  }
-  const std::vector<double> shared_mm = shared.rms(), separate_mm = separate.rms();
-  if (shared_mm.size() != separate_mm.size()) return std::nullopt;
+Result<std::optional<SensorSplit>> splitOf(const CalibrationTable& table, const calibration::CorrectorChoice& choice,
+                                           ComparisonOptions options, const RunControl& control) {
+  const bool by_position = choice.position_id != "none";
+  if (sensorsOf(table).size() < 2 || (!by_position && choice.orientation_id == "none")) return std::nullopt;
+  FT_TRY(const MethodText position,
+         parseMethodText(correctors::methodText(choice.position_id, choice.position_settings)));
+  FT_TRY(const MethodText turn,
+         parseMethodText(correctors::methodText(choice.orientation_id, choice.orientation_settings)));
+  options.position_methods = {by_position ? position : MethodText{"none", {}}};
+  options.orientation_methods = {by_position ? MethodText{"none", {}} : turn};
+  // Left out one by one in closed form, the sensors could not be fitted apart.
+  if (!options.validation || options.validation->kind == ValidationKind::kLeaveOneOut)
+    options.validation = defaultValidation(table, true);
+  options.with_surroundings = false;
+  const auto together = judged(table, options, by_position, partOf(control, 0.0, 0.4));
+  options.separate_sensors = true;
+  const auto apart = together ? judged(table, options, by_position, partOf(control, 0.4, 1.0)) : std::nullopt;
+  if (control.stop.stop_requested()) return comparisonStopped();
+  if (!together || !apart || together->place_errors.size() != apart->place_errors.size()) return std::nullopt;
   SensorSplit split;
-  split.shared_mm = rootMeanSquare(shared_mm);
-  split.separate_mm = rootMeanSquare(separate_mm);
-  split.separate_less_shared_mm = pairedDifference(separate_mm, shared_mm);
-  split.is_better = split.separate_less_shared_mm.high90 < 0.0;
-  split.text = splitText(split);
+  split.shared = together->stats.rms;
+  split.separate = apart->stats.rms;
+  split.separate_less_shared = pairedDifference(apart->place_errors, together->place_errors);
+  split.is_better = split.separate_less_shared.high90 < 0.0;
+  split.text = splitText(split, by_position ? "mm" : "degrees", *options.validation);
   return split;
+}
+
+std::vector<Node> fitRowsOf(const CalibrationTable& table) {
+  std::vector<Node> rows;
+  std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(rows),
+               [](const Node& node) { return node.role == NodeRole::kFit; });
+  return rows;
+}
+
+Result<calibration::Corrector> fitByEvidence(const CalibrationTable& table, calibration::CorrectorChoice choice,
+                                             calibration::AlignMode align, const RunControl& control) {
+  ComparisonOptions options;
+  options.align = align;
+  FT_TRY(const auto split, splitOf(table, choice, options, partOf(control, 0.0, 0.9)));
+  choice.separate_sensors = split && split->is_better;
+  FT_TRY(auto corrector,
+         calibration::Corrector::fit(fitRowsOf(table), table.metadata, choice, align, partOf(control, 0.9, 1.0)));
+  return split ? corrector.withNote(split->text) : corrector;
 }
 
 }  // namespace fieldtrue::evaluation

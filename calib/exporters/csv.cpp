@@ -52,10 +52,11 @@ std::string addedFields(const calibration::Corrector& corrector, const Node& nod
   text += node.has_orientation ? field(angleBetween_rad(q_before, truth.orientation)) +
                                      field(angleBetween_rad(corrected.orientation, truth.orientation))
                                : ",,";
-  const std::optional<double> uncertainty_m =
-      node.has_orientation ? corrector.uncertaintyAt_m(tracked) : corrector.uncertainty_m(tracked.position_m);
+  const std::optional<double> uncertainty_m = node.has_orientation
+                                                  ? corrector.uncertaintyAt_m(tracked, node.sensor)
+                                                  : corrector.uncertainty_m(tracked.position_m, node.sensor);
   text += uncertainty_m ? field(*uncertainty_m) : ",";
-  return text + (corrector.covers(tracked.position_m) ? ",1" : ",0");
+  return text + (corrector.covers(tracked.position_m, node.sensor) ? ",1" : ",0");
 }
 
 /// A node table that any reader of node tables takes, with columns added at the end of each line.

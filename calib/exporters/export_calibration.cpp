@@ -1,6 +1,7 @@
 #include "calib/exporters/export_calibration.h"
 
 #include "calib/core/number_text.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::exporters {
 namespace {
@@ -24,6 +25,10 @@ Result<Written> exportCalibration(const Exporter& exporter, const calibration::C
     return fail(ErrorCode::kUnsupported, "Format " + exporter.id +
                                              " is written measured-to-true only; leave --direction out, "
                                              "or choose a field of ITK or VTK or a lattice");
+  if (!exporter.knows_pose && !corrector.sensorsApart().empty())
+    return fail(ErrorCode::kUnsupported, "This calibration holds a correction for each of " +
+                                             sensorsText(corrector.sensorsApart()) + ", and format " + exporter.id +
+                                             " holds one: choose the sensor with --sensor");
   // Before minutes of sampling.
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   std::error_code ignored;

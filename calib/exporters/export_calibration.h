@@ -9,9 +9,8 @@ std::filesystem::path exportPath(const Exporter& exporter, const std::filesystem
                                  const ExportOptions& options);
 
 /// Writes a calibration in a format, after asking what stands for all formats.
-/// @error kUnsupported where the format cannot be written in the direction asked for, or where the correction depends
-/// on
-///        orientation by more than 1 mm, the format knows positions only and no orientation is chosen; as the format
+/// @error kUnsupported where the format cannot be written in the direction asked for, or knows positions only and the
+///        correction depends on the sensor, or by more than 1 mm on an orientation that is not chosen; as the format
 Result<Written> exportCalibration(const Exporter& exporter, const calibration::Corrector& corrector,
                                   const ExportOptions& options, const std::filesystem::path& path,
                                   const RunControl& control);

@@ -36,7 +36,7 @@ struct Exporter {
   std::string in_words;   ///< Unit, frame and direction of the file, for menus.
   Purpose purpose = Purpose::kFieldtrue;
   bool may_be_inverse = false;  ///< Can be written true to measured.
-  bool knows_pose = false;      ///< Keeps a correction that depends on how the sensor is turned.
+  bool knows_pose = false;      ///< Keeps what depends on how the sensor is turned, or on which sensor it is.
   bool has_free_pitch = false;  ///< A lattice whose pitch is chosen for the deviation that is allowed.
   bool is_folder = false;       ///< Writes a folder of files.
   Result<Written> (*write)(const ExportSubject&, const ExportOptions&, const std::filesystem::path&,

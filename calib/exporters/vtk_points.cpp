@@ -71,7 +71,7 @@ Result<Written> writePlaces(const ExportSubject& subject, const ExportOptions&, 
     node.push_back(row.node);
     sensor.push_back(row.sensor);
     visit.push_back(row.visit);
-    uncertainty_m.push_back(corrector.uncertaintyAt_m(tracked).value_or(std::nan("")));
+    uncertainty_m.push_back(corrector.uncertaintyAt_m(tracked, row.sensor).value_or(std::nan("")));
   }
   Facts facts = subject.facts("metres");
   facts.emplace_back("points", "true positions, in the calibration's frame");

@@ -65,6 +65,11 @@ FIELDTRUE_API const char* fieldtrue_error(void);
 FIELDTRUE_API fieldtrue_status fieldtrue_bake(const fieldtrue_calibration* calibration, double max_deviation_um,
                                               double max_angle_deg, fieldtrue_calibration** baked);
 
+/* The calibration of one sensor alone, for what is asked without a sensor: positions, uncertainty, inside. Where each
+ * sensor was given a correction of its own, those of the whole calibration speak of the first sensor. */
+FIELDTRUE_API fieldtrue_status fieldtrue_of_sensor(const fieldtrue_calibration* calibration, int sensor,
+                                                   fieldtrue_calibration** one);
+
 /* Corrects one pose; tracked and corrected may be the same. Where the method does not reach, the alignment alone is
  * applied. sensor: a number of the calibrated table, or FIELDTRUE_FIRST_SENSOR. */
 FIELDTRUE_API void fieldtrue_correct(const fieldtrue_calibration* calibration, int sensor,

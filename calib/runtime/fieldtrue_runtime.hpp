@@ -49,6 +49,13 @@ class Calibration {
     return Calibration(made);
   }
 
+  /// One sensor's alone, for uncertainty_m and isInside where each sensor has a correction of its own. @throws Failure
+  Calibration ofSensor(int sensor) const {
+    fieldtrue_calibration* made = nullptr;
+    check(fieldtrue_of_sensor(calibration_, sensor, &made));
+    return Calibration(made);
+  }
+
   Pose correct(const Pose& tracked, int sensor = FIELDTRUE_FIRST_SENSOR) const {
     Pose corrected;
     fieldtrue_correct(calibration_, sensor, &tracked, &corrected);

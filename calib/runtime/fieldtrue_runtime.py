@@ -41,6 +41,7 @@ def _library():
             ("fieldtrue_load", ctypes.c_int, [ctypes.c_char_p, ctypes.POINTER(handle)]),
             ("fieldtrue_free", None, [handle]),
             ("fieldtrue_bake", ctypes.c_int, [handle, ctypes.c_double, ctypes.c_double, ctypes.POINTER(handle)]),
+            ("fieldtrue_of_sensor", ctypes.c_int, [handle, ctypes.c_int, ctypes.POINTER(handle)]),
             ("fieldtrue_correct_many", None, [handle, ctypes.c_int, pose, pose, ctypes.c_size_t]),
             ("fieldtrue_uncertainty_m", ctypes.c_double, [handle, pose]),
             ("fieldtrue_inside", ctypes.c_int, [handle, ctypes.c_double * 3]),
@@ -82,9 +83,16 @@ class Calibration:
 
     def baked(self, max_deviation_um=50.0, max_angle_deg=0.01):
         """The same on a dense lattice, which is fast whatever the method was."""
+        return self._made(_lib.fieldtrue_bake, max_deviation_um, max_angle_deg)
+
+    def of_sensor(self, sensor):
+        """One sensor's alone, for uncertainty_m and is_inside where each sensor has a correction of its own."""
+        return self._made(_lib.fieldtrue_of_sensor, sensor)
+
+    def _made(self, function, *arguments):
         made = Calibration.__new__(Calibration)
         made._handle = ctypes.c_void_p()
-        _checked(_lib.fieldtrue_bake(self._handle, max_deviation_um, max_angle_deg, ctypes.byref(made._handle)))
+        _checked(function(self._handle, *arguments, ctypes.byref(made._handle)))
         return made
 
     def correct(self, position_m, orientation_wxyz=(0, 0, 0, 0), sensor=FIRST_SENSOR):

@@ -92,7 +92,7 @@ void correctBlock(const calibration::Evaluator& evaluator, std::optional<int> se
     has_orientation[i] = hasOrientation(tracked[i].orientation_wxyz);
     sensors[i] = sensor;
     if (!has_orientation[i] && evaluator.takesOrientation())
-      means_m[i] = evaluator.correctPosition_m(poses[i].position_m);
+      means_m[i] = evaluator.correctPosition_m(poses[i].position_m, sensor);
   }
   const std::span<Pose> block = std::span(poses).first(n);
   evaluator.correct(block, block, std::span(sensors).first(n));
@@ -145,6 +145,14 @@ fieldtrue_status fieldtrue_bake(const fieldtrue_calibration* calibration, double
   return made(baked, [=] { return calibration->content.baked(1e-6 * max_deviation_um, max_angle_deg / kDegPerRad); });
 }
 
+fieldtrue_status fieldtrue_of_sensor(const fieldtrue_calibration* calibration, int sensor,
+                                     fieldtrue_calibration** one) {
+  if (one == nullptr) return badArgument("fieldtrue_of_sensor needs a place for the calibration of one sensor.");
+  *one = nullptr;
+  if (calibration == nullptr) return badArgument("fieldtrue_of_sensor needs a calibration.");
+  return made(one, [=] { return calibration->content.ofSensor(sensor); });
+}
+
 void fieldtrue_correct(const fieldtrue_calibration* calibration, int sensor, const fieldtrue_pose* tracked,
                        fieldtrue_pose* corrected) {
   const calibration::Evaluator& evaluator = calibration->content.evaluator();
@@ -152,7 +160,7 @@ void fieldtrue_correct(const fieldtrue_calibration* calibration, int sensor, con
   const Pose pose = poseFrom(*tracked);
   Pose answer = evaluator.correct(pose, sensorOf(sensor));
   if (!has_orientation && evaluator.takesOrientation())
-    answer.position_m = evaluator.correctPosition_m(pose.position_m);
+    answer.position_m = evaluator.correctPosition_m(pose.position_m, sensorOf(sensor));
   writePose(answer, has_orientation, *corrected);
 }
 

@@ -25,6 +25,9 @@ class RuntimeCalibration {
   ///        kDegenerate without a region
   Result<RuntimeCalibration> baked(double max_deviation_m, double max_angle_rad) const;
 
+  /// Of one sensor alone. @error as Evaluator::partsOf
+  Result<RuntimeCalibration> ofSensor(int sensor) const;
+
   const calibration::Evaluator& evaluator() const { return evaluator_; }
   const std::vector<Eigen::Quaterniond>& orientationsSeen() const { return orientations_seen_; }
   const Setup& setup() const { return setup_; }
@@ -38,7 +41,7 @@ class RuntimeCalibration {
   void prepare() const;
 
   calibration::Evaluator evaluator_;
-  std::vector<Eigen::Vector3d> places_m_;  ///< Tracked, of the fit.
+  std::vector<std::pair<int, Eigen::Vector3d>> places_m_;  ///< Tracked, of the fit, each with its sensor.
   std::vector<Eigen::Quaterniond> orientations_seen_;
   Setup setup_;
   std::map<std::string, std::string> facts_;

@@ -7,9 +7,6 @@
 
 namespace fieldtrue {
 
-namespace {
-
-/// "sensor 0" or "sensors 0, 1 and 2".
 std::string sensorsText(const std::vector<int>& sensors) {
   std::string text = sensors.size() == 1 ? "sensor " : "sensors ";
   for (std::size_t i = 0; i < sensors.size(); ++i) {
@@ -19,14 +16,21 @@ std::string sensorsText(const std::vector<int>& sensors) {
   return text;
 }
 
-}  // namespace
-
-std::vector<int> sensorsOf(const CalibrationTable& table) {
+std::vector<int> sensorsOf(std::span<const Node> nodes) {
   std::set<int> sensors;
-  for (const Node& node : table.nodes) {
+  for (const Node& node : nodes) {
     if (node.role != NodeRole::kSkipped) sensors.insert(node.sensor);
   }
   return {sensors.begin(), sensors.end()};
+}
+
+std::vector<int> sensorsOf(const CalibrationTable& table) { return sensorsOf(std::span<const Node>(table.nodes)); }
+
+std::vector<Node> nodesOfSensor(std::span<const Node> nodes, int sensor) {
+  std::vector<Node> rows;
+  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(rows),
+               [&](const Node& node) { return node.sensor == sensor; });
+  return rows;
 }
 
 Result<CalibrationTable> rowsOfSensor(const CalibrationTable& table, std::optional<int> sensor) {

@@ -1,6 +1,7 @@
 #include "widgets/pages/export_page.h"
 
 #include <QCheckBox>
+#include <QComboBox>
 #include <QDesktopServices>
 #include <QDir>
 #include <QDoubleSpinBox>
@@ -12,6 +13,7 @@
 #include <QListWidget>
 #include <QProgressBar>
 #include <QPushButton>
+#include <QSignalBlocker>
 #include <QStackedWidget>
 #include <QUrl>
 #include <QVBoxLayout>
@@ -140,6 +142,10 @@ QWidget* ExportPage::makeBake() {
   inverse_ = new QCheckBox(tr("True to measured, for programs that resample"), bake_row_);
   inverse_->setObjectName(QStringLiteral("exportInverse"));
   connect(inverse_, &QCheckBox::toggled, this, &ExportPage::onTarget);
+  sensor_ = new QComboBox(bake_row_);
+  sensor_->setObjectName(QStringLiteral("exportSensor"));
+  sensor_->setAccessibleName(tr("The sensor whose correction is written"));
+  connect(sensor_, &QComboBox::currentIndexChanged, this, &ExportPage::onTarget);
   bake_ = new QCheckBox(tr("Bake to a lattice that is fast to evaluate, off the method by at most"), bake_row_);
   bake_->setObjectName(QStringLiteral("exportBake"));
   deviation_ = new NumberBox(bake_row_);
@@ -158,6 +164,7 @@ QWidget* ExportPage::makeBake() {
   row->addWidget(deviation_);
   row->addSpacing(kGap);
   row->addWidget(inverse_);
+  row->addWidget(sensor_);
   row->addStretch(1);
   return bake_row_;
 }
@@ -167,7 +174,19 @@ void ExportPage::onData() {
   stack_->setCurrentIndex(has_something ? 1 : 0);
   if (!has_something) return;
   showCalibration();
+  showSensors();
   onTarget();
+}
+
+/// Sensors with a correction each, for formats that hold one.
+void ExportPage::showSensors() {
+  std::vector<int> sensors;
+  if (workbench_.corrector()) sensors = workbench_.corrector()->sensorsApart();
+  const QSignalBlocker quiet(sensor_);
+  const QVariant chosen = sensor_->currentData();
+  sensor_->clear();
+  for (const int sensor : sensors) sensor_->addItem(tr("Sensor %1").arg(sensor), sensor);
+  sensor_->setCurrentIndex(std::max(0, sensor_->findData(chosen)));
 }
 
 QString ExportPage::verdictOnCalibration() const {
@@ -237,6 +256,8 @@ QString ExportPage::suggestedName(const ExportTarget& target) const {
   if (target.exporter && target.exporter->purpose != exporters::Purpose::kFieldtrue && !target.exporter->knows_pose)
     name += target.exporter->may_be_inverse && inverse_->isChecked() ? QStringLiteral("_true-to-measured")
                                                                      : QStringLiteral("_measured-to-true");
+  if (target.exporter && !target.exporter->knows_pose && sensor_->count() > 0)
+    name += QStringLiteral("_sensor-%1").arg(sensor_->currentData().toInt());
   return name + target.extension;
 }
 
@@ -251,7 +272,9 @@ void ExportPage::onTarget() {
   const bool is_lattice = any([](const exporters::Exporter& one) { return one.has_free_pitch; });
   const bool can_be_baked = any([](const exporters::Exporter& one) { return one.knows_pose; });
   const bool may_be_inverse = any([](const exporters::Exporter& one) { return one.may_be_inverse; });
-  bake_row_->setVisible(is_lattice || can_be_baked || may_be_inverse);
+  const bool holds_one = any([](const exporters::Exporter& one) { return !one.knows_pose; });
+  bake_row_->setVisible(is_lattice || can_be_baked || may_be_inverse || (holds_one && sensor_->count() > 0));
+  sensor_->setVisible(holds_one && sensor_->count() > 0);
   bake_->setVisible(can_be_baked);
   bake_->setEnabled(workbench_.corrector() && !workbench_.corrector()->isBaked());
   pitch_->setVisible(is_lattice);
@@ -313,7 +336,8 @@ void ExportPage::write() {
   if (wanted_files.empty()) return;
   if (!present.isEmpty()) return askToReplace(present);
   std::vector<Writing> writings;
-  const ExportChoices choices{bake_->isChecked(), inverse_->isChecked(), deviation_->value() / 1000.0};
+  ExportChoices choices{bake_->isChecked(), inverse_->isChecked(), deviation_->value() / 1000.0, {}};
+  if (sensor_->count() > 0) choices.sensor = sensor_->currentData().toInt();
   for (const File& file : wanted_files) writings.push_back({file.path, file.target->prepare(choices), {}});
   progress_->setValue(0);
   jobs_.run([writings](const RunControl& control) { return writeAll(writings, control); },

@@ -8,6 +8,7 @@
 #include "widgets/workbench/workbench.h"
 
 class QCheckBox;
+class QComboBox;
 class QDoubleSpinBox;
 class QLabel;
 class QListWidget;
@@ -41,6 +42,7 @@ class ExportPage : public QWidget {
   void onTarget();
   void onData();
   void showCalibration();
+  void showSensors();
   /// What the comparison says of the calibration; empty where there is none of the present places.
   QString verdictOnCalibration() const;
   QString setupOfCalibration() const;
@@ -67,6 +69,7 @@ class ExportPage : public QWidget {
   QWidget* bake_row_;
   QCheckBox* bake_;
   QCheckBox* inverse_;
+  QComboBox* sensor_;
   QLabel* pitch_;
   QDoubleSpinBox* deviation_;
   QLineEdit* path_;

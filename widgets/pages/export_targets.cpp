@@ -65,10 +65,12 @@ ExportWriting calibrationWriter(const Workbench& workbench, const exporters::Exp
   options.held_out = heldOutError(workbench);
   if (exporter.has_free_pitch) options.max_deviation_m = choices.deviation_m;
   if (exporter.may_be_inverse && choices.inverse) options.direction = exporters::Direction::kTrueToMeasured;
-  return [corrector = *workbench.corrector(), exporter = &exporter, bake, deviation_m = choices.deviation_m, options](
-             const std::string& path, const RunControl& control) -> Result<std::string> {
-    const Result<calibration::Corrector> written =
-        bake ? corrector.baked(deviation_m, control) : Result<calibration::Corrector>(corrector);
+  const auto sensor = exporter.knows_pose ? std::nullopt : choices.sensor;
+  return [corrector = *workbench.corrector(), exporter = &exporter, bake, deviation_m = choices.deviation_m, sensor,
+          options](const std::string& path, const RunControl& control) -> Result<std::string> {
+    const Result<calibration::Corrector> written = bake     ? corrector.baked(deviation_m, control)
+                                                   : sensor ? corrector.ofSensor(*sensor)
+                                                            : Result<calibration::Corrector>(corrector);
     if (!written) return tl::unexpected(written.error());
     FT_TRY(const auto done, exporters::exportCalibration(*exporter, *written, options, path, control));
     std::string note = bake ? written->report().notes.back() : std::string();

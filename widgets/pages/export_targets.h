@@ -2,6 +2,7 @@
 
 #include <QString>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct ExportChoices {
   bool bake = false;
   bool inverse = false;  ///< True to measured.
   double deviation_m = 0.0;
+  std::optional<int> sensor;  ///< Whose correction, where each has its own and the format holds one.
 };
 
 /// Writes one file beside the window; answers with what is to be said of it.

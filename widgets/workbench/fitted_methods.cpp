@@ -1,15 +1,8 @@
 #include "widgets/workbench/fitted_methods.h"
 
-#include <algorithm>
+#include "calib/evaluation/sensor_scores.h"
 
 namespace fieldtrue::widgets {
-
-std::vector<Node> fitRows(const CalibrationTable& table) {
-  std::vector<Node> rows;
-  std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(rows),
-               [](const Node& node) { return node.role == NodeRole::kFit; });
-  return rows;
-}
 
 FittedMethods::FittedMethods(QObject* parent) : QObject(parent) {}
 
@@ -52,7 +45,7 @@ void FittedMethods::stop() {
 void FittedMethods::start(std::size_t row) {
   running_.insert(row);
   jobs_.run(
-      [rows = fitRows(table_), metadata = table_.metadata, choice = choices_[row], align = align_](
+      [rows = evaluation::fitRowsOf(table_), metadata = table_.metadata, choice = choices_[row], align = align_](
           const RunControl& control) { return calibration::Corrector::fit(rows, metadata, choice, align, control); },
       [this, row](Result<calibration::Corrector> result) { arrived(row, std::move(result)); });
 }

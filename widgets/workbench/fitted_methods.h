@@ -12,9 +12,6 @@
 
 namespace fieldtrue::widgets {
 
-/// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
-std::vector<Node> fitRows(const CalibrationTable& table);
-
 /// The compared position methods as calibrations, each fitted on all fit rows in the background when something first
 /// asks for it.
 class FittedMethods : public QObject {

@@ -16,6 +16,7 @@
 #include "calib/calibration/alignment.h"
 #include "calib/core/json_text.h"
 #include "calib/core/thread_pool.h"
+#include "calib/evaluation/sensor_scores.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/style/unit_texts.h"
@@ -351,7 +352,7 @@ bool Workbench::correctorIsCurrent() const {
     return a.node == b.node && a.sensor == b.sensor && a.visit == b.visit &&
            a.tracker_from_sensor.position_m == b.tracker_from_sensor.position_m;
   };
-  const std::vector<Node> now = fitRows(table());
+  const std::vector<Node> now = evaluation::fitRowsOf(table());
   const std::vector<Node>& then = corrector_->table().nodes;
   return std::equal(now.begin(), now.end(), then.begin(), then.end(), same);
 }
@@ -438,27 +439,26 @@ void Workbench::stopComparing() {
 void Workbench::fit(const calibration::CorrectorChoice& choice, calibration::AlignMode align) {
   if (isFitting() || !mayUse(table())) return;
   endCondition(QStringLiteral("session/fit"));
-  fit_jobs_.run(
-      [table = table(), choice, align](const RunControl& control) {
-        return calibration::Corrector::fit(fitRows(table), table.metadata, choice, align, control);
-      },
-      [this](Result<calibration::Corrector> result) {
-        emit fittingChanged();
-        if (!result) {
-          showMessage({QString::fromStdString(result.error().message),
-                       Severity::kAttention,
-                       {},
-                       {},
-                       QStringLiteral("session/fit")});
-          return;
-        }
-        corrector_ = std::move(*result);
-        const calibration::CorrectorChoice& fitted = corrector_->choice();
-        post(&acquisition::AcquisitionController::storeFit,
-             QString::fromStdString(fitted.position_id + " + " + fitted.orientation_id),
-             QString::fromStdString(corrector_->toText()));
-        emit correctorChanged();
-      });
+  auto work = [table = table(), choice, align](const RunControl& control) {
+    return evaluation::fitByEvidence(table, choice, align, control);
+  };
+  fit_jobs_.run(std::move(work), [this](Result<calibration::Corrector> result) {
+    emit fittingChanged();
+    if (!result) {
+      showMessage({QString::fromStdString(result.error().message),
+                   Severity::kAttention,
+                   {},
+                   {},
+                   QStringLiteral("session/fit")});
+      return;
+    }
+    corrector_ = std::move(*result);
+    const calibration::CorrectorChoice& fitted = corrector_->choice();
+    post(&acquisition::AcquisitionController::storeFit,
+         QString::fromStdString(fitted.position_id + " + " + fitted.orientation_id),
+         QString::fromStdString(corrector_->toText()));
+    emit correctorChanged();
+  });
   emit fittingChanged();
 }
 

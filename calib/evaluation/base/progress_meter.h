@@ -5,8 +5,16 @@
 #include <mutex>
 
 #include "calib/core/error.h"
+#include "calib/core/run_control.h"
 
 namespace fieldtrue::evaluation {
+
+/// The same control, telling its progress as a part of the whole.
+inline RunControl partOf(const RunControl& control, double from, double to) {
+  RunControl part = control;
+  part.progress = [&control, from, to](double fraction) { control.progress(from + (to - from) * fraction); };
+  return part;
+}
 
 /// What a comparison ends with once it is asked to stop.
 inline tl::unexpected<Error> comparisonStopped() {

@@ -18,7 +18,7 @@ Pose numberedPose(int n) {
   return {{n * 0.001, -0.127, 0.0635}, Eigen::Quaterniond(0.943714, -0.189308, 0.038135, 0.268536).normalized()};
 }
 
-std::string numbered(int n, bool states_crc = true) {
+std::string messageNumber(int n, bool states_crc = true) {
   const Pose pose = numberedPose(n);
   std::string message = encodeIgtl("TRANSFORM", "Probe", igtlStampOf(1.7e9 + n), encodeTransformBody(pose));
   if (!states_crc) std::fill_n(message.begin() + 50, 8, '\0');
@@ -27,7 +27,7 @@ std::string numbered(int n, bool states_crc = true) {
 
 std::string stream(int first, int count, bool states_crc = true) {
   std::string all;
-  for (int n = first; n < first + count; ++n) all += numbered(n, states_crc);
+  for (int n = first; n < first + count; ++n) all += messageNumber(n, states_crc);
   return all;
 }
 
@@ -101,16 +101,17 @@ void OpenigtlinkParserTest::garbageFirst() {
     for (char& c : garbage) c = static_cast<char>(random());
     QCOMPARE(parsed({garbage + stream(1, 3)}), (std::vector{1, 2, 3}));
     // The rest of a message that began before anybody listened.
-    QCOMPARE(parsed({numbered(9).substr(std::min<std::size_t>(length, 105)) + stream(1, 3)}), (std::vector{1, 2, 3}));
+    QCOMPARE(parsed({messageNumber(9).substr(std::min<std::size_t>(length, 105)) + stream(1, 3)}),
+             (std::vector{1, 2, 3}));
   }
 }
 
 void OpenigtlinkParserTest::everyLostByteEverywhere() {
-  const std::string one = numbered(2);
+  const std::string one = messageNumber(2);
   for (std::size_t lost = 0; lost < one.size(); ++lost) {
     std::string cut = one;
     cut.erase(lost, 1);
-    const auto numbers = parsed({numbered(1) + cut + numbered(3) + numbered(4)});
+    const auto numbers = parsed({messageNumber(1) + cut + messageNumber(3) + messageNumber(4)});
     // Bodies end and messages begin with a zero: where the last is lost, the next message's serves.
     QVERIFY2(numbers == (std::vector{1, 3, 4}) || (lost + 2 >= one.size() && numbers == (std::vector{1, 2, 4})),
              qPrintable(QString::number(lost)));
@@ -119,12 +120,12 @@ void OpenigtlinkParserTest::everyLostByteEverywhere() {
 
 void OpenigtlinkParserTest::everyChangedByteEverywhere() {
   // The body and its CRC are protected; what names the message is not, but it cannot change a pose.
-  const std::string one = numbered(2);
+  const std::string one = messageNumber(2);
   for (std::size_t changed = 42; changed < one.size(); ++changed) {
     for (int bit = 0; bit < 8; ++bit) {
       std::string wrong = one;
       wrong[changed] = static_cast<char>(wrong[changed] ^ 1 << bit);
-      const auto numbers = parsed({numbered(1) + wrong + stream(3, 60)});
+      const auto numbers = parsed({messageNumber(1) + wrong + stream(3, 60)});
       QVERIFY(std::find(numbers.begin(), numbers.end(), 2) == numbers.end());
       QCOMPARE(numbers.front(), 1);
       QVERIFY2(numbers.back() == 62 || changed < 50, "a changed length may swallow what follows, nothing else");
@@ -146,11 +147,11 @@ void OpenigtlinkParserTest::neverBelievesNoise() {
 }
 
 void OpenigtlinkParserTest::wrongCrc() {
-  std::string wrong = numbered(2);
+  std::string wrong = messageNumber(2);
   wrong.back() = static_cast<char>(wrong.back() ^ 1);
   IgtlParser parser;
   std::vector<IgtlMessage> messages;
-  parser.add(numbered(1) + wrong + numbered(3), messages);
+  parser.add(messageNumber(1) + wrong + messageNumber(3), messages);
   QCOMPARE(numbersOf(messages), (std::vector{1, 3}));
   QCOMPARE(parser.wrong_crcs(), std::uint64_t{1});
   QCOMPARE(parser.dropped_bytes(), std::uint64_t{wrong.size()});
@@ -159,18 +160,18 @@ void OpenigtlinkParserTest::wrongCrc() {
 void OpenigtlinkParserTest::withoutCrcOneMessageLate() {
   IgtlParser parser;
   std::vector<IgtlMessage> messages;
-  parser.add(numbered(1, false), messages);
+  parser.add(messageNumber(1, false), messages);
   QVERIFY(messages.empty());
-  parser.add(numbered(2, false), messages);
+  parser.add(messageNumber(2, false), messages);
   QCOMPARE(numbersOf(messages), std::vector{1});
 }
 
 void OpenigtlinkParserTest::withoutCrcNothingIsInvented() {
-  const std::string one = numbered(2, false);
+  const std::string one = messageNumber(2, false);
   for (std::size_t lost = 0; lost < one.size(); ++lost) {
     std::string cut = one;
     cut.erase(lost, 1);
-    const auto numbers = parsed({numbered(1, false) + cut + stream(3, 4, false)});
+    const auto numbers = parsed({messageNumber(1, false) + cut + stream(3, 4, false)});
     // The poses are right (numbersOf looks); without its first zero, the one that ends the message before serves.
     QVERIFY2(numbers == (std::vector{1, 3, 4, 5}) || numbers == (std::vector{3, 4, 5}) ||
                  (lost == 0 && numbers == (std::vector{2, 3, 4, 5})),
@@ -180,7 +181,7 @@ void OpenigtlinkParserTest::withoutCrcNothingIsInvented() {
 
 void OpenigtlinkParserTest::otherTypesArePassedOver() {
   const std::string image = encodeIgtl("IMAGE", "Camera", 0, std::string(5000, '\1'));
-  const std::string all = image + numbered(1) + encodeIgtl("NEWTYPE", "", 0, "") + numbered(2) + image;
+  const std::string all = image + messageNumber(1) + encodeIgtl("NEWTYPE", "", 0, "") + messageNumber(2) + image;
   for (std::size_t piece : {std::size_t{1}, std::size_t{7}, std::size_t{1000}, all.size()}) {
     IgtlParser parser;
     std::vector<IgtlMessage> messages;
@@ -201,13 +202,13 @@ void OpenigtlinkParserTest::largeImagesAreNotKept() {
   parser.add(header, messages);
   const std::string block(1 << 20, '\1');
   for (int i = 0; i < 3 * 1024; ++i) parser.add(block, messages);
-  parser.add(numbered(1), messages);
+  parser.add(messageNumber(1), messages);
   QCOMPARE(numbersOf(messages), std::vector{1});
 }
 
 void OpenigtlinkParserTest::absurdLengths() {
   // A pose of 3 GiB is none: its header is dropped, and what follows is read.
-  std::string header = numbered(1);
+  std::string header = messageNumber(1);
   header[46] = static_cast<char>(0xC0);
   QCOMPARE(parsed({header + stream(2, 2)}), (std::vector{2, 3}));
 }

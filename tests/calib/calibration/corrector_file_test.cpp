@@ -176,7 +176,7 @@ class CorrectorFileTest : public QObject {
     row("other file", "{\"schema\": \"fieldtrue.gap/1\"}", ErrorCode::kBadInput, "not a Fieldtrue calibration");
     row("no schema", "{}", ErrorCode::kBadInput, "not a Fieldtrue calibration");
     row("not an object", "[1, 2]", ErrorCode::kBadInput, "not a Fieldtrue calibration");
-    row("newer", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/3"; }), ErrorCode::kNewerVersion,
+    row("newer", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/4"; }), ErrorCode::kNewerVersion,
         "newer version");
     row("odd version", rewritten(text, [](json& j) { j["schema"] = "fieldtrue.ftcal/one"; }), ErrorCode::kBadInput,
         "fieldtrue.ftcal/one");

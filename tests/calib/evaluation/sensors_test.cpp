@@ -1,11 +1,13 @@
 #include <QTest>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "calib/calibration/corrector.h"
 #include "calib/core/units.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/sensor_scores.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
 #include "tests/support/test_main.h"
@@ -148,8 +150,152 @@ class SensorsTest : public QObject {
         compared(twoSensors({.smooth_m = 0.02, .gain = 0.02, .noise_2_m = 0.001}), "polynomial:degree=3");
     QVERIFY(comparison.split.has_value());
     QVERIFY2(comparison.split->is_better, comparison.split->text.c_str());
-    QVERIFY(comparison.split->separate_mm < 0.5 * comparison.split->shared_mm);
-    FT_VERIFY_MATCH(holdsAll(comparison.split->text, {"err differently", "--sensor N"}));
+    QVERIFY(comparison.split->separate < 0.5 * comparison.split->shared);
+    FT_VERIFY_MATCH(holdsAll(comparison.split->text, {"err differently", "kfold:10"}));
+  }
+
+  void theFigureApartIsThatOfRefits() {
+    const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = 0.02, .noise_2_m = 0.001});
+    ComparisonOptions options;
+    options.position_methods = {parseMethodText("polynomial:degree=2").value()};
+    options.orientation_methods = {{"none", {}}};
+    options.validation = Validation{ValidationKind::kBlocks, 8};
+    options.separate_sensors = true;
+    options.with_surroundings = false;
+    const auto comparison = compareMethods(table, options);
+    FT_VERIFY_OK(comparison);
+    // The octants about the middle of the places, each foretold by a calibration fitted without it.
+    Eigen::AlignedBox3d box;
+    for (const Node& node : table.nodes) box.extend(node.reference_from_sensor.position_m);
+    const auto octant = [&](const Node& node) {
+      const Eigen::Vector3d off_m = node.reference_from_sensor.position_m - box.center();
+      return (off_m.x() > 0 ? 1 : 0) + (off_m.y() > 0 ? 2 : 0) + (off_m.z() > 0 ? 4 : 0);
+    };
+    auto choice = calibration::parseCorrectorChoice("polynomial:degree=2", "none").value();
+    choice.separate_sensors = true;
+    // All rows of a place are of the octant of its first.
+    std::map<int, int> octant_of_place;
+    for (const Node& node : table.nodes) octant_of_place.emplace(node.node, octant(node));
+    std::map<int, double> squares_mm2;
+    for (int left_out = 0; left_out < 8; ++left_out) {
+      std::vector<Node> rest;
+      std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(rest),
+                   [&](const Node& node) { return octant_of_place[node.node] != left_out; });
+      const auto fit = calibration::Corrector::fit(rest, table.metadata, choice, calibration::AlignMode::kRigid);
+      FT_VERIFY_OK(fit);
+      for (const Node& node : table.nodes)
+        if (octant_of_place[node.node] == left_out)
+          squares_mm2[node.node] += 0.5e6 * (fit->correct(node.tracker_from_sensor, node.sensor).position_m -
+                                             node.reference_from_sensor.position_m)
+                                                .squaredNorm();
+    }
+    for (std::size_t k = 0; k < comparison->places.size(); ++k)
+      FT_VERIFY_MATCH(
+          near(comparison->position.front().place_errors[k], std::sqrt(squares_mm2[comparison->places[k]]), 1e-6));
+  }
+
+  void aFitByEvidenceKeepsACorrectionForEach_data() {
+    QTest::addColumn<double>("gain");
+    QTest::newRow("err differently") << 0.02;
+    QTest::newRow("err alike") << 0.0;
+  }
+  void aFitByEvidenceKeepsACorrectionForEach() {
+    QFETCH(double, gain);
+    const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = gain, .noise_2_m = 0.001});
+    const auto choice = calibration::parseCorrectorChoice("polynomial:degree=3", "polynomial_quaternion").value();
+    const auto fitted = fitByEvidence(table, choice, calibration::AlignMode::kRigid, {});
+    FT_VERIFY_OK(fitted);
+    QCOMPARE(fitted->sensorsApart().size(), gain > 0.0 ? std::size_t{2} : std::size_t{0});
+    QCOMPARE(fitted->choice().separate_sensors, gain > 0.0);
+    FT_VERIFY_MATCH(holdsAll(fitted->report().notes.back(), {gain > 0.0 ? "err differently" : "share one"}));
+    if (gain == 0.0) {
+      auto shared = calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
+      QCOMPARE(shared->withNote(fitted->report().notes.back()).toText(), fitted->toText());
+    }
+  }
+
+  void eachHasItsCorrection() {
+    const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = 0.02});
+    auto choice = calibration::parseCorrectorChoice("polynomial:degree=3", "polynomial_quaternion").value();
+    choice.separate_sensors = true;
+    const auto apart = calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
+    FT_VERIFY_OK(apart);
+    QCOMPARE(apart->sensorsApart(), (std::vector<int>{1, 2}));
+    const auto again = calibration::Corrector::fromText(apart->toText(), "again");
+    FT_VERIFY_OK(again);
+    QCOMPARE(again->toText(), apart->toText());
+    QVERIFY(nlohmann::json::parse(apart->toText()).at("schema") == "fieldtrue.ftcal/3");
+    std::vector<Pose> tracked, together(table.nodes.size());
+    std::vector<std::optional<int>> sensors;
+    for (const Node& node : table.nodes) {
+      tracked.push_back(node.tracker_from_sensor);
+      sensors.emplace_back(node.sensor);
+    }
+    again->correct(tracked, together, sensors);
+    for (const int sensor : {1, 2}) {
+      // The same rows fitted by themselves, in the alignment of all: its inverse is applied to the truth first.
+      CalibrationTable rows{table.metadata, {}};
+      for (Node node : table.nodes) {
+        if (node.sensor != sensor) continue;
+        const Pose tracker_from_reference = inverse(apart->alignment().reference_from_tracker);
+        node.reference_from_sensor.position_m = tracker_from_reference * node.reference_from_sensor.position_m;
+        rows.nodes.push_back(node);
+      }
+      auto position_only = choice;
+      position_only.orientation_id = "none";
+      position_only.orientation_settings = {};
+      const auto alone =
+          calibration::Corrector::fit(rows.nodes, table.metadata, position_only, calibration::AlignMode::kNone);
+      FT_VERIFY_OK(alone);
+      const auto one = again->ofSensor(sensor);
+      FT_VERIFY_OK(one);
+      QVERIFY(one->sensorsApart().empty());
+      for (std::size_t i = 0; i < table.nodes.size(); ++i) {
+        if (table.nodes[i].sensor != sensor) continue;
+        const Eigen::Vector3d expected_m =
+            apart->alignment().reference_from_tracker * alone->correctPosition_m(tracked[i].position_m);
+        FT_VERIFY_MATCH(near(together[i].position_m, expected_m, 1e-9));
+        FT_VERIFY_MATCH(sameBits(together[i], again->correct(tracked[i], sensor)));
+        FT_VERIFY_MATCH(sameBits(together[i], one->correct(tracked[i])));
+        QVERIFY(again->covers(tracked[i].position_m, sensor));
+      }
+    }
+    QVERIFY(!again->ofSensor(3));
+    FT_VERIFY_MATCH(holdsAll(again->ofSensor(3).error().message, {"sensors 1 and 2", "sensor 3"}));
+    // A sensor that was not fitted, or is not told, is corrected as the first.
+    FT_VERIFY_MATCH(sameBits(again->correct(tracked[0], 7), again->correct(tracked[0], 1)));
+    FT_VERIFY_MATCH(sameBits(again->correct(tracked[0]), again->correct(tracked[0], 1)));
+  }
+
+  void latticesAreOfEachSensor() {
+    const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = 0.02});
+    auto choice = calibration::parseCorrectorChoice("polynomial:degree=3", "none").value();
+    choice.separate_sensors = true;
+    const auto apart = calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
+    FT_VERIFY_OK(apart);
+    const auto baked = apart->baked(50e-6);
+    FT_VERIFY_OK(baked);
+    for (const Node& node : table.nodes) {
+      const Pose& tracked = node.tracker_from_sensor;
+      FT_VERIFY_MATCH(near(baked->correct(tracked, node.sensor).position_m,
+                           apart->correct(tracked, node.sensor).position_m, 50e-6));
+    }
+    const auto again = calibration::Corrector::fromText(baked->toText(), "again");
+    FT_VERIFY_OK(again);
+    QVERIFY(again->isBaked());
+    QCOMPARE(again->toText(), baked->toText());
+  }
+
+  void withOneSensorSeparateIsShared() {
+    CalibrationTable table = twoSensors({.smooth_m = 0.02});
+    std::erase_if(table.nodes, [](const Node& node) { return node.sensor != 2; });
+    auto choice = calibration::parseCorrectorChoice("polynomial:degree=2", "none").value();
+    const auto shared =
+        calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
+    choice.separate_sensors = true;
+    const auto separate =
+        calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
+    QCOMPARE(separate->toText(), shared->toText());
   }
 
   void gridMethodsTakeSensorsSideBySide() {

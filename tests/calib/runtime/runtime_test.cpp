@@ -62,6 +62,22 @@ Corrector fitted(const CalibrationTable& table, const std::string& position, con
   return *std::move(corrector);
 }
 
+/// A second sensor of another gain, and what each has of its own.
+Corrector fittedApart() {
+  CalibrationTable table = bentTable();
+  std::vector<Node> second = table.nodes;
+  for (Node& node : second) {
+    node.sensor = 3;
+    node.tracker_from_sensor.position_m *= 1.02;
+  }
+  table.nodes.insert(table.nodes.end(), second.begin(), second.end());
+  CorrectorChoice choice = parseCorrectorChoice("polynomial:degree=3", "polynomial_quaternion").value();
+  choice.separate_sensors = true;
+  auto corrector = Corrector::fit(table.nodes, table.metadata, choice, AlignMode::kRigid);
+  if (!corrector) qFatal("%s", corrector.error().message.c_str());
+  return *std::move(corrector);
+}
+
 /// Inside, at the edge and outside.
 std::vector<Pose> somePoses(const CalibrationTable& table, std::size_t n = kPoses) {
   std::mt19937 random(5);
@@ -123,6 +139,26 @@ class RuntimeTest : public QObject {
     for (const auto& method : correctors::orientationMethods())
       QVERIFY2(correctors::findOrientationReader(method.id).value() == method.read, method.id.c_str());
     QVERIFY(!correctors::findPositionReader("nothing"));
+  }
+
+  void eachSensorHasItsCorrection() {
+    const Corrector program = fittedApart();
+    const Calibration runtime = loaded(program);
+    const std::vector<Pose> poses = somePoses(program.table());
+    const auto tracked = inC(poses);
+    for (const int sensor : {0, 3}) {
+      const auto of_runtime = runtime.correct(tracked, sensor);
+      const Calibration alone = runtime.ofSensor(sensor);
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        const Pose of_program = program.correct(poses[i], sensor);
+        FT_VERIFY_MATCH(near(outOfC(of_runtime[i]), of_program, 1e-15, 1e-12));
+        FT_VERIFY_MATCH(near(outOfC(alone.correct(tracked[i])), of_program, 1e-15, 1e-12));
+        QCOMPARE(alone.isInside(tracked[i]), program.covers(poses[i].position_m, sensor));
+      }
+      const Worst worst = differenceInside(alone, runtime.baked(50.0, 0.01).ofSensor(sensor), tracked);
+      QVERIFY2(worst.position_m < 50e-6, qPrintable(QString::number(worst.position_m)));
+    }
+    QVERIFY_EXCEPTION_THROWN(runtime.ofSensor(1), fieldtrue_runtime::Failure);
   }
 
   void correctsToTheBitsOfTheProgram_data() {
