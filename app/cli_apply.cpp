@@ -67,6 +67,10 @@ struct PendingRow {
 
 /// The number of a sensor as a table writes it; none where it is something else.
 std::optional<int> sensorNumber(std::string_view text) {
+  // Tables that passed through other programs write 1 as 1.0.
+  if (const std::size_t point = text.find('.');
+      point != std::string_view::npos && text.find_first_not_of('0', point + 1) == std::string_view::npos)
+    text = text.substr(0, point);
   int sensor = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), sensor);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
@@ -373,7 +377,8 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
                  {"rows", table.n_rows()},
                  {"outside", table.n_outside()},
                  {"lost", table.n_lost()},
-                 {"other_setup", table.n_other_setup()}};
+                 {"other_setup", table.n_other_setup()},
+                 {"other_sensor", table.n_other_sensor()}};
   answer.text = std::to_string(table.n_rows()) + " rows written to " + options.out + "; " +
                 std::to_string(table.n_outside()) + " outside the calibrated region (covered = 0), " +
                 std::to_string(table.n_lost()) + " without a pose\n";

@@ -40,7 +40,7 @@ Result<calibration::Corrector> fitRows(const CalibrationTable& table, calibratio
                                        const std::string& sensors, calibration::AlignMode align,
                                        const RunControl& control) {
   if (sensors == "auto") return evaluation::fitByEvidence(table, choice, align, control);
-  choice.separate_sensors = sensors == "separate";
+  choice.separate_position = choice.separate_orientation = sensors == "separate";
   return calibration::Corrector::fit(evaluation::fitRowsOf(table), table.metadata, choice, align, control);
 }
 

@@ -50,10 +50,12 @@ std::string lineAfter(const std::string& text, std::string_view head) {
   return std::string(trimmed(text.substr(begin, text.find('\n', begin) - begin)));
 }
 
-/// Any reply with a right CRC is one of NDI's: a refusal too.
+constexpr const char* kNdiQuestion = "VER";
+
+/// Any reply with a right CRC is one of NDI's: a refusal too. The question has one as well, and a line may echo it.
 std::optional<ProbeAnswer> ndiAnswer(std::string_view heard) {
   const auto reply = findNdiReply(heard);
-  if (!reply) return std::nullopt;
+  if (!reply || reply->text.starts_with(kNdiQuestion)) return std::nullopt;
   ProbeAnswer answer;
   const std::string first = reply->text.substr(0, reply->text.find('\n'));
   answer.model = reply->error ? "NDI tracker" : "NDI " + std::string(trimmed(first));
@@ -93,7 +95,7 @@ TrackerProbe ndiProbe() {
   TrackerProbe probe;
   probe.rates = {kNdiPowerUpBaud, 115200, 921600, 57600, 38400, 19200, 230400, 1228739};
   probe.stop = "\r";
-  probe.ask = ndiCommand("VER", "0");
+  probe.ask = ndiCommand(kNdiQuestion, "0");
   probe.answer = ndiAnswer;
   probe.may_do = "A command half typed by another program is ended.";
   return probe;

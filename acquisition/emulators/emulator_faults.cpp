@@ -43,8 +43,8 @@ std::span<const EmulatorFault> emulatorFaults() {
        [](EmulatorFaults& f, std::uint64_t) { f.stuck = true; }, "flock"},
       {"missing", "for one second in four the tools are MISSING", false,
        [](EmulatorFaults& f, std::uint64_t) { f.missing = true; }, "ndi"},
-      {"out_of_volume", "for one second in four the tools are out of the measuring volume, and their poses wrong", false,
-       [](EmulatorFaults& f, std::uint64_t) { f.out_of_volume = true; }, "ndi"},
+      {"out_of_volume", "for one second in four the tools are out of the measuring volume, and their poses wrong",
+       false, [](EmulatorFaults& f, std::uint64_t) { f.out_of_volume = true; }, "ndi"},
       {"tool_unplugged", "the last tool is unplugged after three seconds of tracking", false,
        [](EmulatorFaults& f, std::uint64_t) { f.tool_unplugged = true; }, "ndi"},
   };

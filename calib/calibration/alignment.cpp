@@ -170,6 +170,7 @@ correctors::FitData makeFitData(std::span<const Node> nodes, const TableMetadata
   }
   data.index = indexOf(nodes);
   data.jig_sd_m = metadata.jig_tolerance_m.value_or(0.0);
+  data.is_dipole = metadata.transmitter_model.value_or("dipole") == "dipole";
   data.dimension = pointSpread(data.p_true_m).dimension;
   return data;
 }

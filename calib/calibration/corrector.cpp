@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/coincident_places.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/baked/baked_position.h"
 #include "calib/correctors/base/fit_checks.h"
@@ -66,6 +67,11 @@ std::string orientationNote(std::span<const Node> nodes) {
          " rows have no orientation, so that no orientation is used: complete these rows, or leave them out.";
 }
 
+/// A note with whose it is; empty where there is none.
+std::string named(const std::string& whose, const std::string& note) {
+  return whose.empty() || note.empty() ? note : whose + ": " + note;
+}
+
 }  // namespace
 
 Result<CorrectorChoice> parseCorrectorChoice(const std::string& position_text, const std::string& orientation_text) {
@@ -86,37 +92,44 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
     FT_TRY(auto alignment, fitAlignment(nodes));
     parts.alignment = alignment;
   }
-  std::vector<std::string> notes{orientationNote(nodes)};
-  const auto fit_rows = [&](std::span<const Node> rows, const std::string& whose) -> Result<Correction> {
-    const correctors::FitData data = makeFitData(rows, metadata, parts.alignment);
+  std::vector<Node> rows(nodes.begin(), nodes.end());
+  std::vector<std::string> notes{joinCoincidentPlaces(rows), orientationNote(nodes)};
+  const auto fit_parts = [&](std::span<const Node> some, const std::string& whose, bool position, bool orientation,
+                             Correction& to) -> Result<void> {
+    const correctors::FitData data = makeFitData(some, metadata, parts.alignment);
     FT_TRY_VOID(correctors::checkPositions(data, "A calibration"));
-    Correction correction;
-    FT_TRY(correction.position, position_method->fit(data, choice.position_settings, control));
-    FT_TRY(correction.orientation, orientation_method->fit(data, choice.orientation_settings, control));
-    correction.region = Region::around(data.p_tracked_m, data.dimension,
-                                       kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
-    for (const std::string& note : {correctors::planeNote(data, "nothing is claimed off it"),
-                                    correction.position->note(), correction.orientation->note()})
-      if (!note.empty()) notes.push_back(whose + note);
-    return correction;
+    if (position) {
+      FT_TRY(to.position, position_method->fit(data, choice.position_settings, control));
+      to.region = Region::around(data.p_tracked_m, data.dimension,
+                                 kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
+      notes.push_back(named(whose, correctors::planeNote(data, "nothing is claimed off it")));
+      notes.push_back(named(whose, to.position->note()));
+    }
+    if (orientation) {
+      FT_TRY(to.orientation, orientation_method->fit(data, choice.orientation_settings, control));
+      notes.push_back(named(whose, to.orientation->note()));
+    }
+    return {};
   };
-  const std::vector<int> sensors = sensorsOf(nodes);
-  const bool separate = choice.separate_sensors && sensors.size() > 1;
-  if (separate) {
+  const std::vector<int> sensors = sensorsOf(rows);
+  const bool position_apart = choice.separate_position && sensors.size() > 1;
+  const bool orientation_apart = choice.separate_orientation && sensors.size() > 1;
+  FT_TRY_VOID(fit_parts(rows, "", !position_apart, !orientation_apart, parts));
+  if (position_apart || orientation_apart) {
     for (const int sensor : sensors) {
-      const std::string whose = "Sensor " + std::to_string(sensor) + ": ";
-      auto correction = fit_rows(nodesOfSensor(nodes, sensor), whose);
-      if (!correction) return fail(correction.error().code, whose + correction.error().message);
-      parts.by_sensor[sensor] = *std::move(correction);
+      Correction own = parts;
+      const std::string whose = "Sensor " + std::to_string(sensor);
+      auto fitted = fit_parts(nodesOfSensor(rows, sensor), whose, position_apart, orientation_apart, own);
+      if (!fitted) return fail(fitted.error().code, named(whose, fitted.error().message));
+      parts.by_sensor[sensor] = std::move(own);
     }
     static_cast<Correction&>(parts) = parts.by_sensor.begin()->second;
-  } else {
-    FT_TRY(static_cast<Correction&>(parts), fit_rows(nodes, ""));
   }
 
   Corrector corrector(std::move(parts));
   corrector.choice_ = choice;
-  corrector.choice_.separate_sensors = separate;
+  corrector.choice_.separate_position = position_apart;
+  corrector.choice_.separate_orientation = orientation_apart;
   corrector.align_ = align;
   corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
   corrector.setup_ = setupOf(corrector.table_);
@@ -129,15 +142,20 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
 }
 
 Result<Corrector> Corrector::ofSensor(int sensor) const {
+  const std::vector<int> sensors = sensorsOf(table_.nodes);
+  if (std::find(sensors.begin(), sensors.end(), sensor) == sensors.end())
+    return fail(ErrorCode::kBadInput, "This calibration was fitted on " + sensorsText(sensors) +
+                                          ", and knows nothing of sensor " + std::to_string(sensor));
+  if (sensors.size() == 1) return *this;
   FT_TRY(auto alone, partsOf(sensor));
   Corrector corrector(std::move(alone));
   corrector.choice_ = choice_;
-  corrector.choice_.separate_sensors = false;
+  corrector.choice_.separate_position = corrector.choice_.separate_orientation = false;
   corrector.align_ = align_;
   corrector.setup_ = setup_;
   corrector.setup_["sensor"] = std::to_string(sensor);
   corrector.table_ =
-      parts().by_sensor.empty() ? table_ : CalibrationTable{table_.metadata, nodesOfSensor(table_.nodes, sensor)};
+      choice_.separate_position ? CalibrationTable{table_.metadata, nodesOfSensor(table_.nodes, sensor)} : table_;
   corrector.report_ = reportOf(corrector.table_.nodes, corrector);
   corrector.report_.notes = report_.notes;
   return corrector;
@@ -192,7 +210,7 @@ Result<Corrector> Corrector::baked(double max_deviation_m, const RunControl& con
   corrector.report_ = reportOf(table_.nodes, corrector);
   corrector.report_.notes = report_.notes;
   for (const auto& [sensor, correction] : corrector.parts().by_sensor)
-    corrector.report_.notes.push_back("Sensor " + std::to_string(sensor) + ": " + correction.position->note());
+    corrector.report_.notes.push_back(named("Sensor " + std::to_string(sensor), correction.position->note()));
   if (corrector.parts().by_sensor.empty()) corrector.report_.notes.push_back(corrector.parts().position->note());
   if (takesOrientation())
     corrector.report_.notes.push_back(

@@ -23,9 +23,10 @@ struct CorrectorChoice {
   Settings position_settings;
   std::string orientation_id = "none";
   Settings orientation_settings;
-  /// Each sensor has a correction of its own, from its own rows, beyond the alignment that all share. Nothing else than
-  /// one correction where all rows are of one sensor.
-  bool separate_sensors = false;
+  /// Each sensor has a correction of its own, from its own rows, beyond the alignment that all share; shared all the
+  /// same where all rows are of one sensor.
+  bool separate_position = false;
+  bool separate_orientation = false;
 };
 
 /// Parses `method[:key=value,...]` for both parts and checks the settings.
@@ -56,7 +57,7 @@ class Corrector : public Evaluator {
   const Setup& setup() const { return setup_; }
 
   /// The calibration of one sensor, as if it alone had been fitted in the same alignment; of a correction that all
-  /// share the same with the mounting of this one. @error as partsOf
+  /// share the same with the mounting of this one. @error kBadInput for a sensor that was not fitted
   Result<Corrector> ofSensor(int sensor) const;
 
   /// What another program made.

@@ -95,6 +95,10 @@ std::string Corrector::toText() const {
       {"report", reportToJson(report_)},
       {"table", fieldtrue::toJson(table_)},
   };
+  if (!parts().by_sensor.empty()) {
+    content["position"]["by_sensor"] = choice_.separate_position;
+    content["orientation"]["by_sensor"] = choice_.separate_orientation;
+  }
   for (const auto& [sensor, correction] : parts().by_sensor)
     content["by_sensor"][std::to_string(sensor)] = correctionToJson(correction);
   if (parts().by_sensor.empty()) content.update(correctionToJson(parts()), true);
@@ -123,8 +127,10 @@ Corrector Corrector::fromJson(const JsonReader& content) {
   const auto orientation =
       methodFrom<correctors::OrientationModel>(content["orientation"], correctors::findOrientationMethod);
   Corrector corrector(evaluatorPartsFrom(content));
-  corrector.choice_ = {position.first, position.second, orientation.first, orientation.second,
-                       !corrector.parts().by_sensor.empty()};
+  corrector.choice_ = {position.first, position.second, orientation.first, orientation.second};
+  if (const auto apart = content["position"].find("by_sensor")) corrector.choice_.separate_position = apart->flag();
+  if (const auto apart = content["orientation"].find("by_sensor"))
+    corrector.choice_.separate_orientation = apart->flag();
   corrector.align_ = content["align"].oneOf({"rigid", "none"}) == "rigid" ? AlignMode::kRigid : AlignMode::kNone;
   corrector.report_ = reportFrom(content["report"]);
   corrector.table_ = tableFrom(content["table"]);

@@ -91,9 +91,12 @@ std::vector<int> Evaluator::sensorsApart() const {
 }
 
 Result<Evaluator::Parts> Evaluator::partsOf(int sensor) const {
-  if (!parts_.by_sensor.empty() && !parts_.by_sensor.contains(sensor))
-    return fail(ErrorCode::kBadInput, "This calibration holds a correction for each of " + sensorsText(sensorsApart()) +
-                                          ", and none for sensor " + std::to_string(sensor));
+  std::vector<int> known = sensorsApart();
+  if (known.empty())
+    for (const auto& [mounted, mount] : parts_.alignment.mounts) known.push_back(mounted);
+  if (!known.empty() && std::find(known.begin(), known.end(), sensor) == known.end())
+    return fail(ErrorCode::kBadInput, "This calibration was fitted on " + sensorsText(known) +
+                                          ", and knows nothing of sensor " + std::to_string(sensor));
   Parts alone;
   static_cast<Correction&>(alone) = of(sensor);
   alone.alignment.reference_from_tracker = parts_.alignment.reference_from_tracker;

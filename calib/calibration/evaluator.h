@@ -48,7 +48,7 @@ class Evaluator {
   std::vector<int> sensorsApart() const;
 
   /// What applies to one sensor alone: its correction and its mounting.
-  /// @error kBadInput where each sensor has a correction of its own and this one has none
+  /// @error kBadInput where several sensors were fitted and this one was not
   Result<Parts> partsOf(int sensor) const;
 
   /// Where the position part takes orientation: the mean over the orientations that were fitted.

@@ -56,16 +56,6 @@ struct SensorScore {
   ErrorStats stats;                  ///< mm or deg.
 };
 
-/// Whether each sensor corrected by itself, from its own rows beyond one alignment, errs less than with the correction
-/// that all share: RMS over the sensors of a place, both at places that the same fits did not see.
-struct SensorSplit {
-  double shared = 0;    ///< mm, or degrees of an orientation.
-  double separate = 0;  ///< The same unit.
-  PairedDifference separate_less_shared;
-  bool is_better = false;  ///< Separate: the paired 90 % interval is below zero.
-  std::string text;        ///< One sentence.
-};
-
 /// One method's score on the places its fits did not see.
 struct MethodScore {
   std::string method;
@@ -106,6 +96,23 @@ struct GainTest {
   double low90_without_worst_place = 0;
   bool apply = false;
 };
+
+/// Whether each sensor corrected by itself, from its own rows beyond one alignment, errs less than with the correction
+/// that all share: RMS over the sensors of a place, both at places that the same fits did not see.
+struct SensorSplit {
+  double shared = 0;    ///< mm, or degrees of an orientation.
+  double separate = 0;  ///< The same unit.
+  PairedDifference separate_less_shared;
+  bool is_better = false;     ///< Separate: the paired 90 % interval is below zero.
+  bool is_told = true;        ///< False where a sensor cannot be fitted by itself; then only the text is set.
+  GainTest gain;              ///< Of the separate corrections, over no correction.
+  double before = 0;          ///< RMS with no correction, at the same places.
+  std::vector<double> after;  ///< Of each place with separate corrections; same order as Comparison::places.
+  std::string text;           ///< One sentence.
+};
+
+/// Whether each sensor is to have a correction of its own.
+inline bool isApart(const std::optional<SensorSplit>& split) { return split && split->is_better; }
 
 /// @param places node numbers, before and after in the same order; fewer than 3 never pass
 GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
@@ -181,8 +188,10 @@ struct Comparison {
   std::optional<FoldBack> fold_back;  ///< With the best position method fitted to all rows it may see.
   std::optional<OrientationDependence> orientation_dependence;  ///< None without orientation.
   std::vector<ResamplingError> resampling;                      ///< Empty for places in one plane.
-  std::optional<SensorSplit> split;                             ///< Of the best position method; none with one sensor.
-  std::vector<std::string> notes;                               ///< E.g. that the nodes lie in one plane.
+  /// Of the best methods, or of those that come nearest where none beats the error before; none with one sensor.
+  std::optional<SensorSplit> split;
+  std::optional<SensorSplit> orientation_split;
+  std::vector<std::string> notes;  ///< E.g. that the nodes lie in one plane.
 };
 
 /// Scores every method on places its fits did not see.

@@ -36,12 +36,13 @@ json sensorsToJson(const std::vector<SensorScore>& sensors) {
   return to;
 }
 
-json splitToJson(const SensorSplit& split) {
-  return {{"shared_mm", split.shared},
-          {"separate_mm", split.separate},
-          {"separate_less_shared_mm", split.separate_less_shared.difference},
-          {"low90", split.separate_less_shared.low90},
-          {"high90", split.separate_less_shared.high90},
+json splitToJson(const SensorSplit& split, const std::string& unit) {
+  const auto figure = [&](double value) { return split.is_told ? json(value) : json(nullptr); };
+  return {{"shared_" + unit, figure(split.shared)},
+          {"separate_" + unit, figure(split.separate)},
+          {"separate_less_shared_" + unit, figure(split.separate_less_shared.difference)},
+          {"low90", figure(split.separate_less_shared.low90)},
+          {"high90", figure(split.separate_less_shared.high90)},
           {"separate_is_better", split.is_better},
           {"text", split.text}};
 }
@@ -166,7 +167,9 @@ json toJson(const Comparison& comparison) {
           {"orientation_dependence", partToJson(comparison.orientation_dependence)},
           {"resampling", resamplingToJson(comparison.resampling)},
           {"sensors", sensorsToJson(comparison.before_sensors)},
-          {"split", comparison.split ? splitToJson(*comparison.split) : json(nullptr)},
+          {"split", comparison.split ? splitToJson(*comparison.split, "mm") : json(nullptr)},
+          {"orientation_split",
+           comparison.orientation_split ? splitToJson(*comparison.orientation_split, "deg") : json(nullptr)},
           {"notes", comparison.notes}};
 }
 

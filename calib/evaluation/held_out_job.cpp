@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "calib/calibration/alignment.h"
-#include "calib/evaluation/coincident_places.h"
+#include "calib/calibration/coincident_places.h"
 #include "calib/evaluation/held_out.h"
 
 namespace fieldtrue::evaluation {
@@ -30,7 +30,8 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
     return fail(ErrorCode::kTooFewNodes, table.nodes.empty()
                                              ? "The table has no rows to compare methods on"
                                              : "Every row of the table is skipped; nothing is left to compare");
-  if (std::string note = joinCoincidentPlaces(job.nodes); !note.empty()) job.notes.push_back(std::move(note));
+  if (std::string note = calibration::joinCoincidentPlaces(job.nodes); !note.empty())
+    job.notes.push_back(std::move(note));
   auto candidates = candidatesOf(options);
   if (!candidates) return tl::unexpected(candidates.error());
   job.candidates = *std::move(candidates);

@@ -12,7 +12,7 @@ Result<Comparison> judgeCalibration(const calibration::Corrector& corrector, con
   options.position_methods = {method};
   options.orientation_methods = {{"none", {}}};
   options.align = corrector.align();
-  options.separate_sensors = choice.separate_sensors;
+  options.separate_sensors = choice.separate_position;
   options.with_surroundings = false;
   return compareMethods(corrector.table(), options, control);
 }

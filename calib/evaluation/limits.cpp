@@ -90,7 +90,8 @@ const MethodScore* bestScore(const Comparison& comparison) {
 /// Errors of what the verdict recommends.
 const std::vector<double>& recommendedErrors(const Comparison& comparison) {
   const MethodScore* best = bestScore(comparison);
-  return best != nullptr && comparison.verdict.apply_position ? best->place_errors : comparison.before_place_mm;
+  if (best == nullptr || !comparison.verdict.apply_position) return comparison.before_place_mm;
+  return isApart(comparison.split) ? comparison.split->after : best->place_errors;
 }
 
 std::vector<bool> nearHoles(const Comparison& comparison, const HeldOutJob& job) {

@@ -16,6 +16,7 @@ constexpr std::size_t kFewestPlaces = 3;
 constexpr double kWholeRegion = 0.5;
 /// Differences of the last bits are not a win: a millionth of a millimetre or of a degree.
 constexpr double kTie = 1e-6;
+constexpr const char* kForEachSensor = " with a correction for each sensor";
 
 std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, double before_rms,
                                    const Comparison& comparison) {
@@ -29,13 +30,11 @@ std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, doubl
   return best;
 }
 
-/// Fills in each method's RMS minus that of the best, or of the least wrong where none beats the error before, with
-/// the interval over the same places.
+/// Fills in each method's RMS minus that of the best, or of no correction where none beats it, with the interval over
+/// the same places.
 void tellDistanceToBest(std::vector<MethodScore>& scores, std::optional<std::size_t> best_row,
-                        const Comparison& comparison) {
-  const auto best = best_row ? best_row : bestRow(scores, HUGE_VAL, comparison);
-  if (!best) return;
-  const std::vector<double> of_best = scores[*best].place_errors;
+                        const std::vector<double>& before) {
+  const std::vector<double> of_best = best_row ? scores[*best_row].place_errors : before;
   for (MethodScore& score : scores) {
     if (score.skipped) continue;
     const PairedDifference difference = pairedDifference(score.place_errors, of_best);
@@ -111,15 +110,16 @@ std::string unrankedText(const Comparison& comparison) {
 
 std::string positionText(const Comparison& comparison, const std::string& do_not_apply) {
   const GainTest& test = comparison.verdict.position;
-  const std::string before = errorText(comparison.before_position_mm.rms) + " mm";
+  const bool is_apart = isApart(comparison.split) && !comparison.verdict.is_inside_out;
+  const std::string before = errorText(is_apart ? comparison.split->before : comparison.before_position_mm.rms) + " mm";
   if (!comparison.best_position_row)
     return do_not_apply + (comparison.verdict.is_inside_out ? insideOutText(*comparison.fold_back) + "; " : "") +
            "no method" + unrankedText(comparison) + " does better than " +
            (comparison.align == calibration::AlignMode::kRigid ? "the rigid alignment alone" : "the tracker as it is") +
            " (" + before + ") " + placesText(comparison);
   const MethodScore& best = comparison.position[*comparison.best_position_row];
-  const std::string name = correctors::positionLabel(best.method, best.settings);
-  const std::string after = errorText(best.stats.rms) + " mm";
+  const std::string name = correctors::positionLabel(best.method, best.settings) + (is_apart ? kForEachSensor : "");
+  const std::string after = errorText(is_apart ? comparison.split->separate : best.stats.rms) + " mm";
   if (comparison.verdict.is_inside_out)
     return do_not_apply + name + " would take the error from " + before + " to " + after + " (" +
            placesText(comparison) + "), but " + insideOutText(*comparison.fold_back);
@@ -145,11 +145,13 @@ std::string expectationText(const Comparison& comparison) {
 std::string orientationText(const Comparison& comparison) {
   if (!comparison.before_orientation_deg || comparison.verdict.is_inside_out) return {};
   const GainTest& test = comparison.verdict.orientation;
-  const std::string before = errorText(comparison.before_orientation_deg->rms);
+  const bool is_apart = isApart(comparison.orientation_split);
+  const std::string before =
+      errorText(is_apart ? comparison.orientation_split->before : comparison.before_orientation_deg->rms);
   if (!comparison.best_orientation_row) return "; orientation stays as it is (" + before + " degrees)";
   const MethodScore& best = comparison.orientation[*comparison.best_orientation_row];
-  const std::string name = correctors::orientationLabel(best.method, best.settings);
-  const std::string after = errorText(best.stats.rms);
+  const std::string name = correctors::orientationLabel(best.method, best.settings) + (is_apart ? kForEachSensor : "");
+  const std::string after = errorText(is_apart ? comparison.orientation_split->separate : best.stats.rms);
   if (test.apply) return "; for orientation apply " + name + ": " + before + " degrees before, " + after + " after";
   return "; orientation stays as it is (" + before + " degrees; the best method, " + name + ", gains " +
          percentText(test.gain) + " %" + whyNot(test, comparison) + ")";
@@ -211,8 +213,8 @@ void pickBest(Comparison& comparison) {
     verdict.orientation = testGain(comparison.places, comparison.before_place_deg, best.place_errors, best.is_tuned);
     trueness.after_orientation_deg = excessError(best.stats.rms, comparison.floor_orientation_deg);
   }
-  tellDistanceToBest(comparison.position, comparison.best_position_row, comparison);
-  tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, comparison);
+  tellDistanceToBest(comparison.position, comparison.best_position_row, comparison.before_place_mm);
+  tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, comparison.before_place_deg);
   verdict.apply_position = verdict.position.apply;
   verdict.apply_orientation = verdict.orientation.apply;
   verdict.gain_low90 = verdict.position.low90;

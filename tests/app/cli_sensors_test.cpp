@@ -101,6 +101,32 @@ class CliSensorsTest : public QObject {
                 .contains("baked"));
   }
 
+  void aSensorThatWasNotFittedIsNotMadeUp() {
+    FT_VERIFY_STATUS(runCli({"fit", "--nodes", at("two.nodes.csv"), "--position", "affine", "--sensor", "4", "--out",
+                             at("four.ftcal.json")}),
+                     0);
+    const CliRun run = runCli({"export", "--calibration", at("four.ftcal.json"), "--format", "ftcal", "--sensor", "0",
+                               "--out", at("zero.ftcal.json")});
+    FT_VERIFY_STATUS(run, 1);
+    FT_VERIFY_MATCH(holdsAll(run.err.toStdString(), {"fitted on sensor 4", "nothing of sensor 0"}));
+    FT_VERIFY_STATUS(runCli({"export", "--calibration", at("four.ftcal.json"), "--format", "ftcal", "--sensor", "4",
+                             "--out", at("same.ftcal.json")}),
+                     0);
+    QCOMPARE(readWhole(at("same.ftcal.json")), readWhole(at("four.ftcal.json")));
+  }
+
+  void numbersThatPassedThroughOtherProgramsAreKnown() {
+    QVERIFY(writeWhole(at("float.csv"), "sensor,x_m,y_m,z_m\n4.0,0.5,0.1,0.1\n"));
+    QVERIFY(writeWhole(at("whole.csv"), "sensor,x_m,y_m,z_m\n4,0.5,0.1,0.1\n"));
+    const auto applied = [&](const QString& in) {
+      const QString out = at("applied_" + in);
+      FT_VERIFY_STATUS(runCli({"apply", "--calibration", at("auto.ftcal.json"), "--in", at(in), "--out", out}), 0);
+    };
+    applied("float.csv");
+    applied("whole.csv");
+    QCOMPARE(readWhole(at("applied_float.csv")).replace("\n4.0,", "\n4,"), readWhole(at("applied_whole.csv")));
+  }
+
   void changesAreToldOfOneSensor() {
     const CliRun unsaid = runCli({"difference", at("auto.ftcal.json"), at("separate.ftcal.json")});
     FT_VERIFY_STATUS(unsaid, 1);

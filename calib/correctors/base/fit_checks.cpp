@@ -1,6 +1,7 @@
 #include "calib/correctors/base/fit_checks.h"
 
 #include <map>
+#include <set>
 
 #include "calib/correctors/base/fit_names.h"
 
@@ -39,6 +40,17 @@ Places mergePlaces(const FitData& data) {
     places.p_true_m[group] /= n_rows;
   }
   return places;
+}
+
+int fewestLevels(const FitData& data) {
+  int fewest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::set<int> levels;
+    for (const auto& index : data.index) levels.insert(index[axis]);
+    const auto n = static_cast<int>(levels.size());
+    if (n > 1 && (fewest == 0 || n < fewest)) fewest = n;
+  }
+  return fewest;
 }
 
 Result<void> checkPositions(const FitData& data, const std::string& method) {

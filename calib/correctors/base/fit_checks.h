@@ -24,6 +24,9 @@ struct Places {
 /// number but stand apart stay apart.
 Places mergePlaces(const FitData& data);
 
+/// Levels of the grid along the axis that has fewest, of those with more than one; 0 where the places are on no grid.
+int fewestLevels(const FitData& data);
+
 /// What every fit asks of its data first: rows, and finite numbers in them.
 /// @param method named in messages, e.g. "Affine fit"
 /// @error kTooFewNodes without rows; kBadInput naming the place whose numbers are not finite

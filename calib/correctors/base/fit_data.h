@@ -24,6 +24,7 @@ struct FitData {
   /// Covariance of each row's mean tracked position, tracker frame; empty when the table states none.
   std::vector<Eigen::Matrix3d> noise_m2;
   double jig_sd_m = 0.0;  ///< SD of placing, per axis: noise of p_true_m; 0 = not stated.
+  bool is_dipole = true;  ///< What is known of dipole trackers may be used: the table names no other transmitter.
   int dimension = 3;      ///< Spread of the true positions: 3 volume, 2 one plane, 1 line, 0 point.
 
   std::size_t size() const { return p_tracked_m.size(); }

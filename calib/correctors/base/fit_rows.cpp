@@ -5,6 +5,7 @@ namespace fieldtrue::correctors {
 FitData rowsOfFitData(const FitData& data, const std::vector<std::size_t>& rows) {
   FitData part;
   part.jig_sd_m = data.jig_sd_m;
+  part.is_dipole = data.is_dipole;
   part.dimension = data.dimension;
   for (const std::size_t row : rows) {
     part.p_tracked_m.push_back(data.p_tracked_m[row]);

@@ -215,6 +215,8 @@ std::map<int, int> foldsOf(const Places& places) {
 Result<identify::PhysicsFit> findScene(const FitData& data, const Places& places, const Settings& settings,
                                        const RunControl& control) {
   identify::PhysicsFit none;
+  none.why_none = "the tracker's transmitter is no dipole, and another's physics is not known";
+  if (!data.is_dipole) return none;
   none.why_none = "the places span no plane";
   if (data.dimension < 2 || pointSpread(data.p_tracked_m).dimension < 2) return none;
   const auto most_places = static_cast<std::size_t>(integerSetting(settings, kSearchPlaces));

@@ -63,7 +63,8 @@ Result<PolynomialDegree> degreeFor(const PolynomialTask& task, const Settings& s
     if (control.stop.stop_requested())
       return fail(ErrorCode::kCancelled, "The choice of the degree was stopped on request");
     const PolynomialProblem problem{
-        degreeName(task.label, degree), task.data.p_tracked_m, task.values, degree, task.data.dimension, places.size()};
+        degreeName(task.label, degree), task.data.p_tracked_m, task.values, degree, task.data.dimension, places.size(),
+        fewestLevels(task.data)};
     const auto fits = PolynomialHoldOut::make(problem, places);
     if (!fits && degree == 1) why_not = fits.error();
     if (!fits) continue;
@@ -85,8 +86,8 @@ Result<ChosenPolynomial> fitChosenPolynomial(const PolynomialTask& task, const S
                                              const RunControl& control) {
   FT_TRY(const auto degree, degreeFor(task, settings, control));
   const PolynomialProblem problem{
-      degreeName(task.label, degree.degree), task.data.p_tracked_m, task.values, degree.degree, task.data.dimension,
-      mergePlaces(task.data).size()};
+      degreeName(task.label, degree.degree), task.data.p_tracked_m,  task.values, degree.degree, task.data.dimension,
+      mergePlaces(task.data).size(),         fewestLevels(task.data)};
   return PolynomialField::fit(problem).map([&](PolynomialField field) {
     return ChosenPolynomial{std::move(field), degree.note};
   });

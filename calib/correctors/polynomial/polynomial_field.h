@@ -19,6 +19,7 @@ struct PolynomialProblem {
   int degree = 3;
   int dimension = 3;         ///< 3 volume; 2 plane: monomials of the two principal axes of p_m only.
   std::size_t n_places = 0;  ///< Distinct places among the rows.
+  int fewest_levels = 0;     ///< Of the grid's axes, those with one level left out; 0 = the places are on no grid.
 };
 
 /// A vector polynomial of position: all monomials up to a degree of centred and scaled coordinates, three outputs.

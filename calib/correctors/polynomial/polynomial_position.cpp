@@ -72,7 +72,8 @@ Result<std::unique_ptr<PositionModel>> fitPolynomialPosition(const FitData& data
                                                              const std::string& name) {
   FT_TRY_VOID(checkPositions(data, name));
   const std::vector<Eigen::Vector3d> d_m = displacements_m(data);
-  const PolynomialProblem problem{name, data.p_tracked_m, d_m, degree.degree, data.dimension, mergePlaces(data).size()};
+  const PolynomialProblem problem{
+      name, data.p_tracked_m, d_m, degree.degree, data.dimension, mergePlaces(data).size(), fewestLevels(data)};
   return PolynomialField::fit(problem).map([&](PolynomialField field) -> std::unique_ptr<PositionModel> {
     return std::make_unique<PolynomialPosition>(ChosenPolynomial{std::move(field), degree.note});
   });
@@ -84,7 +85,8 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutPolynomialPosition(co
   FT_TRY_VOID(checkPositions(data, name));
   const std::vector<Eigen::Vector3d> d_m = displacements_m(data);
   Places places = mergePlaces(data);
-  const PolynomialProblem problem{name, data.p_tracked_m, d_m, degree.degree, data.dimension, places.size()};
+  const PolynomialProblem problem{name,          data.p_tracked_m,  d_m, degree.degree, data.dimension,
+                                  places.size(), fewestLevels(data)};
   return PolynomialHoldOut::make(problem, std::move(places))
       .map([&](PolynomialHoldOut fits) -> std::unique_ptr<HoldOutFits<PositionModel>> {
         return std::make_unique<PolynomialPositionHoldOut>(std::move(fits), degree.note);

@@ -6,6 +6,7 @@
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/units.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::evaluation {
 namespace {
@@ -32,12 +33,22 @@ void groupOrientations(OrientationRows& rows) {
   }
 }
 
+int sensorOfMostRows(std::span<const Node> nodes) {
+  std::map<int, std::size_t> n_rows;
+  for (const Node& node : nodes) ++n_rows[node.sensor];
+  const auto most =
+      std::max_element(n_rows.begin(), n_rows.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == n_rows.end() ? 0 : most->first;
+}
+
 }  // namespace
 
 Result<OrientationRows> orientationRows(const CalibrationTable& table) {
   std::vector<Node> nodes;
   std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(nodes),
                [](const Node& node) { return node.role != NodeRole::kSkipped; });
+  // Sensors differ by their mountings and by their coils, which is not how they are turned: one of them is asked.
+  nodes = nodesOfSensor(nodes, sensorOfMostRows(nodes));
   const auto n_without = std::count_if(nodes.begin(), nodes.end(), [](const Node& n) { return !n.has_orientation; });
   if (nodes.empty() || n_without > 0)
     return fail(ErrorCode::kUnsupported,

@@ -49,6 +49,52 @@ CalibrationTable flatTable() {
 class CorrectorTest : public QObject {
   Q_OBJECT
  private slots:
+  void repeatedPlacesAreOneWhateverTheirNumbers() {
+    // Each place twice, the second time under a number of its own or as a visit more: the same smoothing.
+    SyntheticOptions options;
+    options.smooth_distortion_m = 0.02;
+    SyntheticNoise noise;
+    noise.position_sd_m = 0.002;
+    const CalibrationTable once = syntheticTable(options, noise);
+    noise.seed = 2;
+    CalibrationTable as_visits = once, as_places = once;
+    for (Node node : syntheticTable(options, noise).nodes) {
+      node.visit = 1;
+      as_visits.nodes.push_back(node);
+      node.visit = 0;
+      node.node += 1000;
+      as_places.nodes.push_back(node);
+    }
+    const CorrectorChoice choice = parseCorrectorChoice("bspline", "none").value();
+    const auto visits = Corrector::fit(as_visits.nodes, once.metadata, choice, AlignMode::kRigid);
+    const auto places = Corrector::fit(as_places.nodes, once.metadata, choice, AlignMode::kRigid);
+    FT_VERIFY_OK(visits);
+    FT_VERIFY_OK(places);
+    FT_VERIFY_MATCH(holdsAll(places->report().notes.front(), {"100 places have the true position of another"}));
+    for (const Node& node : once.nodes) {
+      const Eigen::Vector3d between_m = node.tracker_from_sensor.position_m + Eigen::Vector3d(0.05, 0.07, 0.03);
+      FT_VERIFY_MATCH(near(places->correctPosition_m(between_m), visits->correctPosition_m(between_m), 1e-12));
+    }
+  }
+
+  void aPolynomialNeedsALevelMoreThanItsDegree() {
+    SyntheticOptions options;
+    options.counts = {4, 4, 3};
+    options.smooth_distortion_m = 0.02;
+    const CalibrationTable table = syntheticTable(options);
+    const auto fitted = [&](const char* method) {
+      return Corrector::fit(table.nodes, table.metadata, parseCorrectorChoice(method, "none").value(),
+                            AlignMode::kRigid);
+    };
+    FT_VERIFY_OK(fitted("polynomial:degree=2"));
+    const auto refused = fitted("polynomial:degree=3");
+    QVERIFY(!refused);
+    FT_VERIFY_MATCH(holdsAll(refused.error().message, {"degree 3 needs 4 levels", "along one there are 3"}));
+    const auto by_itself = fitted("polynomial:degree=auto");
+    FT_VERIFY_OK(by_itself);
+    FT_VERIFY_MATCH(holdsAll(by_itself->report().notes.front(), {"1 to 2 were tried"}));
+  }
+
   void alignsUnlessTheTableSaysItIsAligned() {
     TableMetadata metadata;
     QCOMPARE(defaultAlignMode(metadata), AlignMode::kRigid);

@@ -24,16 +24,21 @@ const Eigen::Quaterniond kMount2(Eigen::AngleAxisd(-1.1, Eigen::Vector3d(0, 1, 3
 
 struct TwoSensors {
   double smooth_m = 0.0;
-  double gain = 0.0;         ///< What the second reads too far, as a share of the distance.
+  double gain = 0.0;    ///< What the second reads too far, as a share of the distance.
+  double gain_1 = 0.0;  ///< And the first.
+  double turn_rad_m =
+      0.0;  ///< What the second is turned by too far about y for each metre along x; the first the other way.
   double noise_2_m = 0.0;    ///< Placing error of the second, SD an axis.
   bool side_by_side = true;  ///< 10 cm apart, else both at the same place.
 };
 
 /// What a tracker reads of a true pose in its own frame.
-Pose reading(const SyntheticOptions& options, const Pose& truth, const Eigen::Quaterniond& mount, double gain) {
+Pose reading(const SyntheticOptions& options, const Pose& truth, const Eigen::Quaterniond& mount, double gain,
+             double turn_rad_m = 0.0) {
   Pose tracked = syntheticReading(options, truth);
   tracked.position_m *= 1.0 + gain;
-  tracked.orientation = truth.orientation * mount.conjugate();
+  const double turn_rad = turn_rad_m * truth.position_m.x();
+  tracked.orientation = Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitY()) * truth.orientation * mount.conjugate();
   return tracked;
 }
 
@@ -53,8 +58,8 @@ CalibrationTable twoSensors(const TwoSensors& how) {
     // Turned from place to place, so that orientations tell something.
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.1 * static_cast<double>(i % 7), Eigen::Vector3d::UnitX()));
     one.reference_from_sensor.orientation = other.reference_from_sensor.orientation = turn;
-    one.tracker_from_sensor = reading(options, one.reference_from_sensor, kMount1, 0.0);
-    other.tracker_from_sensor = reading(options, other.reference_from_sensor, kMount2, how.gain);
+    one.tracker_from_sensor = reading(options, one.reference_from_sensor, kMount1, how.gain_1, -how.turn_rad_m);
+    other.tracker_from_sensor = reading(options, other.reference_from_sensor, kMount2, how.gain, how.turn_rad_m);
     if (how.noise_2_m > 0.0)
       for (double& coordinate : other.reference_from_sensor.position_m) coordinate += placing_m(random);
   }
@@ -141,6 +146,7 @@ class SensorsTest : public QObject {
         twoSensors({.smooth_m = 0.02, .noise_2_m = 0.001, .side_by_side = side_by_side}), "polynomial:degree=3");
     QVERIFY(comparison.split.has_value());
     QVERIFY2(!comparison.split->is_better, comparison.split->text.c_str());
+    QVERIFY(!comparison.verdict.text.empty());
     FT_VERIFY_MATCH(holdsAll(comparison.split->text, {"share one correction"}));
   }
 
@@ -152,6 +158,53 @@ class SensorsTest : public QObject {
     QVERIFY2(comparison.split->is_better, comparison.split->text.c_str());
     QVERIFY(comparison.split->separate < 0.5 * comparison.split->shared);
     FT_VERIFY_MATCH(holdsAll(comparison.split->text, {"err differently", "kfold:10"}));
+  }
+
+  void oppositeErrorsAreCorrectedApart() {
+    // What is 3 % too far for one and 3 % too near for the other leaves nothing that both could share.
+    const CalibrationTable table = twoSensors({.gain = 0.03, .gain_1 = -0.03, .noise_2_m = 0.001});
+    const Comparison comparison = compared(table, "affine");
+    QVERIFY(isApart(comparison.split));
+    QVERIFY(comparison.verdict.apply_position);
+    QCOMPARE(comparison.best_position, std::string("affine"));
+    FT_VERIFY_MATCH(holdsAll(comparison.verdict.text, {"Apply Affine", "with a correction for each sensor"}));
+    QVERIFY(comparison.split->separate < 0.2 * comparison.split->before);
+    QVERIFY(comparison.verdict.worst_mm < comparison.split->before);
+  }
+
+  void orientationIsAskedByItself() {
+    const CalibrationTable table = twoSensors({.turn_rad_m = 0.1, .noise_2_m = 0.001});
+    const auto choice =
+        calibration::parseCorrectorChoice("polynomial:degree=1", "polynomial_quaternion:degree=1").value();
+    const auto fitted = fitByEvidence(table, choice, calibration::AlignMode::kRigid, {});
+    FT_VERIFY_OK(fitted);
+    QVERIFY(!fitted->choice().separate_position && fitted->choice().separate_orientation);
+    const auto shared =
+        calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
+    FT_VERIFY_OK(shared);
+    double squares_rad2 = 0.0, shared_rad2 = 0.0;
+    for (const Node& node : table.nodes) {
+      const Pose& tracked = node.tracker_from_sensor;
+      const Eigen::Quaterniond& q_true = node.reference_from_sensor.orientation;
+      QCOMPARE(fitted->correct(tracked, node.sensor).position_m, shared->correct(tracked, node.sensor).position_m);
+      squares_rad2 += std::pow(angleBetween_rad(fitted->correct(tracked, node.sensor).orientation, q_true), 2);
+      shared_rad2 += std::pow(angleBetween_rad(shared->correct(tracked, node.sensor).orientation, q_true), 2);
+    }
+    QVERIFY(squares_rad2 < 0.01 * shared_rad2);
+    const auto again = calibration::Corrector::fromText(fitted->toText(), "again");
+    FT_VERIFY_OK(again);
+    QCOMPARE(again->toText(), fitted->toText());
+  }
+
+  void aSensorOfFewPlacesIsTold() {
+    CalibrationTable table = twoSensors({.smooth_m = 0.02, .noise_2_m = 0.001});
+    std::erase_if(table.nodes, [](const Node& node) { return node.sensor == 2 && node.node > 5; });
+    const auto choice = calibration::parseCorrectorChoice("polynomial:degree=2", "none").value();
+    const auto fitted = fitByEvidence(table, choice, calibration::AlignMode::kRigid, {});
+    FT_VERIFY_OK(fitted);
+    QVERIFY(fitted->sensorsApart().empty());
+    FT_VERIFY_MATCH(
+        holdsAll(fitted->report().notes.back(), {"cannot be told", "Sensor 2", "needs at least 10 places"}));
   }
 
   void theFigureApartIsThatOfRefits() {
@@ -172,7 +225,7 @@ class SensorsTest : public QObject {
       return (off_m.x() > 0 ? 1 : 0) + (off_m.y() > 0 ? 2 : 0) + (off_m.z() > 0 ? 4 : 0);
     };
     auto choice = calibration::parseCorrectorChoice("polynomial:degree=2", "none").value();
-    choice.separate_sensors = true;
+    choice.separate_position = choice.separate_orientation = true;
     // All rows of a place are of the octant of its first.
     std::map<int, int> octant_of_place;
     for (const Node& node : table.nodes) octant_of_place.emplace(node.node, octant(node));
@@ -206,18 +259,21 @@ class SensorsTest : public QObject {
     const auto fitted = fitByEvidence(table, choice, calibration::AlignMode::kRigid, {});
     FT_VERIFY_OK(fitted);
     QCOMPARE(fitted->sensorsApart().size(), gain > 0.0 ? std::size_t{2} : std::size_t{0});
-    QCOMPARE(fitted->choice().separate_sensors, gain > 0.0);
-    FT_VERIFY_MATCH(holdsAll(fitted->report().notes.back(), {gain > 0.0 ? "err differently" : "share one"}));
+    QCOMPARE(fitted->choice().separate_position, gain > 0.0);
+    const std::vector<std::string>& notes = fitted->report().notes;
+    QVERIFY(notes.size() >= 2);
+    const std::string& of_position = notes[notes.size() - 2];
+    FT_VERIFY_MATCH(holdsAll(of_position, {gain > 0.0 ? "err differently in position" : "share one"}));
     if (gain == 0.0) {
       auto shared = calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
-      QCOMPARE(shared->withNote(fitted->report().notes.back()).toText(), fitted->toText());
+      QCOMPARE(shared->withNote(of_position).withNote(notes.back()).toText(), fitted->toText());
     }
   }
 
   void eachHasItsCorrection() {
     const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = 0.02});
     auto choice = calibration::parseCorrectorChoice("polynomial:degree=3", "polynomial_quaternion").value();
-    choice.separate_sensors = true;
+    choice.separate_position = choice.separate_orientation = true;
     const auto apart = calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
     FT_VERIFY_OK(apart);
     QCOMPARE(apart->sensorsApart(), (std::vector<int>{1, 2}));
@@ -270,7 +326,7 @@ class SensorsTest : public QObject {
   void latticesAreOfEachSensor() {
     const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = 0.02});
     auto choice = calibration::parseCorrectorChoice("polynomial:degree=3", "none").value();
-    choice.separate_sensors = true;
+    choice.separate_position = choice.separate_orientation = true;
     const auto apart = calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
     FT_VERIFY_OK(apart);
     const auto baked = apart->baked(50e-6);
@@ -292,7 +348,7 @@ class SensorsTest : public QObject {
     auto choice = calibration::parseCorrectorChoice("polynomial:degree=2", "none").value();
     const auto shared =
         calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
-    choice.separate_sensors = true;
+    choice.separate_position = choice.separate_orientation = true;
     const auto separate =
         calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
     QCOMPARE(separate->toText(), shared->toText());

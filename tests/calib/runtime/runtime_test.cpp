@@ -72,7 +72,7 @@ Corrector fittedApart() {
   }
   table.nodes.insert(table.nodes.end(), second.begin(), second.end());
   CorrectorChoice choice = parseCorrectorChoice("polynomial:degree=3", "polynomial_quaternion").value();
-  choice.separate_sensors = true;
+  choice.separate_position = choice.separate_orientation = true;
   auto corrector = Corrector::fit(table.nodes, table.metadata, choice, AlignMode::kRigid);
   if (!corrector) qFatal("%s", corrector.error().message.c_str());
   return *std::move(corrector);

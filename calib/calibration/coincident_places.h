@@ -5,7 +5,7 @@
 
 #include "calib/core/calibration_table.h"
 
-namespace fieldtrue::evaluation {
+namespace fieldtrue::calibration {
 
 /// Rows with one true position are one place, whatever their numbers: held out apart, a repeated reading would be
 /// foretold by its own repetition. Gives such rows the lowest of their numbers.
@@ -13,4 +13,4 @@ namespace fieldtrue::evaluation {
 /// @return a sentence naming the places that were joined; empty when none were
 std::string joinCoincidentPlaces(std::vector<Node>& nodes);
 
-}  // namespace fieldtrue::evaluation
+}  // namespace fieldtrue::calibration

@@ -1,4 +1,4 @@
-#include "calib/evaluation/coincident_places.h"
+#include "calib/calibration/coincident_places.h"
 
 #include <algorithm>
 #include <map>
@@ -7,7 +7,7 @@
 #include "calib/core/place_name.h"
 #include "calib/tables/true_box.h"
 
-namespace fieldtrue::evaluation {
+namespace fieldtrue::calibration {
 namespace {
 
 constexpr double kTolerance = 1e-3;  ///< Of the diagonal of the box around the true positions.
@@ -61,8 +61,7 @@ std::string joinCoincidentPlaces(std::vector<Node>& nodes) {
   const auto& [place, other] = *joined.lower().begin();
   const std::size_t n = joined.lower().size();
   return std::to_string(n) + (n == 1 ? " place has" : " places have") + " the true position of another, as " +
-         names.of(place) + " that of " + names.of(joined.lowest(other)) +
-         ": each such set was held out together, as one place.";
+         names.of(place) + " that of " + names.of(joined.lowest(other)) + ": each such set counts as one place.";
 }
 
-}  // namespace fieldtrue::evaluation
+}  // namespace fieldtrue::calibration
