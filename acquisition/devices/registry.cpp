@@ -9,12 +9,14 @@
 
 #include "acquisition/devices/fastrak_device.h"
 #include "acquisition/devices/flock_device.h"
+#include "acquisition/devices/isotrak_device.h"
 #include "acquisition/devices/liberty_device.h"
 #include "acquisition/devices/ndi_device.h"
 #include "acquisition/devices/openigtlink_device.h"
 #include "acquisition/devices/simulated_device.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/emulators/flock_emulator.h"
+#include "acquisition/emulators/isotrak_emulator.h"
 #include "acquisition/emulators/liberty_emulator.h"
 #include "acquisition/emulators/ndi_emulator.h"
 #include "acquisition/emulators/openigtlink_emulator.h"
@@ -47,6 +49,14 @@ std::span<const DeviceKind> deviceKinds() {
        .probe = fastrakProbe(),
        .make = makeFastrak,
        .emulate = makeFastrakEmulator},
+      {.id = "isotrak",
+       .label = "Polhemus Isotrak II",
+       .address_help = "the line, then settings: isotrak:/dev/ttyUSB0@19200, isotrak:tcp:localhost:4000,stations=1+2",
+       .source = "Isotrak II manual OPM01PI021, 2001 edition; VRPN's driver",
+       .settings = isotrakSettings(),
+       .probe = isotrakProbe(),
+       .make = makeIsotrak,
+       .emulate = makeIsotrakEmulator},
       {.id = "liberty",
        .label = "Polhemus Liberty",
        .address_help = "the line, then settings: liberty:/dev/ttyUSB0@115200, liberty:tcp:localhost:4000,stations=1+2",

@@ -123,6 +123,8 @@ class TrackerStartup : public QObject {
   QString where() const;
   void failNothingPluggedIn(const std::vector<int>& wanted);
   void failNotTaken(const QString& setting);
+  /// Another kind of tracker answered. @param name with its article @param id of its row
+  void failIsAnother(const QString& name, const QString& id);
 
   Transport& line_;
   LineExchange exchange_;

@@ -227,8 +227,7 @@ std::string encodeLibertyText(const LibertyRecord& record, std::span<const int> 
 }
 
 std::string libertyStatusMeaning(const std::string& status) {
-  if (status.size() != 1) return commonStatusMeaning(status);
-  return "the tracker reports error " + status + ", listed under error codes in its manual";
+  return status.size() == 1 ? manualErrorMeaning(status) : commonStatusMeaning(status);
 }
 
 Result<LibertyParser> LibertyParser::make(Settings settings) {
