@@ -177,14 +177,19 @@ void FastrakStartup::settled(const FastrakStatus& status) {
 }
 
 StreamPlan FastrakStartup::stream() const {
-  FastrakStreamSettings settings;
-  for (const int station : identity_.stations) {
-    settings.items[static_cast<std::size_t>(station - 1)] = {kFastrakDriverItems.begin(), kFastrakDriverItems.end()};
+  return madeStream(fastrakStream({{"stations", stationsText(identity_.stations)}}));
+}
+
+Result<StreamPlan> fastrakStream(const StreamSettings& settings) {
+  FT_TRY(const auto stations, streamStations(settings, kFastrakStations));
+  FastrakStreamSettings stream;
+  for (const int station : stations) {
+    stream.items[static_cast<std::size_t>(station - 1)] = {kFastrakDriverItems.begin(), kFastrakDriverItems.end()};
   }
-  auto parser = FastrakParser::make(settings);
-  FT_CHECK(parser.has_value());
+  FT_TRY(auto parser, FastrakParser::make(stream));
   StreamPlan plan;
-  plan.parser = std::make_unique<FastrakReadings>(std::move(*parser));
+  plan.parser = std::make_unique<FastrakReadings>(std::move(parser));
+  plan.settings = settings;
   plan.begin = encode(fastrak::continuous(true));
   plan.meaning = fastrakStatusMeaning;
   return plan;

@@ -30,6 +30,21 @@ std::vector<Setting> withRecord(std::vector<Setting> settings) {
   return settings;
 }
 
+const IsotrakRecordKind* findIsotrakRecord(const std::string& id) {
+  const auto& kinds = isotrakRecordKinds();
+  const auto found = std::find_if(kinds.begin(), kinds.end(), [&id](const auto& kind) { return kind.id == id; });
+  return found == kinds.end() ? nullptr : &*found;
+}
+
+Result<IsotrakParser> isotrakParser(const IsotrakRecordKind& record, const std::vector<int>& stations, bool single) {
+  IsotrakParser::Settings settings;
+  settings.format = record.format;
+  settings.stations = stations;
+  settings.items = record.items;
+  settings.single = single;
+  return IsotrakParser::make(std::move(settings));
+}
+
 }  // namespace
 
 const std::vector<IsotrakRecordKind>& isotrakRecordKinds() {
@@ -58,10 +73,7 @@ std::vector<Setting> isotrakSettings() { return withRecord(polhemusSettings(kIso
 
 Result<std::unique_ptr<TrackerDevice>> makeIsotrak(const std::string& address, const simulation::Scene&) {
   const auto apply = [](const Settings& settings, IsotrakSetup& setup) -> Result<void> {
-    const auto& kinds = isotrakRecordKinds();
-    setup.record = &*std::find_if(kinds.begin(), kinds.end(), [&settings](const IsotrakRecordKind& kind) {
-      return kind.id == choiceSetting(settings, "record");
-    });
+    setup.record = findIsotrakRecord(choiceSetting(settings, "record"));
     return applyPolhemusSettings(settings, kIsotrakStations, setup);
   };
   return deviceAtAddress<IsotrakStartup>(address, isotrakSettings(), IsotrakSetup{}, apply);
@@ -164,7 +176,9 @@ LineStep IsotrakStartup::readBack(char letter, const char* fact) {
 void IsotrakStartup::verify() {
   const auto complete = [this](const std::string& heard) {
     std::vector<Reading> readings;
-    parser(true).add(heard, readings);
+    auto parser = isotrakParser(*isotrak_.record, identity_.stations, true);
+    FT_CHECK(parser.has_value());
+    parser->add(heard, readings);
     std::set<int> sent;
     for (const Reading& reading : readings) sent.insert(reading.sample.sensor);
     return sent.size() == identity_.stations.size();
@@ -187,20 +201,19 @@ void IsotrakStartup::settled() {
   finish();
 }
 
-IsotrakParser IsotrakStartup::parser(bool single) const {
-  IsotrakParser::Settings settings;
-  settings.format = isotrak_.record->format;
-  settings.stations = identity_.stations;
-  settings.items = isotrak_.record->items;
-  settings.single = single;
-  auto parser = IsotrakParser::make(std::move(settings));
-  FT_CHECK(parser.has_value());
-  return std::move(*parser);
+StreamPlan IsotrakStartup::stream() const {
+  return madeStream(isotrakStream({{"stations", stationsText(identity_.stations)}, {"record", isotrak_.record->id}}));
 }
 
-StreamPlan IsotrakStartup::stream() const {
+Result<StreamPlan> isotrakStream(const StreamSettings& settings) {
+  FT_TRY(const auto stations, streamStations(settings, kIsotrakStations));
+  FT_TRY(const std::string record, streamText(settings, "record"));
+  const IsotrakRecordKind* kind = findIsotrakRecord(record);
+  if (!kind) return fail(ErrorCode::kBadInput, "its setting record is '" + record + "', which no Isotrak II has");
+  FT_TRY(auto parser, isotrakParser(*kind, stations, false));
   StreamPlan plan;
-  plan.parser = std::make_unique<IsotrakParser>(parser(false));
+  plan.parser = std::make_unique<IsotrakParser>(std::move(parser));
+  plan.settings = settings;
   plan.begin = encode(fastrak::continuous(true));
   plan.meaning = isotrakStatusMeaning;
   return plan;

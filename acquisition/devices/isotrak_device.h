@@ -38,6 +38,8 @@ struct IsotrakSetup : LineSetup {
 /// How an Isotrak II is found on a line.
 TrackerProbe isotrakProbe();
 std::vector<Setting> isotrakSettings();
+/// Its stream, from the stations that are on and the kind of record. @error kBadInput
+Result<StreamPlan> isotrakStream(const StreamSettings& settings);
 /// @error kBadInput
 Result<std::unique_ptr<TrackerDevice>> makeIsotrak(const std::string& address, const simulation::Scene& scene);
 
@@ -59,7 +61,6 @@ class IsotrakStartup : public TrackerStartup {
   LineStep readBack(char letter, const char* fact);
   void verify();
   void settled();
-  IsotrakParser parser(bool single) const;
 
   IsotrakSetup isotrak_;
   IsotrakStatus status_;

@@ -51,7 +51,28 @@ TrackerProbe probeOfMake() {
   return probe;
 }
 
+Result<StreamPlan> streamOfMake(const StreamSettings& settings, const LibertyMake& row) {
+  LibertyParser::Settings stream;
+  stream.tag = row.tag;
+  FT_TRY(stream.stations, streamStations(settings, row.most_stations));
+  stream.items = {kLibertyDriverItems.begin(), kLibertyDriverItems.end()};
+  FT_TRY(auto parser, LibertyParser::make(std::move(stream)));
+  StreamPlan plan;
+  plan.parser = std::make_unique<LibertyParser>(std::move(parser));
+  plan.settings = settings;
+  plan.begin = liberty::continuous();
+  plan.meaning = libertyStatusMeaning;
+  return plan;
+}
+
 }  // namespace
+
+Result<StreamPlan> libertyStream(const StreamSettings& settings) {
+  return streamOfMake(settings, libertyMake("liberty"));
+}
+Result<StreamPlan> patriotStream(const StreamSettings& settings) {
+  return streamOfMake(settings, libertyMake("patriot"));
+}
 
 TrackerProbe libertyProbe() {
   TrackerProbe probe = probeOfMake();
@@ -182,17 +203,7 @@ void LibertyStartup::settled() {
 }
 
 StreamPlan LibertyStartup::stream() const {
-  LibertyParser::Settings settings;
-  settings.tag = liberty_.make_row->tag;
-  settings.stations = identity_.stations;
-  settings.items = {kLibertyDriverItems.begin(), kLibertyDriverItems.end()};
-  auto parser = LibertyParser::make(std::move(settings));
-  FT_CHECK(parser.has_value());
-  StreamPlan plan;
-  plan.parser = std::make_unique<LibertyParser>(std::move(*parser));
-  plan.begin = liberty::continuous();
-  plan.meaning = libertyStatusMeaning;
-  return plan;
+  return madeStream(streamOfMake({{"stations", stationsText(identity_.stations)}}, *liberty_.make_row));
 }
 
 }  // namespace fieldtrue::acquisition

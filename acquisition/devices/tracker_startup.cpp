@@ -25,6 +25,11 @@ std::string firstBytes(const std::string& bytes) {
 
 }  // namespace
 
+StreamPlan madeStream(Result<StreamPlan> plan) {
+  FT_CHECK(plan.has_value());
+  return std::move(*plan);
+}
+
 TrackerStartup::TrackerStartup(Transport& line, LineSetup setup, QObject* parent)
     : QObject(parent), line_(line), exchange_(line, this), setup_(std::move(setup)) {
   identity_.baud = setup_.baud;

@@ -293,7 +293,7 @@ void ConnectPage::refreshLines() {
   const QString typed = address_->findText(address_->currentText()) < 0 ? address_->currentText() : QString();
   address_->clear();
   for (const std::string& usual : kind.usual_addresses) address_->addItem(QString::fromStdString(usual));
-  const bool is_on_a_line = kind.usual_addresses.empty();
+  const bool is_on_a_line = kind.stream && kind.usual_addresses.empty();
   for (const acquisition::SerialLine& line :
        is_on_a_line ? acquisition::serialLines() : std::vector<acquisition::SerialLine>()) {
     address_->addItem(QString::fromStdString(line.path));
@@ -301,7 +301,8 @@ void ConnectPage::refreshLines() {
   }
   if (!typed.isEmpty()) address_->setCurrentText(typed);
   if (address_->count() == 0)
-    address_->lineEdit()->setPlaceholderText(tr("no serial line found; type a path or tcp:host:port"));
+    address_->lineEdit()->setPlaceholderText(kind.stream ? tr("no serial line found; type a path or tcp:host:port")
+                                                         : tr("type the path of the file"));
 }
 
 QString ConnectPage::deviceText() const {
