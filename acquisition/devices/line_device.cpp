@@ -97,7 +97,7 @@ void LineDevice::startupFinished() {
   identity_ = startup_->identity();
   StreamPlan plan = startup_->stream();
   const QString text = summary(plan.part);
-  trace_.beginStream({0, plan.settings, identity_->rate_hz, text.toStdString(), describe()});
+  trace_.beginStream({0, 0, plan.settings, identity_->rate_hz, text.toStdString(), describe()});
   reader_ = std::make_unique<StreamReader>(std::move(plan), identity_->rate_hz, clock_speed_, text);
   quiet_ticks_ = 0;
   heard_since_tick_ = noise_since_reading_ = false;
@@ -184,6 +184,7 @@ void LineDevice::failWith(const QString& text) {
 }
 
 void LineDevice::closeLine() {
+  trace_.endStream();
   watch_.stop();
   gap_.stop();
   running_ = false;
@@ -200,6 +201,7 @@ void LineDevice::stop() {
     return;
   }
   if (farewell_) return;
+  trace_.endStream();
   if (!line_->isOpen()) {
     closeLine();
     emit stateChanged(DeviceState::kClosed, "Closed");

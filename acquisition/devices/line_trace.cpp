@@ -1,6 +1,8 @@
 #include "acquisition/devices/line_trace.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <utility>
 
 namespace fieldtrue::acquisition {
 namespace {
@@ -20,15 +22,23 @@ void LineTrace::add(double t_s, bool sent, std::string_view bytes) {
     ++chunks_dropped_;
     chunks_.pop_front();
   }
-  // A line that is lost and found for days: of what begins before the oldest chunk, only the last is still read.
-  while (streams_.size() > 1 && streams_[1].first_chunk <= chunks_dropped_) streams_.erase(streams_.begin());
+  // Of a line that is lost and found for days only the streams are kept that have a chunk.
+  const std::size_t last = streams_.size() - (streaming_ ? 1 : 0);
+  std::size_t gone = 0;
+  while (gone < last && streams_[gone].end_chunk <= chunks_dropped_) ++gone;
+  streams_.erase(streams_.begin(), streams_.begin() + static_cast<std::ptrdiff_t>(gone));
 }
 
 void LineTrace::beginStream(TraceStream stream) {
+  endStream();
   stream.first_chunk = chunks_dropped_ + chunks_.size();
-  // One that brought no byte before the next began is of no use.
-  if (!streams_.empty() && streams_.back().first_chunk == stream.first_chunk) streams_.pop_back();
   streams_.push_back(std::move(stream));
+  streaming_ = true;
+}
+
+void LineTrace::endStream() {
+  if (streaming_) streams_.back().end_chunk = chunks_dropped_ + chunks_.size();
+  streaming_ = false;
 }
 
 Trace LineTrace::content() const {
@@ -39,7 +49,10 @@ Trace LineTrace::content() const {
     trace.bytes += chunk.bytes;
   }
   trace.streams = streams_;
-  for (TraceStream& stream : trace.streams) stream.first_chunk -= std::min(stream.first_chunk, chunks_dropped_);
+  if (streaming_) trace.streams.back().end_chunk = chunks_dropped_ + chunks_.size();
+  for (TraceStream& stream : trace.streams) {
+    for (std::size_t* chunk : {&stream.first_chunk, &stream.end_chunk}) *chunk -= std::min(*chunk, chunks_dropped_);
+  }
   return trace;
 }
 

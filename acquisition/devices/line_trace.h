@@ -19,9 +19,10 @@ struct TraceChunk {
   std::size_t length = 0;
 };
 
-/// A stream among the bytes: from one chunk on, what the tracker sent is read by its parser.
+/// A stream among the bytes: from one chunk to another, what the tracker sent is read by its parser.
 struct TraceStream {
   std::size_t first_chunk = 0;
+  std::size_t end_chunk = 0;  ///< One beyond its last.
   StreamSettings settings;
   double rate_hz = 0.0;    ///< Of each sensor.
   std::string summary;     ///< "Fastrak 2.41, station 1 at 120 Hz".
@@ -49,8 +50,10 @@ class LineTrace {
   explicit LineTrace(std::size_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
 
   void add(double t_s, bool sent, std::string_view bytes);
-  /// The chunks that follow are a stream's. @param stream its first_chunk is not looked at
+  /// The chunks that follow are a stream's. @param stream its chunks are not looked at
   void beginStream(TraceStream stream);
+  /// The chunks that follow are no stream's.
+  void endStream();
   /// All of it that is kept; a stream whose beginning is not begins with the first chunk.
   Trace content() const;
 
@@ -65,7 +68,8 @@ class LineTrace {
   std::size_t chunks_dropped_ = 0;
   std::uint64_t bytes_dropped_ = 0;
   std::deque<Chunk> chunks_;
-  std::vector<TraceStream> streams_;  ///< Their first chunks count from the beginning of the line.
+  std::vector<TraceStream> streams_;  ///< Their chunks count from the beginning of the line.
+  bool streaming_ = false;            ///< The last stream's end is still to come.
 };
 
 }  // namespace fieldtrue::acquisition

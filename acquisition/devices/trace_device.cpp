@@ -59,9 +59,11 @@ class TracePlayback : public Playback {
 
  private:
   TracePlayback(Trace trace, const DeviceKind& kind) : trace_(std::move(trace)), kind_(kind) {
-    const std::size_t first = trace_.streams.empty() ? trace_.chunks.size() : trace_.streams.front().first_chunk;
-    for (std::size_t i = first; i < trace_.chunks.size(); ++i) {
-      if (!trace_.chunks[i].sent) pieces_.push_back(i);
+    std::size_t from = 0;
+    for (const TraceStream& stream : trace_.streams) {
+      for (from = std::max(from, stream.first_chunk); from < stream.end_chunk; ++from) {
+        if (!trace_.chunks[from].sent) pieces_.push_back(from);
+      }
     }
   }
 

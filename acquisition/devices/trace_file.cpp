@@ -19,11 +19,9 @@ constexpr std::string_view kTraceSchema = "fieldtrue.trace/";
 constexpr int kNewestTrace = 1;
 
 nlohmann::json toJson(const TraceStream& stream) {
-  return {{"first_chunk", stream.first_chunk},
-          {"settings", stream.settings},
-          {"rate_hz", stream.rate_hz},
-          {"summary", stream.summary},
-          {"metadata", fieldtrue::toJson(stream.metadata)}};
+  return {{"first_chunk", stream.first_chunk}, {"end_chunk", stream.end_chunk},
+          {"settings", stream.settings},       {"rate_hz", stream.rate_hz},
+          {"summary", stream.summary},         {"metadata", fieldtrue::toJson(stream.metadata)}};
 }
 
 nlohmann::json settingsOf(const Trace& trace) {
@@ -51,7 +49,12 @@ std::string chunksOf(const Trace& trace) {
 TraceStream streamFrom(const JsonReader& json, std::size_t chunks) {
   constexpr Bounds kRates_hz{1e-3, 1e5};
   TraceStream stream;
-  stream.first_chunk = static_cast<std::size_t>(json["first_chunk"].integer(0, static_cast<std::int64_t>(chunks)));
+  const auto chunkAt = [&json, chunks](const char* key, std::size_t least) {
+    return static_cast<std::size_t>(
+        json[key].integer(static_cast<std::int64_t>(least), static_cast<std::int64_t>(chunks)));
+  };
+  stream.first_chunk = chunkAt("first_chunk", 0);
+  stream.end_chunk = json.has("end_chunk") ? chunkAt("end_chunk", stream.first_chunk) : chunks;
   stream.settings = json["settings"].namedTexts();
   stream.rate_hz = json["rate_hz"].number(kRates_hz, "Hz");
   json.text("summary", stream.summary);
