@@ -308,10 +308,12 @@ void ConnectPage::refreshLines() {
 QString ConnectPage::deviceText() const {
   const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
   const QString settings = changedSettings(kind.settings, settings_->values());
-  QStringList parts{QString::fromStdString(kind.id)};
-  if (kind_->currentIndex() != 0) parts << address_->currentText().trimmed();
-  if (!settings.isEmpty()) parts << settings;
-  return parts.join(QLatin1Char(':'));
+  // Settings follow an address behind a comma; the simulated tracker has none.
+  const bool simulated = kind_->currentIndex() == 0;
+  QString text = QString::fromStdString(kind.id);
+  if (!simulated) text += QLatin1Char(':') + address_->currentText().trimmed();
+  if (!settings.isEmpty()) text += QLatin1Char(simulated ? ':' : ',') + settings;
+  return text;
 }
 
 void ConnectPage::chooseScene() {
