@@ -84,7 +84,7 @@ std::optional<std::string> isotrakUnpacked(std::string_view wire) {
   std::string bytes;
   for (std::size_t at = 0; at < wire.size(); at += kSevenBytes + 1) {
     const std::string_view group = wire.substr(at, kSevenBytes + 1);
-    const auto highest = static_cast<unsigned>(group.back());
+    const unsigned highest = static_cast<unsigned char>(group.back());
     const std::size_t count = group.size() - 1;
     if (count == 0 || highest >> count != 0) return std::nullopt;
     for (std::size_t i = 0; i < count; ++i) {

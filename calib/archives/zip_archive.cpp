@@ -35,7 +35,7 @@ bool fillZip(const std::filesystem::path& path, const std::vector<ZipMember>& me
   for (const ZipMember& member : members)
     if (!addMember(archive.get(), member)) return false;
   if (zip_close(archive.get()) != 0) return false;
-  archive.release();
+  (void)archive.release();  // Closing freed it.
   return true;
 }
 
