@@ -180,7 +180,7 @@ std::optional<LibertyRecord> decodeLibertyRecord(const LibertyFrame& frame, std:
   const char* at = frame.payload.data();
   for (const int id : items) {
     const LibertyItem& item = *findLibertyItem(id);
-    if (std::memcmp(at, item.literal.data(), item.literal.size()) != 0) return std::nullopt;
+    if (!item.literal.empty() && std::memcmp(at, item.literal.data(), item.literal.size()) != 0) return std::nullopt;
     at += item.literal.size();
     std::array<double, 9> values{};
     for (std::size_t i = 0; i < static_cast<std::size_t>(item.values); ++i, at += 4) {
