@@ -103,7 +103,7 @@ const std::vector<Outputs>& outputs() {
   static const std::vector<Outputs> all = {{"simulate", {"--nodes", "--samples"}},
                                            {"tables", {"--nodes", "--samples"}},
                                            {"import", {"--nodes", "--samples", "--calibration"}},
-                                           {"acquire", {"--session"}},
+                                           {"acquire", {"--session", "--trace"}},
                                            {"fit", {"--out"}},
                                            {"compare", {"--html"}},
                                            {"apply", {"--out"}},

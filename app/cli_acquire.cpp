@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "acquisition/devices/registry.h"
+#include "acquisition/devices/trace_file.h"
 #include "acquisition/plan/place_state.h"
 #include "acquisition/plan/plan.h"
 #include "acquisition/session/acquisition_controller.h"
@@ -38,6 +39,7 @@ struct AcquireOptions {
   std::string session;
   int samples_per_node = 60;
   bool automatic = false;
+  std::string trace;  ///< Where the bytes of the tracker's line are written; empty = nowhere.
   std::vector<std::string> setup;
 };
 
@@ -110,12 +112,25 @@ class Acquisition {
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
     if (!over_) QCoreApplication::exec();
+    writeTraceOfLine();
     controller_.disconnectDevice();
     controller_.closeSession();
     live_line_.clear();
     if (!failure_) return answer();
     if (!plan_json.isEmpty()) removeIfEmpty();
     return tl::unexpected(*failure_);
+  }
+
+  /// Whatever ended the recording: its faults are what a trace is for.
+  void writeTraceOfLine() {
+    const auto trace = options_.trace.empty() ? std::nullopt : controller_.trace();
+    if (!trace) return;
+    live_line_.clear();
+    if (const auto written = acquisition::writeTrace(options_.trace, *trace); !written) {
+      if (!failure_) failure_ = Failure{kNotPossible, written.error().message};
+      return;
+    }
+    lines_ << "The line's last " << trace->bytes.size() << " bytes are in " << options_.trace << std::endl;
   }
 
   /// The plan that was asked for; a session that is resumed must have been made with it.
@@ -152,6 +167,10 @@ class Acquisition {
     status_ = status;
     tellMisfits(misfits);
     if (status.device == acquisition::DeviceState::kFailed) {
+      fail(status.device_text.toStdString());
+      return;
+    }
+    if (status.device == acquisition::DeviceState::kClosed && told_start_ && !over_) {
       fail(status.device_text.toStdString());
       return;
     }
@@ -325,11 +344,21 @@ class Acquisition {
   bool over_ = false;
 };
 
+/// Why the trace that is asked for cannot be written; said before a day's recording, not after it.
+std::string noTraceOf(const acquisition::TrackerDevice& device, const AcquireOptions& options) {
+  if (options.trace.empty()) return {};
+  if (!device.trace()) return "--trace writes what goes over a tracker's line, and " + options.device + " has none";
+  const QFileInfo folder(QFileInfo(QString::fromStdString(options.trace)).path());
+  return folder.isDir() ? std::string() : "--trace " + options.trace + ": its folder does not exist";
+}
+
 Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   const auto scene = readSceneArgument(options.scene);
   if (!scene) return tl::unexpected(scene.error());
   // Made only to see that its text can be read, before a session file is made; it is not started.
-  if (const auto device = acquisition::makeDevice(options.device, *scene); !device) return wrongUsage(device.error());
+  const auto device = acquisition::makeDevice(options.device, *scene);
+  if (!device) return wrongUsage(device.error());
+  if (const auto why = noTraceOf(**device, options); !why.empty()) return wrongUsage(why);
   const auto setup = readSetupArgument(options.setup);
   if (!setup) return tl::unexpected(setup.error());
   const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
@@ -367,6 +396,8 @@ void addAcquireCommand(CommandLine& line) {
       ->check(CLI::Range(1, 100000));
   addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
   command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
+  command->add_option("--trace", options->trace, "Writes the last bytes of the tracker's line (*.trace.zip) at the end")
+      ->type_name("FILE");
   command->add_option("--session", options->session, "Session file (*.fieldtrue); made new, or resumed if it exists")
       ->type_name("FILE")
       ->required();

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "acquisition/devices/polhemus_settings.h"
+#include "acquisition/protocols/isotrak.h"
 
 namespace fieldtrue::acquisition {
 namespace {
@@ -16,8 +17,6 @@ constexpr ReadBack kReadBacks[] = {
     {'I', "increment"}, {'V', "position_envelope"}, {'Q', "angular_envelope"}, {'H', "hemisphere"}};
 
 bool isLine(const std::string& heard) { return heard.find('\n') != std::string::npos; }
-
-const std::vector<int> kFastrakRates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
 
 std::optional<ProbeAnswer> fastrakAnswer(std::string_view heard) {
   const auto status = findStatus(heard);
@@ -46,7 +45,7 @@ class FastrakReadings : public StreamParser {
 
 TrackerProbe fastrakProbe() {
   TrackerProbe probe;
-  probe.rates = kFastrakRates;
+  probe.rates = polhemusRates();
   probe.stop = encode(fastrak::continuous(false)) + "\r";
   probe.ask = encode(fastrak::status());
   probe.answer = fastrakAnswer;
@@ -76,10 +75,13 @@ void FastrakStartup::run() {
   greeting.stop = farewell();
   greeting.clear = "\r";
   greeting.ask = encode(fastrak::status());
-  greeting.answered = [](const std::string& heard) { return findStatus(heard).has_value(); };
+  greeting.answered = [](const std::string& heard) { return findStatus(heard) || findIsotrakStatus(heard); };
   greeting.reset = encode(fastrak::reinitialise());
-  greeting.rates = kFastrakRates;
-  greet(std::move(greeting), [this](const std::string& heard) { statusCame(*findStatus(heard)); });
+  greeting.rates = polhemusRates();
+  greet(std::move(greeting), [this](const std::string& heard) {
+    const auto status = findStatus(heard);
+    status ? statusCame(*status) : failIsAnother("an Isotrak II", "isotrak");
+  });
 }
 
 void FastrakStartup::statusCame(const FastrakStatus& status) {
@@ -175,14 +177,19 @@ void FastrakStartup::settled(const FastrakStatus& status) {
 }
 
 StreamPlan FastrakStartup::stream() const {
-  FastrakStreamSettings settings;
-  for (const int station : identity_.stations) {
-    settings.items[static_cast<std::size_t>(station - 1)] = {kFastrakDriverItems.begin(), kFastrakDriverItems.end()};
+  return madeStream(fastrakStream({{"stations", stationsText(identity_.stations)}}));
+}
+
+Result<StreamPlan> fastrakStream(const StreamSettings& settings) {
+  FT_TRY(const auto stations, streamStations(settings, kFastrakStations));
+  FastrakStreamSettings stream;
+  for (const int station : stations) {
+    stream.items[static_cast<std::size_t>(station - 1)] = {kFastrakDriverItems.begin(), kFastrakDriverItems.end()};
   }
-  auto parser = FastrakParser::make(settings);
-  FT_CHECK(parser.has_value());
+  FT_TRY(auto parser, FastrakParser::make(stream));
   StreamPlan plan;
-  plan.parser = std::make_unique<FastrakReadings>(std::move(*parser));
+  plan.parser = std::make_unique<FastrakReadings>(std::move(parser));
+  plan.settings = settings;
   plan.begin = encode(fastrak::continuous(true));
   plan.meaning = fastrakStatusMeaning;
   return plan;

@@ -33,6 +33,8 @@ inline constexpr std::array<int, 4> kFastrakDriverItems = {2, 11, 16, 1};
 std::vector<Setting> fastrakSettings();
 /// How a Fastrak is found on a line.
 TrackerProbe fastrakProbe();
+/// Its stream, from the stations that are on. @error kBadInput
+Result<StreamPlan> fastrakStream(const StreamSettings& settings);
 /// A Fastrak at an address. @error kBadInput
 Result<std::unique_ptr<TrackerDevice>> makeFastrak(const std::string& address, const simulation::Scene& scene);
 

@@ -5,6 +5,7 @@
 
 #include "acquisition/protocols/plain_number.h"
 #include "calib/core/declare.h"
+#include "calib/core/file_io.h"
 #include "calib/core/trimmed.h"
 
 namespace fieldtrue::acquisition {
@@ -334,28 +335,47 @@ void FlockStartup::settled() {
   finish();
 }
 
-FlockLayout FlockStartup::layout() const {
-  FlockLayout layout;
-  layout.mode = findFlockMode(flock_.record);
-  layout.group = group_;
-  layout.range_m = range_m();
-  layout.conventions = flock_.conventions;
-  return layout;
-}
-
 StreamPlan FlockStartup::stream() const {
-  FlockStreamSettings settings;
-  settings.layout = layout();
-  settings.drop_repeats = flock_.drop_repeats;
-  settings.sensors.clear();
+  std::map<int, int> sensors;
   for (std::size_t i = 0; i < receivers_.size(); ++i) {
     const int station = static_cast<int>(i) + 1;
     const bool wanted =
         std::find(identity_.stations.begin(), identity_.stations.end(), station) != identity_.stations.end();
-    settings.sensors[std::max(1, receivers_[i])] = wanted ? station - 1 : -1;
+    sensors[std::max(1, receivers_[i])] = wanted ? station - 1 : -1;
   }
+  const auto yes = [](bool is) { return is ? std::string("yes") : std::string("no"); };
+  const FlockConventions& conventions = flock_.conventions;
+  return madeStream(flockStream({{"sensors", sensorsText(sensors)},
+                                 {"record", flock_.record},
+                                 {"group", yes(group_)},
+                                 {"range_m", formatNumber(range_m())},
+                                 {"drop_repeats", yes(flock_.drop_repeats)},
+                                 {"matrix_by_columns", yes(conventions.matrix_by_columns)},
+                                 {"inverted_quaternion", yes(conventions.inverted_quaternion)},
+                                 {"mirrored", std::string(conventions.mirrored ? 1 : 0, conventions.mirrored)}}));
+}
+
+Result<StreamPlan> flockStream(const StreamSettings& settings) {
+  FlockStreamSettings stream;
+  FT_TRY(const std::string record, streamText(settings, "record"));
+  stream.layout.mode = findFlockMode(record);
+  if (!stream.layout.mode)
+    return fail(ErrorCode::kBadInput, "its setting record is '" + record + "', which no bird has");
+  FT_TRY(stream.layout.group, streamFlag(settings, "group"));
+  FT_TRY(stream.layout.range_m, streamNumber(settings, "range_m"));
+  FlockConventions& conventions = stream.layout.conventions;
+  FT_TRY(conventions.matrix_by_columns, streamFlag(settings, "matrix_by_columns"));
+  FT_TRY(conventions.inverted_quaternion, streamFlag(settings, "inverted_quaternion"));
+  FT_TRY(const std::string mirrored, streamText(settings, "mirrored"));
+  if (!mirrored.empty() && mirrored != "x" && mirrored != "y" && mirrored != "z") {
+    return fail(ErrorCode::kBadInput, "its setting mirrored is '" + mirrored + "'; it must be x, y, z or nothing");
+  }
+  conventions.mirrored = mirrored.empty() ? '\0' : mirrored[0];
+  FT_TRY(stream.drop_repeats, streamFlag(settings, "drop_repeats"));
+  FT_TRY(stream.sensors, streamSensors(settings));
   StreamPlan plan;
-  plan.parser = std::make_unique<FlockParser>(std::move(settings));
+  plan.parser = std::make_unique<FlockParser>(std::move(stream));
+  plan.settings = settings;
   plan.begin = flock::stream();
   plan.part = "Bird";
   plan.meaning = flockSampleMeaning;

@@ -37,6 +37,8 @@ TrackerProbe flockProbe();
 
 /// The settings of a Flock of Birds as data, for registry, forms and command line.
 std::vector<Setting> flockSettings();
+/// Its stream, from its birds and how their records are made. @error kBadInput
+Result<StreamPlan> flockStream(const StreamSettings& settings);
 /// A Flock of Birds at an address. @error kBadInput
 Result<std::unique_ptr<TrackerDevice>> makeFlock(const std::string& address, const simulation::Scene& scene);
 
@@ -64,7 +66,6 @@ class FlockStartup : public TrackerStartup {
   LineStep examine(int parameter, std::size_t bytes, std::function<void(const std::string&)> take) const;
   std::vector<int> birdCommandAddresses() const;
   double range_m() const;
-  FlockLayout layout() const;
 
   FlockSetup flock_;
   FlockAddressing addressing_ = FlockAddressing::kNormal;

@@ -9,7 +9,6 @@ namespace fieldtrue::acquisition {
 namespace {
 
 constexpr char kHemisphereLetter = 'H';
-const std::vector<int> kLibertyRates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
 
 Result<std::unique_ptr<TrackerDevice>> makeOfRow(const std::string& address, const LibertyMake& row) {
   const auto apply = [&row](const Settings& settings, LibertySetup& setup) {
@@ -44,7 +43,7 @@ std::optional<ProbeAnswer> libertyStream(std::string_view heard, const char* id)
 /// How one of them is found; which it is, its tag tells.
 TrackerProbe probeOfMake() {
   TrackerProbe probe;
-  probe.rates = kLibertyRates;
+  probe.rates = polhemusRates();
   probe.stop = "\r" + liberty::point();
   probe.ask = liberty::binary(true) + liberty::who() + liberty::stations();
   probe.reply_ms = 600;
@@ -52,7 +51,28 @@ TrackerProbe probeOfMake() {
   return probe;
 }
 
+Result<StreamPlan> streamOfMake(const StreamSettings& settings, const LibertyMake& row) {
+  LibertyParser::Settings stream;
+  stream.tag = row.tag;
+  FT_TRY(stream.stations, streamStations(settings, row.most_stations));
+  stream.items = {kLibertyDriverItems.begin(), kLibertyDriverItems.end()};
+  FT_TRY(auto parser, LibertyParser::make(std::move(stream)));
+  StreamPlan plan;
+  plan.parser = std::make_unique<LibertyParser>(std::move(parser));
+  plan.settings = settings;
+  plan.begin = liberty::continuous();
+  plan.meaning = libertyStatusMeaning;
+  return plan;
+}
+
 }  // namespace
+
+Result<StreamPlan> libertyStream(const StreamSettings& settings) {
+  return streamOfMake(settings, libertyMake("liberty"));
+}
+Result<StreamPlan> patriotStream(const StreamSettings& settings) {
+  return streamOfMake(settings, libertyMake("patriot"));
+}
 
 TrackerProbe libertyProbe() {
   TrackerProbe probe = probeOfMake();
@@ -90,7 +110,7 @@ void LibertyStartup::run() {
   greeting.ask = liberty::binary(true) + liberty::who();
   greeting.answered = [](const std::string& heard) { return findLibertyFrame(heard, kLibertyWho).has_value(); };
   greeting.reset = liberty::reinitialise();
-  greeting.rates = kLibertyRates;
+  greeting.rates = polhemusRates();
   greet(std::move(greeting), [this](const std::string& heard) { whoCame(*findLibertyFrame(heard, kLibertyWho)); });
 }
 
@@ -98,10 +118,7 @@ void LibertyStartup::whoCame(const LibertyFrame& who) {
   const LibertyMake& asked = *liberty_.make_row;
   if (who.tag != asked.tag) {
     const LibertyMake* found = makeWithTag(who.tag);
-    emit failed(QString("The tracker on %1 is a %2: write %3%4")
-                    .arg(where(), QString(found->name), QString(found->id),
-                         QString::fromStdString(liberty_.device_text).section(':', 1).prepend(':')));
-    return;
+    return failIsAnother(QString("a ") + found->name, found->id);
   }
   const std::string identity = libertyIdentity(who);
   identity_.title = name();
@@ -186,17 +203,7 @@ void LibertyStartup::settled() {
 }
 
 StreamPlan LibertyStartup::stream() const {
-  LibertyParser::Settings settings;
-  settings.tag = liberty_.make_row->tag;
-  settings.stations = identity_.stations;
-  settings.items = {kLibertyDriverItems.begin(), kLibertyDriverItems.end()};
-  auto parser = LibertyParser::make(std::move(settings));
-  FT_CHECK(parser.has_value());
-  StreamPlan plan;
-  plan.parser = std::make_unique<LibertyParser>(std::move(*parser));
-  plan.begin = liberty::continuous();
-  plan.meaning = libertyStatusMeaning;
-  return plan;
+  return madeStream(streamOfMake({{"stations", stationsText(identity_.stations)}}, *liberty_.make_row));
 }
 
 }  // namespace fieldtrue::acquisition

@@ -32,6 +32,10 @@ inline constexpr std::array<int, 4> kLibertyDriverItems = {8, 2, 7, 1};
 TrackerProbe libertyProbe();
 TrackerProbe patriotProbe();
 
+/// Their streams, from the stations that are on. @error kBadInput
+Result<StreamPlan> libertyStream(const StreamSettings& settings);
+Result<StreamPlan> patriotStream(const StreamSettings& settings);
+
 std::vector<Setting> libertySettings();
 std::vector<Setting> patriotSettings();
 /// @error kBadInput

@@ -1,5 +1,6 @@
 #include "acquisition/devices/line_device.h"
 
+#include <QDateTime>
 #include <algorithm>
 
 namespace fieldtrue::acquisition {
@@ -28,7 +29,7 @@ LineDevice::LineDevice(LineSetup setup, StartupFactory make_startup, TransportFa
   connect(&watch_, &QTimer::timeout, this, &LineDevice::watch);
   gap_.setParent(this);
   gap_.setSingleShot(true);
-  connect(&gap_, &QTimer::timeout, this, [this] { say(stream_.ask_again); });
+  connect(&gap_, &QTimer::timeout, this, [this] { say(reader_->plan().ask_again); });
 }
 
 LineDevice::~LineDevice() {
@@ -42,13 +43,28 @@ void LineDevice::say(const std::string& bytes) {
   if (bytes.empty()) return;
   const QByteArray sent = QByteArray::fromStdString(bytes);
   line_->write(sent);
-  emit bytesSeen(true, sent);
+  seen(true, sent, now_s());
+}
+
+void LineDevice::seen(bool sent, const QByteArray& bytes, double at_s) {
+  trace_.add(at_s, sent, {bytes.constData(), static_cast<std::size_t>(bytes.size())});
+  emit bytesSeen(sent, bytes);
+}
+
+std::optional<Trace> LineDevice::trace() const {
+  Trace trace = trace_.content();
+  trace.tracker = setup_.id;
+  trace.device = setup_.device_text;
+  trace.software = "Fieldtrue " FIELDTRUE_VERSION;
+  trace.recorded = QDateTime::currentDateTimeUtc().toString(Qt::ISODate).toStdString();
+  trace.clock_speed = clock_speed_;
+  return trace;
 }
 
 void LineDevice::start() {
   if (line_) return;
   emit stateChanged(DeviceState::kConnecting, "Opening " + QString::fromStdString(setup_.where));
-  clock_.start();
+  if (!clock_.isValid()) clock_.start();
   auto line = make_line_();
   if (line) {
     if (auto opened = (*line)->openLine(); !opened) line = tl::unexpected(opened.error());
@@ -68,7 +84,8 @@ void LineDevice::start() {
 void LineDevice::beginStartup() {
   startup_ = make_startup_(*line_);
   end_ = startup_->farewell();
-  connect(startup_.get(), &TrackerStartup::bytesSeen, this, &LineDevice::bytesSeen);
+  connect(startup_.get(), &TrackerStartup::bytesSeen, this,
+          [this](bool sent, const QByteArray& bytes) { seen(sent, bytes, now_s()); });
   connect(startup_.get(), &TrackerStartup::failed, this, &LineDevice::failWith);
   connect(startup_.get(), &TrackerStartup::finished, this, &LineDevice::startupFinished);
   connect(startup_.get(), &TrackerStartup::progressed, this,
@@ -78,72 +95,50 @@ void LineDevice::beginStartup() {
 
 void LineDevice::startupFinished() {
   identity_ = startup_->identity();
-  stream_ = startup_->stream();
-  FT_CHECK(stream_.parser != nullptr && identity_->rate_hz > 0.0);
-  clocks_.clear();
-  unit_clock_ = UnitClock(clock_speed_);
-  hemisphere_ = {};
-  last_status_.clear();
+  StreamPlan plan = startup_->stream();
+  const QString text = summary(plan.part);
+  trace_.beginStream({0, 0, plan.settings, identity_->rate_hz, text.toStdString(), describe()});
+  reader_ = std::make_unique<StreamReader>(std::move(plan), identity_->rate_hz, clock_speed_, text);
   quiet_ticks_ = 0;
   heard_since_tick_ = noise_since_reading_ = false;
   answers_ = answers_at_tick_ = 0;
   connect(line_.get(), &QIODevice::readyRead, this, &LineDevice::readReady);
   watch_.start(kWatch_ms);
-  say(stream_.begin);
-  say(stream_.ask_again);
+  say(reader_->plan().begin);
+  say(reader_->plan().ask_again);
 }
 
 void LineDevice::readReady() {
   const QByteArray bytes = line_->readAll();
   if (bytes.isEmpty()) return;
-  emit bytesSeen(false, bytes);
-  std::vector<Reading> readings;
-  stream_.parser->add({bytes.constData(), static_cast<std::size_t>(bytes.size())}, readings);
-  noise_since_reading_ = readings.empty();
-  if (stream_.parser->answers() != answers_) askAgain(readings.empty() ? stream_.ask_gap_ms : 0);
-  if (readings.empty()) return;
+  const double arrival_s = now_s();
+  seen(false, bytes, arrival_s);
+  const auto batch = reader_->read({bytes.constData(), static_cast<std::size_t>(bytes.size())}, arrival_s);
+  const StreamPlan& plan = reader_->plan();
+  noise_since_reading_ = batch.samples.empty();
+  if (plan.parser->answers() != answers_) askAgain(batch.samples.empty() ? plan.ask_gap_ms : 0);
+  if (batch.samples.empty()) return;
   heard_since_tick_ = true;
   if (!running_) running();
-  const double arrival_s = now_s();
-  std::map<int, std::size_t> left;
-  for (const Reading& reading : readings) ++left[reading.sample.sensor];
-  std::vector<Sample> samples;
-  samples.reserve(readings.size());
-  for (Reading& reading : readings) {
-    Sample sample = stamped(reading, arrival_s, --left[reading.sample.sensor]);
-    if (stream_.watches_mirrors) hemisphere_.check(sample);
-    noteStatus(sample);
-    samples.push_back(std::move(sample));
-  }
-  emit samplesReceived(samples);
+  for (const QString& remark : batch.remarks) emit stateChanged(DeviceState::kRunning, remark);
+  emit samplesReceived(batch.samples);
 }
 
 void LineDevice::askAgain(int gap_ms) {
-  answers_ = stream_.parser->answers();
+  answers_ = reader_->plan().parser->answers();
   if (gap_ms > 0) return gap_.start(gap_ms);
-  say(stream_.ask_again);
-}
-
-Sample LineDevice::stamped(Reading& reading, double arrival_s, std::size_t later_in_bunch) {
-  Sample sample = std::move(reading.sample);
-  if (reading.unit_s) {
-    sample.time_s = unit_clock_.stamp(arrival_s, *reading.unit_s);
-    if (unit_clock_.jumped()) noteJump();
-  } else {
-    SampleClock& clock = clocks_.try_emplace(sample.sensor, 1.0 / identity_->rate_hz).first->second;
-    sample.time_s = clock.stamp(arrival_s, later_in_bunch);
-  }
-  return sample;
+  say(reader_->plan().ask_again);
 }
 
 void LineDevice::running() {
   running_ = true;
-  emit stateChanged(DeviceState::kRunning, summary());
+  const QString text = reader_->summary();
+  emit stateChanged(DeviceState::kRunning, text);
 }
 
-QString LineDevice::summary() const {
+QString LineDevice::summary(const QString& part_name) const {
   const auto& stations = identity_->stations;
-  const QString part = QString(stream_.part).toLower();
+  const QString part = part_name.toLower();
   QString text = QString("%1, %2 at %3 Hz")
                      .arg(identity_->title, stations.size() == 1 ? QString("%1 %2").arg(part).arg(stations.front())
                                                                  : QString("%1 %2s").arg(stations.size()).arg(part))
@@ -157,27 +152,12 @@ QString LineDevice::summary() const {
   return text;
 }
 
-void LineDevice::noteStatus(const Sample& sample) {
-  std::string& last = last_status_[sample.sensor];
-  if (last == sample.status) return;
-  last = sample.status;
-  emit stateChanged(DeviceState::kRunning, last.empty() ? summary()
-                                                        : QString("%1 %2: %3")
-                                                              .arg(stream_.part)
-                                                              .arg(sample.sensor + 1)
-                                                              .arg(QString::fromStdString(stream_.meaning(last))));
-}
-
-void LineDevice::noteJump() {
-  emit stateChanged(DeviceState::kRunning,
-                    QString("%1; its clock jumped by %2 s").arg(summary()).arg(unit_clock_.jump_s(), 0, 'f', 2));
-}
-
 void LineDevice::watch() {
-  if (!stream_.parser) return;
+  if (!reader_) return;
   quiet_ticks_ = std::exchange(heard_since_tick_, false) ? 0 : quiet_ticks_ + 1;
   // An answer was lost on the line: who only sends when asked would be silent for ever.
-  if (!stream_.ask_again.empty() && answers_ == answers_at_tick_) say(stream_.ask_again);
+  const std::string& ask_again = reader_->plan().ask_again;
+  if (!ask_again.empty() && answers_ == answers_at_tick_) say(ask_again);
   answers_at_tick_ = answers_;
   const int limit_ms = running_ ? setup_.timings.silence_ms : setup_.timings.lock_ms;
   if (quiet_ticks_ * kWatch_ms < limit_ms) return;
@@ -204,6 +184,7 @@ void LineDevice::failWith(const QString& text) {
 }
 
 void LineDevice::closeLine() {
+  trace_.endStream();
   watch_.stop();
   gap_.stop();
   running_ = false;
@@ -211,7 +192,7 @@ void LineDevice::closeLine() {
   retire(this, startup_);
   if (line_) line_->close();
   retire(this, line_);
-  stream_.parser.reset();
+  reader_.reset();
 }
 
 void LineDevice::stop() {
@@ -220,6 +201,7 @@ void LineDevice::stop() {
     return;
   }
   if (farewell_) return;
+  trace_.endStream();
   if (!line_->isOpen()) {
     closeLine();
     emit stateChanged(DeviceState::kClosed, "Closed");
@@ -231,7 +213,8 @@ void LineDevice::stop() {
   retire(this, startup_);
   disconnect(line_.get(), &QIODevice::readyRead, this, nullptr);
   farewell_ = std::make_unique<LineExchange>(*line_);
-  connect(farewell_.get(), &LineExchange::bytesSeen, this, &LineDevice::bytesSeen);
+  connect(farewell_.get(), &LineExchange::bytesSeen, this,
+          [this](bool sent, const QByteArray& bytes) { seen(sent, bytes, now_s()); });
   const auto closed = [this](const std::string&) {
     closeLine();
     emit stateChanged(DeviceState::kClosed, "Closed");

@@ -3,13 +3,12 @@
 #include <QElapsedTimer>
 #include <QTimer>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "acquisition/devices/line_address.h"
-#include "acquisition/devices/sample_clock.h"
+#include "acquisition/devices/stream_reader.h"
 #include "acquisition/devices/tracker_device.h"
 #include "acquisition/devices/tracker_startup.h"
 #include "acquisition/transports/transport.h"
@@ -18,7 +17,7 @@ namespace fieldtrue::acquisition {
 
 /// A tracker on any line: opens it, has the tracker set up, turns its bytes into samples with times, watches that they
 /// keep coming and that they are not mirrored, and takes leave. What differs from tracker to tracker is its startup.
-/// Sensor n of its samples is station n + 1; times count from start().
+/// Sensor n of its samples is station n + 1; times count from the first start(). Its last bytes are kept.
 class LineDevice : public TrackerDevice {
   Q_OBJECT
  public:
@@ -33,22 +32,21 @@ class LineDevice : public TrackerDevice {
   void start() override;
   void stop() override;
   TableMetadata describe() const override;
+  std::optional<Trace> trace() const override;
 
  private:
   void beginStartup();
   void startupFinished();
   void readReady();
   void askAgain(int gap_ms);
-  Sample stamped(Reading& reading, double arrival_s, std::size_t later_in_bunch);
   void watch();
   void running();
-  void noteStatus(const Sample& sample);
-  void noteJump();
+  void seen(bool sent, const QByteArray& bytes, double at_s);
   void failWith(const QString& text);
   void closeLine();
   void say(const std::string& bytes);
   double now_s() const;
-  QString summary() const;
+  QString summary(const QString& part_name) const;
 
   LineSetup setup_;
   StartupFactory make_startup_;
@@ -58,12 +56,9 @@ class LineDevice : public TrackerDevice {
   std::unique_ptr<TrackerStartup> startup_;
   std::unique_ptr<LineExchange> farewell_;
   std::optional<TrackerIdentity> identity_;
-  StreamPlan stream_;
-  std::string end_;                    ///< What ends its stream.
-  std::map<int, SampleClock> clocks_;  ///< By sensor, where the tracker has no clock of its own.
-  UnitClock unit_clock_;
-  HemisphereWatch hemisphere_;
-  std::map<int, std::string> last_status_;  ///< By sensor.
+  std::unique_ptr<StreamReader> reader_;
+  LineTrace trace_;
+  std::string end_;  ///< What ends its stream.
   QElapsedTimer clock_;
   QTimer watch_;
   QTimer gap_;  ///< Until it is asked again.

@@ -7,6 +7,7 @@
 
 #include "acquisition/protocols/plain_number.h"
 #include "calib/core/declare.h"
+#include "calib/core/file_io.h"
 #include "calib/core/trimmed.h"
 
 namespace fieldtrue::acquisition {
@@ -393,14 +394,27 @@ std::map<int, int> NdiStartup::sensors() const {
 }
 
 StreamPlan NdiStartup::stream() const {
-  NdiStreamSettings settings;
-  settings.binary = binary_;
-  settings.sensors = sensors();
-  settings.frame_hz = identity_.rate_hz;
-  settings.gate = ndi_.gate;
+  return madeStream(ndiStream({{"reply", binary_ ? "bx" : "tx"},
+                               {"sensors", sensorsText(sensors())},
+                               {"frame_hz", formatNumber(identity_.rate_hz)},
+                               {"max_error_mm", formatNumber(ndi_.gate.most_error_mm)},
+                               {"volume", ndi_.gate.inside_volume ? "inside" : "any"}}));
+}
+
+Result<StreamPlan> ndiStream(const StreamSettings& settings) {
+  NdiStreamSettings stream;
+  FT_TRY(const std::string reply, streamText(settings, "reply"));
+  stream.binary = reply != "tx";
+  FT_TRY(stream.sensors, streamSensors(settings));
+  FT_TRY(stream.frame_hz, streamNumber(settings, "frame_hz"));
+  if (stream.frame_hz <= 0.0) return fail(ErrorCode::kBadInput, "its setting frame_hz must be above 0");
+  FT_TRY(stream.gate.most_error_mm, streamNumber(settings, "max_error_mm"));
+  FT_TRY(const std::string volume, streamText(settings, "volume"));
+  stream.gate.inside_volume = volume != "any";
   StreamPlan plan;
-  plan.parser = std::make_unique<NdiParser>(std::move(settings));
-  plan.ask_again = ndiCommand(binary_ ? "BX" : "TX", "0001");
+  plan.ask_again = ndiCommand(stream.binary ? "BX" : "TX", "0001");
+  plan.parser = std::make_unique<NdiParser>(std::move(stream));
+  plan.settings = settings;
   plan.ask_gap_ms = kAskGap_ms;
   plan.part = "Tool";
   plan.meaning = ndiSampleMeaning;

@@ -51,6 +51,9 @@ struct NdiSetup : LineSetup {
 /// How an NDI system is found on a line.
 TrackerProbe ndiProbe();
 
+/// Its stream, from its tools and how they are asked for. @error kBadInput
+Result<StreamPlan> ndiStream(const StreamSettings& settings);
+
 /// The settings of an NDI system as data, for registry, forms and command line.
 std::vector<Setting> ndiSettings();
 /// An NDI system at an address. @error kBadInput, kIo for a definition file

@@ -52,6 +52,16 @@ std::string lineAddressOf(const std::string& address) {
   return std::string(kTcp) + line + settings;
 }
 
+StreamPlan streamOfSources(std::shared_ptr<std::vector<IgtlSource>> sources, bool stamped, bool takes_newcomers,
+                           StreamSettings settings) {
+  StreamPlan plan;
+  plan.parser = std::make_unique<IgtlReadings>(std::move(sources), stamped, takes_newcomers);
+  plan.settings = std::move(settings);
+  plan.part = "Sensor";
+  plan.meaning = igtlStatusMeaning;
+  return plan;
+}
+
 }  // namespace
 
 IgtlSetup::IgtlSetup() {
@@ -175,11 +185,36 @@ void IgtlStartup::choose() {
 }
 
 StreamPlan IgtlStartup::stream() const {
-  StreamPlan plan;
-  plan.parser = std::make_unique<IgtlReadings>(igtl_.sources, stamped_, igtl_.devices.empty());
-  plan.part = "Sensor";
-  plan.meaning = igtlStatusMeaning;
-  return plan;
+  StreamSettings settings = {{"stamped", stamped_ ? "yes" : "no"},
+                             {"takes_newcomers", igtl_.devices.empty() ? "yes" : "no"}};
+  for (std::size_t i = 0; i < igtl_.sources->size(); ++i) {
+    const IgtlSource& source = (*igtl_.sources)[i];
+    const std::string key = "sensor_" + std::to_string(i + 1);
+    settings[key] = source.name;
+    settings[key + "_type"] = nameOf(source.type);
+    settings[key + "_device"] = source.message_device;
+  }
+  return streamOfSources(igtl_.sources, stamped_, igtl_.devices.empty(), std::move(settings));
+}
+
+Result<StreamPlan> openigtlinkStream(const StreamSettings& settings) {
+  FT_TRY(const bool stamped, streamFlag(settings, "stamped"));
+  FT_TRY(const bool takes_newcomers, streamFlag(settings, "takes_newcomers"));
+  auto sources = std::make_shared<std::vector<IgtlSource>>();
+  for (std::size_t number = 1;; ++number) {
+    const std::string key = "sensor_" + std::to_string(number);
+    if (!settings.contains(key)) break;
+    IgtlSource source;
+    source.name = settings.at(key);
+    FT_TRY(const std::string type, streamText(settings, key + "_type"));
+    const auto known = igtlPoseType(type);
+    if (!known)
+      return fail(ErrorCode::kBadInput, "its setting " + key + "_type is '" + type + "', which holds no poses");
+    source.type = *known;
+    FT_TRY(source.message_device, streamText(settings, key + "_device"));
+    sources->push_back(std::move(source));
+  }
+  return streamOfSources(std::move(sources), stamped, takes_newcomers, settings);
 }
 
 }  // namespace fieldtrue::acquisition

@@ -26,6 +26,8 @@ struct IgtlSetup : LineSetup {
 std::vector<Setting> openigtlinkSettings();
 /// How a server is found: by what it sends, or by its answer to a question for its state.
 TrackerProbe openigtlinkProbe();
+/// Its stream, from the sensors and how they are sent. @error kBadInput
+Result<StreamPlan> openigtlinkStream(const StreamSettings& settings);
 /// @param address HOST, HOST:PORT or tcp:HOST:PORT, then settings; the port is 18944 where none is given. @error
 /// kBadInput
 Result<std::unique_ptr<TrackerDevice>> makeOpenigtlink(const std::string& address, const simulation::Scene& scene);

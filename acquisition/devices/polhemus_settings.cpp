@@ -20,6 +20,11 @@ std::vector<Setting> polhemusSettings(int most_stations) {
   };
 }
 
+const std::vector<int>& polhemusRates() {
+  static const std::vector<int> kRates = {115200, 57600, 38400, 19200, 9600, 4800, 2400};
+  return kRates;
+}
+
 std::array<double, 4> polhemusFilter(const std::string& name) {
   static const std::map<std::string, std::array<double, 4>> kFilters = {{"off", {0.0, 1.0, 0.0, 0.0}},
                                                                         {"low", {0.2, 0.2, 0.8, 0.8}},

@@ -23,6 +23,9 @@ Result<void> applyPolhemusSettings(const Settings& settings, int most_stations, 
   return {};
 }
 
+/// Rates of their serial lines [baud], the most usual first.
+const std::vector<int>& polhemusRates();
+
 /// Sensitivity, low and high bound and factor of a filter by its name: the maker's macros; 0, 1, 0, 0 is off.
 std::array<double, 4> polhemusFilter(const std::string& name);
 

@@ -2,19 +2,23 @@
 // 1. acquisition/protocols/<id>: commands to bytes, and a StreamParser that turns bytes into readings; no I/O.
 // 2. acquisition/emulators/<id>: the device side over EmulatedUnit, so that it can be tested without hardware.
 // 3. acquisition/devices/<id>_device: its settings, and the TrackerStartup that brings it to a stream; LineDevice has
-//    the line, the clock, the watching and the farewell.
+//    the line, the clock, the watching and the farewell. Its parser is made from text, so that a trace can make it
+//    again.
 // 4. One row below, with the probe by which it is found on a line. Menus, command line and the contract test read the
 // table.
 #include "acquisition/devices/registry.h"
 
 #include "acquisition/devices/fastrak_device.h"
 #include "acquisition/devices/flock_device.h"
+#include "acquisition/devices/isotrak_device.h"
 #include "acquisition/devices/liberty_device.h"
 #include "acquisition/devices/ndi_device.h"
 #include "acquisition/devices/openigtlink_device.h"
 #include "acquisition/devices/simulated_device.h"
+#include "acquisition/devices/trace_device.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/emulators/flock_emulator.h"
+#include "acquisition/emulators/isotrak_emulator.h"
 #include "acquisition/emulators/liberty_emulator.h"
 #include "acquisition/emulators/ndi_emulator.h"
 #include "acquisition/emulators/openigtlink_emulator.h"
@@ -46,7 +50,17 @@ std::span<const DeviceKind> deviceKinds() {
        .settings = fastrakSettings(),
        .probe = fastrakProbe(),
        .make = makeFastrak,
+       .stream = fastrakStream,
        .emulate = makeFastrakEmulator},
+      {.id = "isotrak",
+       .label = "Polhemus Isotrak II",
+       .address_help = "the line, then settings: isotrak:/dev/ttyUSB0@19200, isotrak:tcp:localhost:4000,stations=1+2",
+       .source = "Isotrak II manual OPM01PI021, 2001 edition; VRPN's driver",
+       .settings = isotrakSettings(),
+       .probe = isotrakProbe(),
+       .make = makeIsotrak,
+       .stream = isotrakStream,
+       .emulate = makeIsotrakEmulator},
       {.id = "liberty",
        .label = "Polhemus Liberty",
        .address_help = "the line, then settings: liberty:/dev/ttyUSB0@115200, liberty:tcp:localhost:4000,stations=1+2",
@@ -54,6 +68,7 @@ std::span<const DeviceKind> deviceKinds() {
        .settings = libertySettings(),
        .probe = libertyProbe(),
        .make = makeLiberty,
+       .stream = libertyStream,
        .emulate = makeLibertyEmulator},
       {.id = "patriot",
        .label = "Polhemus Patriot",
@@ -62,6 +77,7 @@ std::span<const DeviceKind> deviceKinds() {
        .settings = patriotSettings(),
        .probe = patriotProbe(),
        .make = makePatriot,
+       .stream = patriotStream,
        .emulate = makePatriotEmulator},
       {.id = "flock",
        .label = "Ascension Flock of Birds",
@@ -70,6 +86,7 @@ std::span<const DeviceKind> deviceKinds() {
        .settings = flockSettings(),
        .probe = flockProbe(),
        .make = makeFlock,
+       .stream = flockStream,
        .emulate = makeFlockEmulator},
       {.id = "ndi",
        .label = "NDI Aurora, Polaris, Vega",
@@ -78,6 +95,7 @@ std::span<const DeviceKind> deviceKinds() {
        .settings = ndiSettings(),
        .probe = ndiProbe(),
        .make = makeNdi,
+       .stream = ndiStream,
        .emulate = makeNdiEmulator},
       {.id = "openigtlink",
        .label = "OpenIGTLink server",
@@ -87,7 +105,14 @@ std::span<const DeviceKind> deviceKinds() {
        .usual_addresses = {"localhost:18944"},
        .probe = openigtlinkProbe(),
        .make = makeOpenigtlink,
-       .emulate = makeIgtlEmulator}};
+       .stream = openigtlinkStream,
+       .emulate = makeIgtlEmulator},
+      {.id = "trace",
+       .label = "A recording, played again",
+       .address_help = "the file, then settings: trace:fault.trace.zip, trace:room.samples.csv,rate=4,loop=1",
+       .source = "What acquire --trace wrote, or a sample table",
+       .settings = traceSettings(),
+       .make = makeTraceDevice}};
   return kKinds;
 }
 

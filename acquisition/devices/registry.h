@@ -9,6 +9,7 @@
 
 #include "acquisition/devices/tracker_device.h"
 #include "acquisition/devices/tracker_probe.h"
+#include "acquisition/devices/tracker_startup.h"
 #include "acquisition/emulators/emulation.h"
 #include "acquisition/emulators/emulator_runner.h"
 #include "calib/core/error.h"
@@ -39,6 +40,8 @@ struct DeviceKind {
   std::vector<KnownUsb> usb = {};  ///< Adapters and sockets that are its own: it is asked first there.
   /// @param address after the first colon; @param scene only used by simulated devices
   Result<std::unique_ptr<TrackerDevice>> (*make)(const std::string& address, const simulation::Scene& scene) = nullptr;
+  /// Makes its stream's parser again from what was kept beside a line's bytes; null where it has no line.
+  Result<StreamPlan> (*stream)(const StreamSettings& settings) = nullptr;
   /// Its other side, on a pty or a TCP port, not yet started; null where nothing is emulated.
   Result<std::unique_ptr<EmulatorRunner>> (*emulate)(const Emulation& emulation) = nullptr;
 };

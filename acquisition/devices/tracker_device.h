@@ -4,8 +4,10 @@
 #include <QMetaType>
 #include <QObject>
 #include <QString>
+#include <optional>
 #include <vector>
 
+#include "acquisition/devices/line_trace.h"
 #include "calib/core/calibration_table.h"
 
 namespace fieldtrue::acquisition {
@@ -31,11 +33,14 @@ class TrackerDevice : public QObject {
   /// What the device said of itself (identity, units, filter, compensation), for the session's metadata.
   virtual TableMetadata describe() const { return {}; }
 
+  /// The last bytes that went over its line, from whatever was connected since it was made; none where it has no line.
+  virtual std::optional<Trace> trace() const { return std::nullopt; }
+
  signals:
   /// @param text what happened in words; for kFailed what was seen and what to do
   void stateChanged(fieldtrue::acquisition::DeviceState state, const QString& text);
   void samplesReceived(const std::vector<fieldtrue::Sample>& samples);
-  /// Raw bytes as they went by, for the trace log.
+  /// Raw bytes as they went by.
   void bytesSeen(bool sent, const QByteArray& bytes);
 };
 

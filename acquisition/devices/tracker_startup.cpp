@@ -25,6 +25,11 @@ std::string firstBytes(const std::string& bytes) {
 
 }  // namespace
 
+StreamPlan madeStream(Result<StreamPlan> plan) {
+  FT_CHECK(plan.has_value());
+  return std::move(*plan);
+}
+
 TrackerStartup::TrackerStartup(Transport& line, LineSetup setup, QObject* parent)
     : QObject(parent), line_(line), exchange_(line, this), setup_(std::move(setup)) {
   identity_.baud = setup_.baud;
@@ -117,7 +122,11 @@ void TrackerStartup::perform(std::vector<LineStep> steps, std::function<void()> 
 }
 
 void TrackerStartup::step(std::size_t next) {
-  if (next >= steps_.size()) return after_steps_();
+  if (next >= steps_.size()) {
+    // A copy: what it calls may begin other steps.
+    const auto then = after_steps_;
+    return then();
+  }
   const LineStep& now = steps_[next];
   const auto go_on = [this, next](const std::string& heard) {
     // A copy: what it calls may begin other steps.
@@ -154,6 +163,11 @@ void TrackerStartup::failNothingPluggedIn(const std::vector<int>& wanted) {
   emit failed(QString("The %1 on %2 answers but has no receiver plugged in%3; plug one into station 1")
                   .arg(name(), where(),
                        wanted.empty() ? QString() : " at station " + QString::fromStdString(stationsText(wanted))));
+}
+
+void TrackerStartup::failIsAnother(const QString& name, const QString& id) {
+  const QString line = QString::fromStdString(setup_.device_text).section(':', 1);
+  emit failed(QString("The tracker on %1 is %2: write %3:%4").arg(where(), name, id, line));
 }
 
 void TrackerStartup::failNotTaken(const QString& setting) {

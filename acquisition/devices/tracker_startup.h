@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "acquisition/devices/line_exchange.h"
+#include "acquisition/devices/stream_settings.h"
 #include "acquisition/protocols/sample_status.h"
 #include "acquisition/protocols/stream_parser.h"
 
@@ -59,6 +60,7 @@ struct TrackerIdentity {
 /// How a tracker that is set up streams.
 struct StreamPlan {
   std::unique_ptr<StreamParser> parser;
+  StreamSettings settings;       ///< What the parser was made from.
   std::string begin;             ///< Said once the parser listens.
   std::string ask_again;         ///< Said after every answer, for trackers that do not send by themselves; else empty.
   int ask_gap_ms = 0;            ///< Waited before asking again where an answer said nothing new.
@@ -67,6 +69,9 @@ struct StreamPlan {
   /// The meaning of a sample's status in words.
   std::string (*meaning)(const std::string& status) = commonStatusMeaning;
 };
+
+/// A plan that was made from settings of the caller's own, which must be right (FT_CHECK).
+StreamPlan madeStream(Result<StreamPlan> plan);
 
 /// How a tracker is found on a line, whatever state it is in.
 struct Greeting {
@@ -123,6 +128,8 @@ class TrackerStartup : public QObject {
   QString where() const;
   void failNothingPluggedIn(const std::vector<int>& wanted);
   void failNotTaken(const QString& setting);
+  /// Another kind of tracker answered. @param name with its article @param id of its row
+  void failIsAnother(const QString& name, const QString& id);
 
   Transport& line_;
   LineExchange exchange_;

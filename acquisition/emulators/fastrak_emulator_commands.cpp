@@ -58,7 +58,7 @@ std::optional<std::vector<double>> filterMacro(double level) {
 FastrakEmulatorCore::Setup FastrakEmulatorCore::factorySetup() const {
   Setup setup;
   setup.identity = options_.identity;
-  for (int station = 1; station <= kFastrakStations; ++station) {
+  for (int station = 1; station <= stations_; ++station) {
     const auto index = static_cast<std::size_t>(station - 1);
     setup.active[index] = plugged(station - 1);
     setup.items[index] = {2, 4, 1};
@@ -120,7 +120,8 @@ void FastrakEmulatorCore::obey(const FastrakCommand& command, std::vector<Emulat
   constexpr std::size_t kLongest = 254;
   if (command.text.size() >= kLongest) return refuse(command, kBufferFull, out);
   const auto handler = handlers().find(command.letter);
-  if (handler == handlers().end()) return refuse(command, kUnknown, out);
+  const bool lacks = letters_it_lacks_.find(command.letter) != std::string::npos;
+  if (lacks || handler == handlers().end()) return refuse(command, kUnknown, out);
   (this->*handler->second)(command, out);
 }
 
@@ -132,13 +133,13 @@ void FastrakEmulatorCore::refuse(const FastrakCommand& command, int code, std::v
 
 std::optional<int> FastrakEmulatorCore::stationOf(const FastrakCommand& command,
                                                   std::vector<EmulatedOutput>& out) const {
-  if (command.station && *command.station >= 1 && *command.station <= kFastrakStations) return command.station;
+  if (command.station && *command.station >= 1 && *command.station <= stations_) return command.station;
   refuse(command, command.station ? kOutOfRange : command.text.empty() ? kMissing : kNotNumeric, out);
   return std::nullopt;
 }
 
-void FastrakEmulatorCore::readBack(char letter, int station, const std::string& text,
-                                   std::vector<EmulatedOutput>& out) const {
+void FastrakEmulatorCore::answerReadBack(char letter, int station, const std::string& text,
+                                         std::vector<EmulatedOutput>& out) const {
   out.push_back({std::string{'2', static_cast<char>('0' + station), letter} + text + "\r\n", false});
 }
 
@@ -171,7 +172,7 @@ void FastrakEmulatorCore::sendPoint(const FastrakCommand&, std::vector<EmulatedO
 }
 
 void FastrakEmulatorCore::sendStatus(const FastrakCommand&, std::vector<EmulatedOutput>& out) {
-  out.push_back({encodeStatus(status()), false});
+  out.push_back({statusRecord(), false});
 }
 
 void FastrakEmulatorCore::setContinuous(const FastrakCommand& command, std::vector<EmulatedOutput>&) {
@@ -187,18 +188,33 @@ void FastrakEmulatorCore::setOutputList(const FastrakCommand& command, std::vect
   if (command.fields.empty()) {
     std::string text;
     for (const int item : items) text += (item < 10 ? " " : "") + std::to_string(item);
-    return readBack('O', *station, text, out);
+    return answerReadBack('O', *station, text, out);
   }
-  std::vector<int> wanted = items;
-  wanted.resize(std::max(command.fields.size(), command.fields.front().empty() ? items.size() : 0));
-  for (std::size_t i = 0; i < command.fields.size(); ++i) {
-    if (command.fields[i].empty()) continue;
-    const auto number = fieldNumber(command.fields[i]);
-    if (!number) return refuse(command, kNotNumeric, out);
-    wanted[i] = static_cast<int>(*number);
+  const auto wanted = changedList(items, command.fields, command, out);
+  if (!wanted) return;
+  if (!fastrakLayout(*wanted, FastrakFormat::kBinary)) return refuse(command, kOutOfRange, out);
+  items = *wanted;
+}
+
+std::optional<std::vector<int>> FastrakEmulatorCore::changedList(std::vector<int> items,
+                                                                 const std::vector<std::string>& fields,
+                                                                 const FastrakCommand& command,
+                                                                 std::vector<EmulatedOutput>& out) const {
+  items.resize(std::max(fields.size(), fields.front().empty() ? items.size() : 0));
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    if (fields[i].empty()) continue;
+    const auto number = fieldNumber(fields[i]);
+    if (!number) {
+      refuse(command, kNotNumeric, out);
+      return std::nullopt;
+    }
+    items[i] = static_cast<int>(*number);
   }
-  if (!fastrakLayout(wanted, FastrakFormat::kBinary)) return refuse(command, kOutOfRange, out);
-  items = wanted;
+  return items;
+}
+
+void FastrakEmulatorCore::refuseAsOutOfRange(const FastrakCommand& command, std::vector<EmulatedOutput>& out) const {
+  refuse(command, kOutOfRange, out);
 }
 
 void FastrakEmulatorCore::setActive(const FastrakCommand& command, std::vector<EmulatedOutput>& out) {
@@ -206,8 +222,8 @@ void FastrakEmulatorCore::setActive(const FastrakCommand& command, std::vector<E
   if (!station) return;
   if (command.fields.empty()) {
     std::string text;
-    for (const bool on : setup_.active) text += on ? '1' : '0';
-    return readBack('l', *station, text, out);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(stations_); ++i) text += setup_.active[i] ? '1' : '0';
+    return answerReadBack('l', *station, text, out);
   }
   const std::string& value = command.fields.front();
   if (value != "0" && value != "1") return refuse(command, kOutOfRange, out);
@@ -241,7 +257,7 @@ void FastrakEmulatorCore::setNumbers(const FastrakCommand& command, std::vector<
   if (command.fields.empty()) {
     std::string text;
     for (const double value : values) text += column(value, row.decimals);
-    return readBack(row.letter, std::max(1, *station), text, out);
+    return answerReadBack(row.letter, std::max(1, *station), text, out);
   }
   if (command.fields.size() > row.defaults.size()) return refuse(command, kOutOfRange, out);
   std::vector<double> wanted = values;

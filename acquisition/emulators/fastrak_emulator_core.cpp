@@ -21,7 +21,9 @@ bool within(const Eigen::Vector3d& v, const std::vector<double>& max_then_min) {
 }  // namespace
 
 FastrakEmulatorCore::FastrakEmulatorCore(std::unique_ptr<PoseSource> source, const FastrakEmulatorOptions& options)
-    : EmulatedUnit(std::move(source), options) {
+    : EmulatedUnit(std::move(source), options),
+      stations_(options.stations),
+      letters_it_lacks_(options.letters_it_lacks) {
   setup_ = saved_ = factorySetup();
   setup_.continuous = options_.faults.already_streaming;
 }
@@ -53,7 +55,7 @@ void FastrakEmulatorCore::hear(std::string_view bytes, std::vector<EmulatedOutpu
 
 std::vector<int> FastrakEmulatorCore::activeSensors() const {
   std::vector<int> sensors;
-  for (int i = 0; i < kFastrakStations; ++i) {
+  for (int i = 0; i < stations_; ++i) {
     if (setup_.active[static_cast<std::size_t>(i)]) sensors.push_back(i);
   }
   return sensors;
@@ -86,6 +88,10 @@ FastrakLayout FastrakEmulatorCore::layout(int station) const {
   return *layout;
 }
 
+std::string FastrakEmulatorCore::written(const FastrakRecord& record) const {
+  return encodeRecord(record, layout(record.station), setup_.unit);
+}
+
 void FastrakEmulatorCore::send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out) {
   for (const Sample& read : samples) {
     const int station = read.sensor + 1;
@@ -100,7 +106,7 @@ void FastrakEmulatorCore::send(const std::vector<Sample>& samples, bool every, s
     FastrakRecord sent = recordOfPose(station, errorOf(sample, station, pose), pose);
     sent.relative_m = pose.position_m - memory.last_position_m.value_or(pose.position_m);
     memory.last_position_m = memory.last_sent_m = pose.position_m;
-    record(encodeRecord(sent, layout(station), setup_.unit), out);
+    record(written(sent), out);
   }
 }
 

@@ -17,6 +17,8 @@ struct FastrakEmulatorOptions : EmulatedUnitOptions {
     version = "G1.02";
     identity = "Fieldtrue Fastrak emulator";
   }
+  int stations = kFastrakStations;
+  std::string letters_it_lacks;  ///< Commands of a Fastrak's that it does not know.
 };
 
 /// A Fastrak without its line: interprets the commands of the manual and keeps their state. Hemisphere, alignment,
@@ -34,11 +36,7 @@ class FastrakEmulatorCore : public EmulatedUnit {
   /// Numbers of a setting as last set, e.g. 'H' of station 2; station 0 for settings of the whole tracker ('x', 'v').
   const std::vector<double>& numbers(char letter, int station) const;
 
- private:
-  void hear(std::string_view bytes, std::vector<EmulatedOutput>& out) override;
-  std::vector<int> activeSensors() const override;
-  void send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out) override;
-
+ protected:
   struct Setup {
     FastrakFormat format = FastrakFormat::kAscii;
     FastrakUnit unit = FastrakUnit::kInch;
@@ -51,6 +49,23 @@ class FastrakEmulatorCore : public EmulatedUnit {
     std::array<Pose, kFastrakStations> tracker_from_aligned;
     std::string identity;
   };
+  /// What differs between trackers of this family.
+  virtual std::string statusRecord() const { return encodeStatus(status()); }
+  virtual std::string written(const FastrakRecord& record) const;
+  virtual void setOutputList(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
+  /// A list with what a command changes in it; none where that was refused.
+  std::optional<std::vector<int>> changedList(std::vector<int> items, const std::vector<std::string>& fields,
+                                              const FastrakCommand& command, std::vector<EmulatedOutput>& out) const;
+  void refuseAsOutOfRange(const FastrakCommand& command, std::vector<EmulatedOutput>& out) const;
+  void answerReadBack(char letter, int station, const std::string& text, std::vector<EmulatedOutput>& out) const;
+
+  Setup setup_, saved_;
+
+ private:
+  void hear(std::string_view bytes, std::vector<EmulatedOutput>& out) override;
+  std::vector<int> activeSensors() const override;
+  void send(const std::vector<Sample>& samples, bool every, std::vector<EmulatedOutput>& out) override;
+
   struct Memory {
     std::optional<Eigen::Vector3d> last_position_m;
     std::optional<Eigen::Vector3d> last_sent_m;
@@ -62,13 +77,11 @@ class FastrakEmulatorCore : public EmulatedUnit {
   void obey(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
   void refuse(const FastrakCommand& command, int code, std::vector<EmulatedOutput>& out) const;
   std::optional<int> stationOf(const FastrakCommand& command, std::vector<EmulatedOutput>& out) const;
-  void readBack(char letter, int station, const std::string& text, std::vector<EmulatedOutput>& out) const;
 
   void setFlag(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
   void sendPoint(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
   void sendStatus(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
   void setContinuous(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
-  void setOutputList(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
   void setActive(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
   void setBoresight(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
   void resetAlignment(const FastrakCommand& command, std::vector<EmulatedOutput>& out);
@@ -84,7 +97,8 @@ class FastrakEmulatorCore : public EmulatedUnit {
   char errorOf(const Sample& sample, int station, const Pose& pose) const;
   FastrakLayout layout(int station) const;
 
-  Setup setup_, saved_;
+  int stations_;
+  std::string letters_it_lacks_;
   FastrakCommandReader reader_;
   std::array<Memory, kFastrakStations> memory_;
 };

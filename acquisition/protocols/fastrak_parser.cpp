@@ -12,6 +12,7 @@ Result<FastrakParser> FastrakParser::make(const FastrakStreamSettings& settings)
   FastrakParser parser;
   parser.unit_ = settings.unit;
   parser.records_to_lock_ = settings.records_to_lock;
+  parser.stylus_in_status_ = settings.stylus_in_status;
   bool any = false;
   for (std::size_t i = 0; i < settings.items.size(); ++i) {
     if (settings.items[i].empty()) continue;
@@ -30,7 +31,8 @@ FastrakParser::Match FastrakParser::match(std::string_view bytes, FastrakRecord&
   const auto station = static_cast<std::size_t>(static_cast<unsigned char>(bytes[1])) - std::size_t{'1'};
   if (station >= active_.size() || !active_[station]) return Match::kNo;
   if (bytes.size() < 3) return Match::kMore;
-  if (!isErrorLetter(bytes[2])) return Match::kNo;
+  const bool is_stylus = stylus_in_status_ && (bytes[2] == '@' || bytes[2] == '*');
+  if (!is_stylus && !isErrorLetter(bytes[2])) return Match::kNo;
   const FastrakLayout& layout = layouts_[station];
   length = layout.bytes;
   if (bytes.size() < length) return Match::kMore;

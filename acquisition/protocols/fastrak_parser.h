@@ -15,7 +15,8 @@ struct FastrakStreamSettings {
   FastrakFormat format = FastrakFormat::kBinary;
   FastrakUnit unit = FastrakUnit::kCentimetre;
   std::array<std::vector<int>, kFastrakStations> items;  ///< Output list of each station; empty = station off.
-  int records_to_lock = 2;  ///< Good records in a row before any is believed. 1 for single polled records.
+  int records_to_lock = 2;        ///< Good records in a row before any is believed. 1 for single polled records.
+  bool stylus_in_status = false;  ///< `@` and `*`, a stylus' button, may stand in place of the error letter.
 };
 
 /// Turns the tracker's bytes, cut anywhere, into records. Bytes that do not fit are dropped one at a time until
@@ -45,6 +46,7 @@ class FastrakParser {
 
   FastrakUnit unit_ = FastrakUnit::kCentimetre;
   int records_to_lock_ = 2;
+  bool stylus_in_status_ = false;
   std::array<FastrakLayout, kFastrakStations> layouts_;
   std::array<bool, kFastrakStations> active_{};
   std::string buffer_;

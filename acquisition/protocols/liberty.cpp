@@ -180,7 +180,7 @@ std::optional<LibertyRecord> decodeLibertyRecord(const LibertyFrame& frame, std:
   const char* at = frame.payload.data();
   for (const int id : items) {
     const LibertyItem& item = *findLibertyItem(id);
-    if (std::memcmp(at, item.literal.data(), item.literal.size()) != 0) return std::nullopt;
+    if (!item.literal.empty() && std::memcmp(at, item.literal.data(), item.literal.size()) != 0) return std::nullopt;
     at += item.literal.size();
     std::array<double, 9> values{};
     for (std::size_t i = 0; i < static_cast<std::size_t>(item.values); ++i, at += 4) {
@@ -227,8 +227,7 @@ std::string encodeLibertyText(const LibertyRecord& record, std::span<const int> 
 }
 
 std::string libertyStatusMeaning(const std::string& status) {
-  if (status.size() != 1) return commonStatusMeaning(status);
-  return "the tracker reports error " + status + ", listed under error codes in its manual";
+  return status.size() == 1 ? manualErrorMeaning(status) : commonStatusMeaning(status);
 }
 
 Result<LibertyParser> LibertyParser::make(Settings settings) {

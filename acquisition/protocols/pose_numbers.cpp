@@ -86,4 +86,8 @@ std::string commonStatusMeaning(const std::string& status) {
   return status;
 }
 
+std::string manualErrorMeaning(const std::string& letter) {
+  return "the tracker reports error " + letter + ", listed under error codes in its manual";
+}
+
 }  // namespace fieldtrue::acquisition

@@ -12,5 +12,7 @@ inline constexpr const char* kStatusFlipped = "flipped";  ///< Mirrored through 
 
 /// Meaning in words of a status every tracker can have; the status itself where it is none of them.
 std::string commonStatusMeaning(const std::string& status);
+/// The same of an error letter whose meanings only the maker's manual lists.
+std::string manualErrorMeaning(const std::string& letter);
 
 }  // namespace fieldtrue::acquisition

@@ -34,6 +34,10 @@ void AcquisitionController::adoptDevice(std::unique_ptr<TrackerDevice> device, c
 
 AcquisitionStatus AcquisitionController::status() const { return impl_->status(); }
 
+std::optional<Trace> AcquisitionController::trace() const {
+  return impl_->tracker.device ? impl_->tracker.device->trace() : std::nullopt;
+}
+
 void AcquisitionController::connectDevice(const QString& device, const QString& scene_path) {
   const Result<simulation::Scene> scene =
       scene_path.isEmpty() ? simulation::Scene() : simulation::readScene(scene_path.toStdString());

@@ -89,6 +89,8 @@ class AcquisitionController : public QObject {
   void setWallClock(std::function<QDateTime()> now);
   /// The value of the last or next statusChanged, at once.
   AcquisitionStatus status() const;
+  /// The last bytes of the tracker's line; none where no tracker is connected, or it has no line.
+  std::optional<Trace> trace() const;
 
  public slots:
   /// Connects a device by its text ("simulated", "fastrak:/dev/ttyUSB0@115200"); emits statusChanged, or deviceFailed.

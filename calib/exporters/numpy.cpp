@@ -1,9 +1,6 @@
-#include <zip.h>
-
-#include <cstring>
 #include <map>
 
-#include "calib/core/file_io.h"
+#include "calib/archives/zip_archive.h"
 #include "calib/exporters/bytes.h"
 #include "calib/exporters/itk_field.h"
 #include "calib/exporters/lattice_arrays.h"
@@ -39,7 +36,7 @@ std::string vectors(const std::vector<Eigen::Vector3d>& vectors_m) {
   return bytes;
 }
 
-std::vector<std::pair<std::string, std::string>> membersOf(const LatticeField& field, const Facts& facts) {
+std::vector<ZipMember> membersOf(const LatticeField& field, const Facts& facts) {
   const LatticeArrays arrays = LatticeArrays::of(field);
   std::string shape;
   for (const int count : field.points.counts) shape += (shape.empty() ? "" : ", ") + std::to_string(count);
@@ -47,66 +44,25 @@ std::vector<std::pair<std::string, std::string>> membersOf(const LatticeField& f
   for (const Eigen::Quaterniond& q : arrays.q)
     for (const double part : {q.w(), q.x(), q.y(), q.z()}) appendDouble(turned, part);
   for (const char one : arrays.inside) inside += static_cast<char>(one != 0 ? 1 : 0);
-  std::vector<std::pair<std::string, std::string>> members;
+  std::vector<ZipMember> members;
   for (std::size_t axis = 0; axis < 3; ++axis)
-    members.emplace_back(std::string(1, "xyz"[axis]) + "_m.npy",
-                         npy("<f8", std::to_string(arrays.axes_m[axis].size()) + ",", doubles(arrays.axes_m[axis])));
-  members.emplace_back("raw_m.npy", npy("<f8", shape + ", 3", vectors(arrays.raw_m)));
-  members.emplace_back("corrected_m.npy", npy("<f8", shape + ", 3", vectors(arrays.corrected_m)));
-  members.emplace_back("q_wxyz.npy", npy("<f8", shape + ", 4", turned));
-  members.emplace_back("uncertainty_m.npy", npy("<f8", shape, doubles(arrays.uncertainty_m)));
-  members.emplace_back("inside.npy", npy("|b1", shape, inside));
+    members.push_back({std::string(1, "xyz"[axis]) + "_m.npy",
+                       npy("<f8", std::to_string(arrays.axes_m[axis].size()) + ",", doubles(arrays.axes_m[axis]))});
+  members.push_back({"raw_m.npy", npy("<f8", shape + ", 3", vectors(arrays.raw_m))});
+  members.push_back({"corrected_m.npy", npy("<f8", shape + ", 3", vectors(arrays.corrected_m))});
+  members.push_back({"q_wxyz.npy", npy("<f8", shape + ", 4", turned)});
+  members.push_back({"uncertainty_m.npy", npy("<f8", shape, doubles(arrays.uncertainty_m))});
+  members.push_back({"inside.npy", npy("|b1", shape, inside)});
   const std::string about = factLines(facts, "");
-  members.emplace_back("about.npy", npy("|S" + std::to_string(about.size()), "", about));
+  // What the file is can be read without unpacking it.
+  members.push_back({"about.npy", npy("|S" + std::to_string(about.size()), "", about), false});
   return members;
-}
-
-bool fillArchive(const std::filesystem::path& path, const std::vector<std::pair<std::string, std::string>>& members) {
-  int status = 0;
-  zip_t* archive = zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &status);
-  if (archive == nullptr) return false;
-  bool good = true;
-  for (const auto& [name, content] : members) {
-    zip_source_t* source = zip_source_buffer(archive, content.data(), content.size(), 0);
-    const zip_int64_t at = source == nullptr ? -1 : zip_file_add(archive, name.c_str(), source, ZIP_FL_ENC_UTF_8);
-    if (at < 0 && source != nullptr) zip_source_free(source);
-    // A time of their own would make every file another one.
-    constexpr zip_uint16_t kNoon = 0x6000, kFirstOf1980 = 0x0021;
-    // What the file is can be read without unpacking it.
-    const zip_int32_t packing = name == "about.npy" ? ZIP_CM_STORE : ZIP_CM_DEFLATE;
-    good = good && at >= 0 && zip_set_file_compression(archive, static_cast<zip_uint64_t>(at), packing, 0) == 0;
-    good = good && zip_file_set_dostime(archive, static_cast<zip_uint64_t>(at), kNoon, kFirstOf1980, 0) == 0;
-  }
-  if (!good) {
-    zip_discard(archive);
-    return false;
-  }
-  if (zip_close(archive) == 0) return true;
-  zip_discard(archive);
-  return false;
 }
 
 Result<void> writeNpz(const LatticeField& field, const Facts& facts, const std::filesystem::path& path) {
   Facts all = facts;
   all.emplace_back("use", "scipy.interpolate.RegularGridInterpolator((x_m, y_m, z_m), corrected_m)");
-  const auto members = membersOf(field, all);
-  return replaceFileAtomically(path, [&](const std::filesystem::path& beside) -> Result<void> {
-    if (!fillArchive(beside, members))
-      return fail(ErrorCode::kIo,
-                  "Cannot write " + path.string() + ": the archive could not be stored; is the disk full?");
-    return {};
-  });
-}
-
-std::string member(zip_t* archive, const char* name) {
-  zip_stat_t about;
-  if (zip_stat(archive, name, 0, &about) != 0) return {};
-  std::string content(about.size, '\0');
-  zip_file_t* file = zip_fopen(archive, name, 0);
-  if (file == nullptr) return {};
-  const zip_int64_t read = zip_fread(file, content.data(), content.size());
-  zip_fclose(file);
-  return read == static_cast<zip_int64_t>(content.size()) ? content : std::string();
+  return writeZip(path, membersOf(field, all));
 }
 
 /// The numbers of an array of doubles in C order; empty where it is something else.
@@ -125,14 +81,13 @@ Result<LatticeField> readNpz(const std::filesystem::path& path) {
   const auto isNot = [&](const std::string& why) {
     return fail(ErrorCode::kBadInput, path.string() + " is no lattice that can be read: " + why);
   };
-  int status = 0;
-  zip_t* archive = zip_open(path.c_str(), ZIP_RDONLY, &status);
-  if (archive == nullptr) return isNot("it is no archive");
+  constexpr std::uint64_t kMostBytes = std::uint64_t{4} << 30U;
+  auto members = readZip(path, kMostBytes);
+  if (!members) return isNot("it is no archive");
   LatticeArrays arrays;
   for (std::size_t axis = 0; axis < 3; ++axis)
-    arrays.axes_m[axis] = numbersOf(member(archive, (std::string(1, "xyz"[axis]) + "_m.npy").c_str()));
-  const std::vector<double> corrected = numbersOf(member(archive, "corrected_m.npy"));
-  zip_discard(archive);
+    arrays.axes_m[axis] = numbersOf((*members)[std::string(1, "xyz"[axis]) + "_m.npy"]);
+  const std::vector<double> corrected = numbersOf((*members)["corrected_m.npy"]);
   for (std::size_t at = 0; at + 3 <= corrected.size(); at += 3) arrays.corrected_m.emplace_back(&corrected[at]);
   auto field = arrays.lattice();
   if (!field) return isNot(field.error().message);

@@ -161,6 +161,46 @@ class CliAcquireTest : public QObject {
         near(table.nodes.front().tracker_from_sensor.position_m, Eigen::Vector3d(0.4, -0.127, 0.0635), 1e-6));
   }
 
+  void aLineIsPlayedAgain() {
+    const QString trace = at("line.trace.zip");
+    const CliRun first = runCli({"acquire", "--device", "simulated:speed=20", "--plan", "grid:2x1x1@0.2", "--auto",
+                                 "--samples-per-node", "20", "--session", at("first.fieldtrue"), "--trace", trace});
+    FT_VERIFY_STATUS(first, 0);
+    QVERIFY2(first.out.contains("bytes are in " + trace.toUtf8()), first.out.constData());
+    // The same line, the same readings at the same two places: the same takes.
+    const CliRun again = runCli({"acquire", "--device", "trace:" + trace + ",rate=20", "--plan", "grid:2x1x1@0.2",
+                                 "--auto", "--samples-per-node", "20", "--session", at("again.fieldtrue")});
+    FT_VERIFY_STATUS(again, 0);
+    QVERIFY2(again.out.contains("done 2 of 2"), again.out.constData());
+    // It ends with the recording.
+    const CliRun over = runCli({"acquire", "--device", "trace:" + trace + ",rate=1000", "--plan", "grid:4x4x4@0.2",
+                                "--auto", "--samples-per-node", "2000", "--session", at("over.fieldtrue")});
+    FT_VERIFY_STATUS(over, 1);
+    QVERIFY2(over.err.contains("at its end"), over.err.constData());
+    // Cut off.
+    QVERIFY(writeWhole(at("cut.trace.zip"), readWhole(trace).chopped(100)));
+    const CliRun cut = runCli({"acquire", "--device", "trace:" + at("cut.trace.zip"), "--plan", "grid:2x1x1@0.2",
+                               "--auto", "--session", at("cut.fieldtrue")});
+    FT_VERIFY_STATUS(cut, 1);
+    QCOMPARE(cut.err.trimmed().count('\n'), 0);
+    QVERIFY2(cut.err.contains("cut.trace.zip"), cut.err.constData());
+    QVERIFY(!QFileInfo::exists(at("cut.fieldtrue")));
+  }
+
+  void aLineThatFailsIsWritten() {
+    QProcess emulator;
+    emulator.start(cliPath(),
+                   {"emulate", "fastrak", "--listen", "0", "--faults", "unplug_after=100", "--duration", "120"});
+    const auto line = waitForLine(emulator, "device (fastrak:tcp:\\S+:\\d+)");
+    QVERIFY(line.hasMatch());
+    const CliRun run = runCli({"acquire", "--device", line.captured(1), "--plan", "grid:4x4x4@0.2", "--auto",
+                               "--session", at("lost.fieldtrue"), "--trace", at("lost.trace.zip")});
+    FT_VERIFY_STATUS(run, 1);
+    QVERIFY(QFileInfo(at("lost.trace.zip")).size() > 1000);
+    QCOMPARE(::kill(static_cast<pid_t>(emulator.processId()), SIGTERM), 0);
+    FT_VERIFY_STATUS(finished(emulator, 20000), 0);
+  }
+
   void listsAreMachineReadable_data() {
     QTest::addColumn<QString>("command");
     QTest::addColumn<QString>("list");

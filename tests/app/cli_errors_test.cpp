@@ -132,6 +132,24 @@ class CliErrorsTest : public QObject {
     row("nobody listens",
         "acquire --device fastrak:tcp:127.0.0.1:1 --plan grid:2x2x2@0.1 --auto --session @/tcp.fieldtrue", 1,
         {"127.0.0.1"});
+    row("a trace that is not there",
+        "acquire --device trace:@/none.trace.zip --plan grid:2x2x2@0.1 --auto --session @/trace.fieldtrue", 1,
+        {"none.trace.zip", "No such file"});
+    row("a trace that is none",
+        "acquire --device trace:@/good.ftcal.json --plan grid:2x2x2@0.1 --auto --session @/trace.fieldtrue", 1,
+        {"good.ftcal.json"});
+    row("a table that is no recording",
+        "acquire --device trace:@/good.nodes.csv --plan grid:2x2x2@0.1 --auto --session @/trace.fieldtrue", 1,
+        {"good.nodes.csv"});
+    row("a trace of what has no line",
+        "acquire --device trace:@/a.zip --plan grid:2x2x2@0.1 --auto --session @/trace.fieldtrue --trace @/b.zip", 2,
+        {"--trace", "line"});
+    row("a trace into nowhere",
+        "acquire --device simulated --plan grid:2x2x2@0.1 --auto --session @/trace.fieldtrue --trace @/no/b.zip", 2,
+        {"--trace", "folder"});
+    row("a trace over the session",
+        "acquire --device simulated --plan grid:2x2x2@0.1 --auto --session @/trace.fieldtrue --trace @/trace.fieldtrue",
+        2, {"--trace", "--session", "same file"});
     row("pty link is taken", "emulate fastrak --pty @/good.nodes.csv --duration 1", 1, {"good.nodes.csv"});
     row("missing recording", "emulate fastrak --listen 0 --replay @/none.samples.csv", 1, {"none.samples.csv"});
   }

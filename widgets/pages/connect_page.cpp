@@ -293,7 +293,7 @@ void ConnectPage::refreshLines() {
   const QString typed = address_->findText(address_->currentText()) < 0 ? address_->currentText() : QString();
   address_->clear();
   for (const std::string& usual : kind.usual_addresses) address_->addItem(QString::fromStdString(usual));
-  const bool is_on_a_line = kind.usual_addresses.empty();
+  const bool is_on_a_line = kind.stream && kind.usual_addresses.empty();
   for (const acquisition::SerialLine& line :
        is_on_a_line ? acquisition::serialLines() : std::vector<acquisition::SerialLine>()) {
     address_->addItem(QString::fromStdString(line.path));
@@ -301,16 +301,19 @@ void ConnectPage::refreshLines() {
   }
   if (!typed.isEmpty()) address_->setCurrentText(typed);
   if (address_->count() == 0)
-    address_->lineEdit()->setPlaceholderText(tr("no serial line found; type a path or tcp:host:port"));
+    address_->lineEdit()->setPlaceholderText(kind.stream ? tr("no serial line found; type a path or tcp:host:port")
+                                                         : tr("type the path of the file"));
 }
 
 QString ConnectPage::deviceText() const {
   const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
   const QString settings = changedSettings(kind.settings, settings_->values());
-  QStringList parts{QString::fromStdString(kind.id)};
-  if (kind_->currentIndex() != 0) parts << address_->currentText().trimmed();
-  if (!settings.isEmpty()) parts << settings;
-  return parts.join(QLatin1Char(':'));
+  // Settings follow an address behind a comma; the simulated tracker has none.
+  const bool simulated = kind_->currentIndex() == 0;
+  QString text = QString::fromStdString(kind.id);
+  if (!simulated) text += QLatin1Char(':') + address_->currentText().trimmed();
+  if (!settings.isEmpty()) text += QLatin1Char(simulated ? ':' : ',') + settings;
+  return text;
 }
 
 void ConnectPage::chooseScene() {

@@ -85,7 +85,8 @@ void DeviceRegistryTest::goodTexts_data() {
        {"simulated", "simulated:speed=4,seed=2,travel_s=1", "simulated:fault=outliers", "fastrak:/dev/ttyUSB0",
         "fastrak:/dev/ttyUSB0@19200,hemisphere=-x,stations=13", "fastrak:/dev/ttyUSB0,stations=1+3",
         "fastrak:tcp:localhost:4000,filter=low,raw_frame=false", "liberty:/dev/ttyUSB0@115200,stations=1+16",
-        "patriot:tcp:localhost:4000,stations=2", "openigtlink:localhost:18944", "openigtlink:localhost",
+        "patriot:tcp:localhost:4000,stations=2", "isotrak:/dev/ttyUSB0@19200,stations=1+2,record=angles",
+        "openigtlink:localhost:18944", "openigtlink:localhost",
         "openigtlink:tcp:localhost:18944,devices=Probe+Stylus,ask=false,transmitter=dipole"}) {
     QTest::newRow(text) << QByteArray(text);
   }
@@ -112,6 +113,8 @@ void DeviceRegistryTest::badTexts_data() {
   row("fastrak:/dev/ttyUSB0,stations=1+", {"stations", "1+"});
   row("liberty:/dev/ttyUSB0,stations=17", {"stations", "1 to 16", "17"});
   row("patriot:/dev/ttyUSB0,stations=1+3", {"stations", "1 to 2", "1+3"});
+  row("isotrak:/dev/ttyUSB0,stations=3", {"stations", "1 to 2", "3"});
+  row("isotrak:/dev/ttyUSB0,record=words", {"record", "quaternion", "words"});
   row("fastrak:/dev/ttyUSB0,color=red", {"color", "hemisphere"});
   row("openigtlink:localhost:port", {"port", "1 to 65535"});
   row("openigtlink:localhost,devices=Probe+", {"devices", "Probe+Stylus"});

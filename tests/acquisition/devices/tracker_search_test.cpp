@@ -102,7 +102,7 @@ void TrackerSearchTest::init() {
 
 void TrackerSearchTest::everyProbeIsWhole() {
   for (const DeviceKind& kind : deviceKinds()) {
-    QVERIFY2(kind.probe.has_value() == (kind.id != "simulated"), kind.id.c_str());
+    QVERIFY2(kind.probe.has_value() == (kind.stream != nullptr), kind.id.c_str());
     if (!kind.probe) continue;
     QVERIFY(kind.probe->answer && !kind.probe->may_do.empty());
     QVERIFY(!kind.probe->ask.empty() || kind.probe->stream);
