@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <span>
 
 #include "calib/core/place_name.h"
 #include "calib/tables/true_box.h"
@@ -29,7 +30,9 @@ class Joined {
   std::map<int, int> lower_;
 };
 
-Joined coincident(const std::vector<Node>& nodes) {
+/// Calls f(a, b) for rows of two places that have one true position.
+template <class Function>
+void forEachCoincident(std::span<const Node> nodes, Function f) {
   const double tolerance_m = kTolerance * trueBox_m(nodes).diagonal().norm();
   const auto p_m = [&](std::size_t row) -> const Eigen::Vector3d& {
     return nodes[row].reference_from_sensor.position_m;
@@ -37,20 +40,35 @@ Joined coincident(const std::vector<Node>& nodes) {
   std::vector<std::size_t> along_x(nodes.size());
   std::iota(along_x.begin(), along_x.end(), std::size_t{0});
   std::sort(along_x.begin(), along_x.end(), [&](std::size_t a, std::size_t b) { return p_m(a).x() < p_m(b).x(); });
-  Joined joined;
   for (std::size_t i = 0; i < along_x.size(); ++i) {
     const std::size_t a = along_x[i];
     for (std::size_t j = i + 1; j < along_x.size() && p_m(along_x[j]).x() - p_m(a).x() <= tolerance_m; ++j) {
       const std::size_t b = along_x[j];
-      if (nodes[a].node != nodes[b].node && nodes[a].sensor == nodes[b].sensor &&
-          (p_m(a) - p_m(b)).norm() <= tolerance_m)
-        joined.join(nodes[a].node, nodes[b].node);
+      if (nodes[a].node != nodes[b].node && (p_m(a) - p_m(b)).norm() <= tolerance_m) f(nodes[a], nodes[b]);
     }
   }
+}
+
+Joined coincident(const std::vector<Node>& nodes) {
+  Joined joined;
+  forEachCoincident(nodes, [&](const Node& a, const Node& b) {
+    if (a.sensor == b.sensor) joined.join(a.node, b.node);
+  });
   return joined;
 }
 
 }  // namespace
+
+std::map<int, std::set<int>> placesSharedBySensors(std::span<const Node> nodes) {
+  std::map<int, std::set<int>> shared;
+  if (nodes.empty()) return shared;
+  forEachCoincident(nodes, [&](const Node& a, const Node& b) {
+    if (a.sensor == b.sensor) return;
+    shared[a.node].insert(b.node);
+    shared[b.node].insert(a.node);
+  });
+  return shared;
+}
 
 std::string joinCoincidentPlaces(std::vector<Node>& nodes) {
   if (nodes.empty()) return {};

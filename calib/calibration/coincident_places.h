@@ -1,5 +1,8 @@
 #pragma once
 
+#include <map>
+#include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,5 +15,9 @@ namespace fieldtrue::calibration {
 /// @param nodes true positions within a thousandth of their extent count as one
 /// @return a sentence naming the places that were joined; empty when none were
 std::string joinCoincidentPlaces(std::vector<Node>& nodes);
+
+/// Of each place those at which another sensor stood where one of its own did, as on a bar whose sensors are a pitch
+/// apart: its error there would foretell this one's. Places without any are not in it.
+std::map<int, std::set<int>> placesSharedBySensors(std::span<const Node> nodes);
 
 }  // namespace fieldtrue::calibration

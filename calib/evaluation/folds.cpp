@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 #include <map>
 #include <set>
 
+#include "calib/calibration/coincident_places.h"
 #include "calib/evaluation/base/index_source.h"
 #include "calib/tables/true_box.h"
 
@@ -66,6 +68,21 @@ Result<std::vector<Fold>> roleFold(std::span<const Node> nodes) {
   return std::vector<Fold>{std::move(fold)};
 }
 
+/// Takes rows from the fits of folds that score another sensor at the same true position.
+void leaveSharedOut(std::vector<Fold>& folds, std::span<const Node> nodes) {
+  const std::map<int, std::set<int>> shared = calibration::placesSharedBySensors(nodes);
+  if (shared.empty()) return;
+  for (Fold& fold : folds) {
+    std::set<int> near;
+    for (const std::size_t row : fold.scored)
+      if (const auto found = shared.find(nodes[row].node); found != shared.end())
+        near.insert(found->second.begin(), found->second.end());
+    std::vector<std::size_t> kept;
+    for (const std::size_t row : fold.fitted) (near.contains(nodes[row].node) ? fold.unused : kept).push_back(row);
+    fold.fitted = std::move(kept);
+  }
+}
+
 Result<int> countAfter(const std::string& text, std::size_t colon, int low, int high) {
   int count = 0;
   const char* const end = text.data() + text.size();
@@ -74,6 +91,28 @@ Result<int> countAfter(const std::string& text, std::size_t colon, int low, int 
     return fail(ErrorCode::kBadInput, "Validation '" + text + "' needs a whole number from " + std::to_string(low) +
                                           " to " + std::to_string(high) + " after the colon");
   return count;
+}
+
+Result<std::vector<Fold>> foldsOf(std::span<const Node> nodes, const Validation& validation, std::uint64_t seed) {
+  if (validation.kind == ValidationKind::kRole) return roleFold(nodes);
+  const std::vector<int> places = placesOf(nodes);
+  if (places.size() < 2)
+    return fail(ErrorCode::kTooFewNodes,
+                "Holding places out needs at least 2 places, got " + std::to_string(places.size()));
+  if (validation.kind == ValidationKind::kBlocks) {
+    std::vector<Fold> folds = foldsOfGroups(nodes, octantGroups(nodes), kOctants);
+    if (folds.size() < 2)
+      return fail(ErrorCode::kDegenerate, "All places lie in one octant, so that none can be held out");
+    return folds;
+  }
+  if (validation.kind == ValidationKind::kFolds) {
+    FT_CHECK(validation.count >= 2);
+    const std::size_t n_groups = std::min(places.size(), static_cast<std::size_t>(validation.count));
+    return foldsOfGroups(nodes, shuffledGroups(places, n_groups, seed), n_groups);
+  }
+  std::map<int, std::size_t> own_group;
+  for (std::size_t i = 0; i < places.size(); ++i) own_group[places[i]] = i;
+  return foldsOfGroups(nodes, own_group, places.size());
 }
 
 }  // namespace
@@ -122,26 +161,16 @@ std::vector<int> placesOf(std::span<const Node> nodes) {
   return places;
 }
 
+std::vector<std::size_t> leftOut(const Fold& fold) {
+  std::vector<std::size_t> rows;
+  std::merge(fold.scored.begin(), fold.scored.end(), fold.unused.begin(), fold.unused.end(), std::back_inserter(rows));
+  return rows;
+}
+
 Result<std::vector<Fold>> makeFolds(std::span<const Node> nodes, const Validation& validation, std::uint64_t seed) {
-  if (validation.kind == ValidationKind::kRole) return roleFold(nodes);
-  const std::vector<int> places = placesOf(nodes);
-  if (places.size() < 2)
-    return fail(ErrorCode::kTooFewNodes,
-                "Holding places out needs at least 2 places, got " + std::to_string(places.size()));
-  if (validation.kind == ValidationKind::kBlocks) {
-    std::vector<Fold> folds = foldsOfGroups(nodes, octantGroups(nodes), kOctants);
-    if (folds.size() < 2)
-      return fail(ErrorCode::kDegenerate, "All places lie in one octant, so that none can be held out");
-    return folds;
-  }
-  if (validation.kind == ValidationKind::kFolds) {
-    FT_CHECK(validation.count >= 2);
-    const std::size_t n_groups = std::min(places.size(), static_cast<std::size_t>(validation.count));
-    return foldsOfGroups(nodes, shuffledGroups(places, n_groups, seed), n_groups);
-  }
-  std::map<int, std::size_t> own_group;
-  for (std::size_t i = 0; i < places.size(); ++i) own_group[places[i]] = i;
-  return foldsOfGroups(nodes, own_group, places.size());
+  FT_TRY(auto folds, foldsOf(nodes, validation, seed));
+  leaveSharedOut(folds, nodes);
+  return folds;
 }
 
 }  // namespace fieldtrue::evaluation

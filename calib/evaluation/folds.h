@@ -8,11 +8,16 @@
 
 namespace fieldtrue::evaluation {
 
-/// One hold-out: the rows fitted to, and the rows scored. No place is in both.
+/// One hold-out: the rows fitted to, and the rows scored. No place is in both, and none where another sensor stood at
+/// the true position of one that is scored is fitted.
 struct Fold {
   std::vector<std::size_t> fitted;
   std::vector<std::size_t> scored;
+  std::vector<std::size_t> unused;  ///< Neither fitted nor scored, where all rows may be fitted.
 };
+
+/// The rows that a fold's fit does not see, ascending, where all others may be fitted.
+std::vector<std::size_t> leftOut(const Fold& fold);
 
 /// Splits rows by place.
 /// @param nodes rows that count (skipped ones left out)

@@ -91,7 +91,7 @@ void runClosedForm(Run& run, std::size_t i, ProgressMeter& meter, double share) 
     const Fold& fold = run.job.folds[k];
     const calibration::Alignment& alignment = run.fold_alignments[k];
     if (fits) {
-      const auto model = (*fits)(fold.scored, inverse(alignment.reference_from_tracker) * tracker_from_all);
+      const auto model = (*fits)(leftOut(fold), inverse(alignment.reference_from_tracker) * tracker_from_all);
       if (model)
         keepScores(run, i, fold, alignment, *model);
       else

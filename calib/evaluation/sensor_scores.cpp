@@ -11,6 +11,7 @@
 #include "calib/evaluation/base/progress_meter.h"
 #include "calib/evaluation/folds.h"
 #include "calib/evaluation/place_scores.h"
+#include "calib/evaluation/verdict.h"
 #include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::evaluation {
@@ -48,7 +49,7 @@ SensorSplit splitOf(const Comparison& together, const Comparison& apart, bool of
   split.shared = shared.stats.rms;
   split.separate = separate.stats.rms;
   split.separate_less_shared = pairedDifference(separate.place_errors, shared.place_errors);
-  split.is_better = split.separate_less_shared.high90 < 0.0;
+  split.is_better = split.separate_less_shared.high90 < -kTie;
   split.gain = testGain(apart.places, before, separate.place_errors, separate.is_tuned);
   split.before = rootMeanSquare(before);
   split.after = separate.place_errors;

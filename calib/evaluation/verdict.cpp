@@ -14,8 +14,6 @@ namespace {
 constexpr std::size_t kFewestPlaces = 3;
 /// Validation places that span less of the box around all places do not stand for the region.
 constexpr double kWholeRegion = 0.5;
-/// Differences of the last bits are not a win: a millionth of a millimetre or of a degree.
-constexpr double kTie = 1e-6;
 constexpr const char* kForEachSensor = " with a correction for each sensor";
 
 std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, double before_rms,

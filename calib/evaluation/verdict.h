@@ -8,6 +8,9 @@ namespace fieldtrue::evaluation {
 /// larger floor is overstated.
 constexpr double kOverstatedFloor = 3.0;
 
+/// Differences of the last bits are not a win: a millionth of a millimetre or of a degree.
+constexpr double kTie = 1e-6;
+
 /// A smaller gain is not worth a correction.
 constexpr double kNeededGain = 0.10;
 
