@@ -58,17 +58,19 @@ Result<void> checkProblem(const PolynomialProblem& problem) {
     return fail(ErrorCode::kDegenerate, problem.name + " needs places that span a plane or a volume, and these " +
                                             std::to_string(problem.n_places) + " lie " +
                                             (problem.dimension == 1 ? "on one line" : "at one point"));
-  // On so few levels only the distortion of the grid itself tells the highest power, and between the levels, where no
-  // place is ever left out, it may be anything.
-  if (problem.fewest_levels > 0 && problem.fewest_levels <= problem.degree)
-    return fail(ErrorCode::kTooFewNodes, problem.name + " needs " + std::to_string(problem.degree + 1) +
-                                             " levels of places along each axis of the grid, and along one there are " +
-                                             std::to_string(problem.fewest_levels));
   const int terms = PolynomialField::termCount(problem.dimension, problem.degree);
   if (problem.n_places < static_cast<std::size_t>(terms))
     return fail(ErrorCode::kTooFewNodes, problem.name + (problem.dimension == 2 ? " in a plane" : "") +
                                              " needs at least " + std::to_string(terms) + " places, got " +
                                              std::to_string(problem.n_places));
+  // On so few levels only the distortion of the grid itself tells the highest power, and between the levels, where no
+  // place is ever left out, it may be anything.
+  const int levels = problem.fewest_levels;
+  if (levels > 0 && levels <= problem.degree)
+    return fail(ErrorCode::kDegenerate, problem.name + " needs " + std::to_string(problem.degree + 1) +
+                                            " levels of places along each axis of the grid, and along one there are " +
+                                            std::to_string(levels) + ": use degree=" + std::to_string(levels - 1) +
+                                            ", or more levels");
   return {};
 }
 

@@ -89,7 +89,8 @@ class CorrectorTest : public QObject {
     FT_VERIFY_OK(fitted("polynomial:degree=2"));
     const auto refused = fitted("polynomial:degree=3");
     QVERIFY(!refused);
-    FT_VERIFY_MATCH(holdsAll(refused.error().message, {"degree 3 needs 4 levels", "along one there are 3"}));
+    FT_VERIFY_MATCH(
+        holdsAll(refused.error().message, {"degree 3 needs 4 levels", "along one there are 3: use degree=2"}));
     const auto by_itself = fitted("polynomial:degree=auto");
     FT_VERIFY_OK(by_itself);
     FT_VERIFY_MATCH(holdsAll(by_itself->report().notes.front(), {"1 to 2 were tried"}));

@@ -82,7 +82,7 @@ class ExportSubjectTest : public QObject {
   }
 
   void turnsThatDoNot() {
-    const calibration::Corrector corrector = correctorOf("polynomial_quaternion");
+    const calibration::Corrector corrector = correctorOf("polynomial_quaternion:degree=2");
     QVERIFY(!corrector.turnTakesOrientation());
     const Eigen::Vector3d p_m(0.8, 0.3, 0.2);
     const ExportSubject subject(corrector, {});

@@ -90,9 +90,9 @@ class ImportPageTest : public WindowDriver {
 
   void anotherProgramsCalibrationIsHeldAgainstOurs() {
     const CalibrationTable table = recorded();
-    const auto corrector = calibration::Corrector::fit(table.nodes, table.metadata,
-                                                       calibration::parseCorrectorChoice("polynomial", "none").value(),
-                                                       calibration::AlignMode::kNone);
+    const auto corrector = calibration::Corrector::fit(
+        table.nodes, table.metadata, calibration::parseCorrectorChoice("polynomial:degree=2", "none").value(),
+        calibration::AlignMode::kNone);
     FT_VERIFY_OK(corrector);
     const QString path = folder_.filePath("theirs.vti");
     const exporters::Exporter& exporter = *exporters::findExporter("vtk_vti").value();

@@ -36,7 +36,7 @@ class SameCalibrationTest : public QObject {
     QTest::newRow("polynomial") << "polynomial:degree=2"
                                 << "none";
     QTest::newRow("splines") << "bspline"
-                             << "polynomial_quaternion";
+                             << "polynomial_quaternion:degree=2";
     QTest::newRow("kriging") << "gaussian_process"
                              << "none";
     QTest::newRow("network") << "neural_network"
