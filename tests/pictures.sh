@@ -15,7 +15,7 @@ render() { # render NAME TEST [VARIABLE=VALUE...]
     "$root/build/ci/tests/widgets_pages_tests" "$test" >"$work/$name.log" || { cat "$work/$name.log" >&2; exit 1; }
 }
 chmod 700 "$work"
-for test in guided_session_test gap_page_test difference_page_test export_page_test import_page_test; do
+for test in guided_session_test gap_page_test difference_page_test export_page_test export_sensors_test import_page_test; do
   render light "$test"
   render dark "$test" FIELDTRUE_DARK=1
 done
@@ -31,6 +31,7 @@ cp "$work/light/6-gap.png" "$target/gap.png"
 cp "$work/dark/6-gap.png" "$target/gap-dark.png"
 cp "$work/light/6-gap-since.png" "$target/gap-since.png"
 cp "$work/light/6-export.png" "$target/export.png"
+cp "$work/light/6-export-sensors.png" "$target/export-sensors.png"
 cp "$work/light/7-changes.png" "$target/changes.png"
 cp "$work/light/8-import.png" "$target/import.png"
 if [ -n "${FIELDTRUE_ALL_PICTURES:-}" ]; then cp -r "$work/light" "$work/dark" "$target/"; fi

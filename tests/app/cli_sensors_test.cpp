@@ -3,6 +3,7 @@
 
 #include "calib/calibration/corrector.h"
 #include "calib/tables/table_io.h"
+#include "calib/tables/table_writer.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"

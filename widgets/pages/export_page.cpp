@@ -64,7 +64,13 @@ ExportPage::ExportPage(Workbench& workbench, QWidget* parent)
   write_ = new QPushButton(tr("Write the file"), column);
   write_->setObjectName(QStringLiteral("exportWrite"));
   write_->setProperty("primary", true);
+  sensor_ = new QComboBox(column);
+  sensor_->setObjectName(QStringLiteral("exportSensor"));
+  sensor_->setAccessibleName(tr("The sensor whose correction is written"));
+  sensor_->setToolTip(sensor_->accessibleName());
+  connect(sensor_, &QComboBox::currentIndexChanged, this, &ExportPage::onTarget);
   auto* row = new QHBoxLayout;
+  row->addWidget(sensor_);
   row->addWidget(path_, 1);
   row->addWidget(browse_button);
   row->addWidget(write_);
@@ -142,10 +148,6 @@ QWidget* ExportPage::makeBake() {
   inverse_ = new QCheckBox(tr("True to measured, for programs that resample"), bake_row_);
   inverse_->setObjectName(QStringLiteral("exportInverse"));
   connect(inverse_, &QCheckBox::toggled, this, &ExportPage::onTarget);
-  sensor_ = new QComboBox(bake_row_);
-  sensor_->setObjectName(QStringLiteral("exportSensor"));
-  sensor_->setAccessibleName(tr("The sensor whose correction is written"));
-  connect(sensor_, &QComboBox::currentIndexChanged, this, &ExportPage::onTarget);
   bake_ = new QCheckBox(tr("Bake to a lattice that is fast to evaluate, off the method by at most"), bake_row_);
   bake_->setObjectName(QStringLiteral("exportBake"));
   deviation_ = new NumberBox(bake_row_);
@@ -164,7 +166,6 @@ QWidget* ExportPage::makeBake() {
   row->addWidget(deviation_);
   row->addSpacing(kGap);
   row->addWidget(inverse_);
-  row->addWidget(sensor_);
   row->addStretch(1);
   return bake_row_;
 }
@@ -219,11 +220,12 @@ void ExportPage::showCalibration() {
             ? QString()
             : tr(" It was fitted before the session's places changed: fit again on the compare page.");
     calibration_->setText(
-        tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows.%4%5 Set-up: %6.")
+        tr("Calibration: %1 for position, %2 for orientation, fitted on %3 rows%7.%4%5 Set-up: %6.")
             .arg(methodLabel(MethodPart::kPosition, choice.position_id, choice.position_settings),
                  methodLabel(MethodPart::kOrientation, choice.orientation_id, choice.orientation_settings))
             .arg(workbench_.corrector()->report().n_nodes)
-            .arg(warning, verdictOnCalibration(), setupOfCalibration()));
+            .arg(warning, verdictOnCalibration(), setupOfCalibration(),
+                 workbench_.corrector()->sensorsApart().empty() ? QString() : tr(", each sensor by itself")));
   } else {
     calibration_->setText(
         tr("The calibration kept in this session corrects nothing, neither position nor orientation: "
@@ -273,7 +275,7 @@ void ExportPage::onTarget() {
   const bool can_be_baked = any([](const exporters::Exporter& one) { return one.knows_pose; });
   const bool may_be_inverse = any([](const exporters::Exporter& one) { return one.may_be_inverse; });
   const bool holds_one = any([](const exporters::Exporter& one) { return !one.knows_pose; });
-  bake_row_->setVisible(is_lattice || can_be_baked || may_be_inverse || (holds_one && sensor_->count() > 0));
+  bake_row_->setVisible(is_lattice || can_be_baked || may_be_inverse);
   sensor_->setVisible(holds_one && sensor_->count() > 0);
   bake_->setVisible(can_be_baked);
   bake_->setEnabled(workbench_.corrector() && !workbench_.corrector()->isBaked());
