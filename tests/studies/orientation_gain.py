@@ -34,7 +34,7 @@ METAL = ("compact_metal", {"center_m": [0.7, 0.4, -0.5], "radius_m": 0.12, "mate
 COILS = [("coil_gain", {"receiver_gain": [0.01, -0.01, 0.005]}),
          ("coil_nonorthogonality", {"receiver_rad": [0.005, -0.01, 0.005]}),
          ("finite_coil", {"coil": "receiver", "radius_m": [0.02, 0.015, 0.01]})]
-TURNING = ["polynomial_quaternion", "hmq_matrix", "gaussian_process:inputs=position", "gaussian_process"]
+TURNING = ["polynomial_quaternion:degree=2", "hmq_matrix", "gaussian_process:inputs=position", "gaussian_process"]
 SCENES = {"unequal coils": scene("unequal coils", COILS), "metal": scene("metal", [METAL]),
           "metal and unequal coils": scene("metal and unequal coils", [METAL] + COILS)}
 
