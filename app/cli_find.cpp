@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/devices/tracker_search.h"
+#include "acquisition/search/tracker_search.h"
 #include "app/cli.h"
 #include "app/cli_signals.h"
 

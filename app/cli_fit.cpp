@@ -14,7 +14,7 @@
 #include "calib/core/units.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/learning_curve.h"
-#include "calib/evaluation/sensor_scores.h"
+#include "calib/evaluation/sensor_splits.h"
 #include "widgets/report/report.h"
 
 /// fit, compare, report: what is done with a table of nodes.
@@ -35,10 +35,10 @@ struct FitOptions {
   TableArguments table;
 };
 
-/// Validation rows stay unseen, skipped ones never count.
-Result<calibration::Corrector> fitRows(const CalibrationTable& table, calibration::CorrectorChoice choice,
-                                       const std::string& sensors, calibration::AlignMode align,
-                                       const RunControl& control) {
+/// @param sensors auto, shared or separate
+Result<calibration::Corrector> fitted(const CalibrationTable& table, calibration::CorrectorChoice choice,
+                                      const std::string& sensors, calibration::AlignMode align,
+                                      const RunControl& control) {
   if (sensors == "auto") return evaluation::fitByEvidence(table, choice, align, control);
   choice.separate_position = choice.separate_orientation = sensors == "separate";
   return calibration::Corrector::fit(evaluation::fitRowsOf(table), table.metadata, choice, align, control);
@@ -82,7 +82,7 @@ Outcome runFit(const FitOptions& options, const CommonOptions& common) {
   for (const auto& [key, value] : *setup) table.metadata.setup[key] = value;
   const auto align = readAlignArgument(options.align, calibration::defaultAlignMode(table.metadata));
   if (!align) return tl::unexpected(align.error());
-  auto corrector = fitRows(table, *choice, options.sensors, *align, runControl(common, "fitting"));
+  auto corrector = fitted(table, *choice, options.sensors, *align, runControl(common, "fitting"));
   if (corrector && options.bake_um) corrector = corrector->baked(1e-6 * *options.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
   const auto saved = corrector->save(options.out);

@@ -72,6 +72,55 @@ std::string named(const std::string& whose, const std::string& note) {
   return whose.empty() || note.empty() ? note : whose + ": " + note;
 }
 
+/// Of a correction's two parts.
+struct Wanted {
+  bool position = true;
+  bool orientation = true;
+};
+
+/// What the parts of a correction are fitted with.
+struct PartsFit {
+  const correctors::PositionMethod& position_method;
+  const correctors::OrientationMethod& orientation_method;
+  const TableMetadata& metadata;
+  const CorrectorChoice& choice;
+  const RunControl& control;
+  const Alignment& alignment;
+  std::vector<std::string>& notes;
+
+  /// Fits the parts that are wanted to some rows, and leaves the others as they are.
+  Result<void> to(std::span<const Node> rows, const std::string& whose, Wanted wanted, Correction& correction) const {
+    const correctors::FitData data = makeFitData(rows, metadata, alignment);
+    FT_TRY_VOID(correctors::checkPositions(data, "A calibration"));
+    if (wanted.position) {
+      FT_TRY(correction.position, position_method.fit(data, choice.position_settings, control));
+      correction.region = Region::around(data.p_tracked_m, data.dimension,
+                                         kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
+      notes.push_back(named(whose, correctors::planeNote(data, "nothing is claimed off it")));
+      notes.push_back(named(whose, correction.position->note()));
+    }
+    if (wanted.orientation) {
+      FT_TRY(correction.orientation, orientation_method.fit(data, choice.orientation_settings, control));
+      notes.push_back(named(whose, correction.orientation->note()));
+    }
+    return {};
+  }
+};
+
+/// Gives each sensor the parts that are to be its own; the first one's stand for a sensor that was not fitted.
+Result<void> fitApart(const PartsFit& fit, std::span<const Node> rows, const std::vector<int>& sensors, Wanted apart,
+                      Evaluator::Parts& parts) {
+  for (const int sensor : sensors) {
+    const std::string whose = "Sensor " + std::to_string(sensor);
+    Correction own = parts;
+    const auto fitted = fit.to(nodesOfSensor(rows, sensor), whose, apart, own);
+    if (!fitted) return fail(fitted.error().code, named(whose, fitted.error().message));
+    parts.by_sensor[sensor] = std::move(own);
+  }
+  static_cast<Correction&>(parts) = parts.by_sensor.begin()->second;
+  return {};
+}
+
 }  // namespace
 
 Result<CorrectorChoice> parseCorrectorChoice(const std::string& position_text, const std::string& orientation_text) {
@@ -94,42 +143,16 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   }
   std::vector<Node> rows(nodes.begin(), nodes.end());
   std::vector<std::string> notes{joinCoincidentPlaces(rows), orientationNote(nodes)};
-  const auto fit_parts = [&](std::span<const Node> some, const std::string& whose, bool position, bool orientation,
-                             Correction& to) -> Result<void> {
-    const correctors::FitData data = makeFitData(some, metadata, parts.alignment);
-    FT_TRY_VOID(correctors::checkPositions(data, "A calibration"));
-    if (position) {
-      FT_TRY(to.position, position_method->fit(data, choice.position_settings, control));
-      to.region = Region::around(data.p_tracked_m, data.dimension,
-                                 kMarginOfSpacing * medianSpacing_m(correctors::mergePlaces(data).p_tracked_m));
-      notes.push_back(named(whose, correctors::planeNote(data, "nothing is claimed off it")));
-      notes.push_back(named(whose, to.position->note()));
-    }
-    if (orientation) {
-      FT_TRY(to.orientation, orientation_method->fit(data, choice.orientation_settings, control));
-      notes.push_back(named(whose, to.orientation->note()));
-    }
-    return {};
-  };
+  const PartsFit fit{*position_method, *orientation_method, metadata, choice, control, parts.alignment, notes};
   const std::vector<int> sensors = sensorsOf(rows);
-  const bool position_apart = choice.separate_position && sensors.size() > 1;
-  const bool orientation_apart = choice.separate_orientation && sensors.size() > 1;
-  FT_TRY_VOID(fit_parts(rows, "", !position_apart, !orientation_apart, parts));
-  if (position_apart || orientation_apart) {
-    for (const int sensor : sensors) {
-      Correction own = parts;
-      const std::string whose = "Sensor " + std::to_string(sensor);
-      auto fitted = fit_parts(nodesOfSensor(rows, sensor), whose, position_apart, orientation_apart, own);
-      if (!fitted) return fail(fitted.error().code, named(whose, fitted.error().message));
-      parts.by_sensor[sensor] = std::move(own);
-    }
-    static_cast<Correction&>(parts) = parts.by_sensor.begin()->second;
-  }
+  const Wanted apart{choice.separate_position && sensors.size() > 1, choice.separate_orientation && sensors.size() > 1};
+  FT_TRY_VOID(fit.to(rows, "", {!apart.position, !apart.orientation}, parts));
+  if (apart.position || apart.orientation) FT_TRY_VOID(fitApart(fit, rows, sensors, apart, parts));
 
   Corrector corrector(std::move(parts));
   corrector.choice_ = choice;
-  corrector.choice_.separate_position = position_apart;
-  corrector.choice_.separate_orientation = orientation_apart;
+  corrector.choice_.separate_position = apart.position;
+  corrector.choice_.separate_orientation = apart.orientation;
   corrector.align_ = align;
   corrector.table_ = {metadata, {nodes.begin(), nodes.end()}};
   corrector.setup_ = setupOf(corrector.table_);
@@ -155,7 +178,7 @@ Result<Corrector> Corrector::ofSensor(int sensor) const {
   corrector.setup_ = setup_;
   corrector.setup_["sensor"] = std::to_string(sensor);
   corrector.table_ =
-      choice_.separate_position ? CalibrationTable{table_.metadata, nodesOfSensor(table_.nodes, sensor)} : table_;
+      sensorsApart().empty() ? table_ : CalibrationTable{table_.metadata, nodesOfSensor(table_.nodes, sensor)};
   corrector.report_ = reportOf(corrector.table_.nodes, corrector);
   corrector.report_.notes = report_.notes;
   return corrector;

@@ -99,8 +99,10 @@ Result<Evaluator::Parts> Evaluator::partsOf(int sensor) const {
                                           ", and knows nothing of sensor " + std::to_string(sensor));
   Parts alone;
   static_cast<Correction&>(alone) = of(sensor);
-  alone.alignment.reference_from_tracker = parts_.alignment.reference_from_tracker;
+  alone.alignment = parts_.alignment;
   alone.alignment.sensor_from_mount = parts_.alignment.mountOf(sensor);
+  // What the others share may be applied to their readings too; what is this one's may not.
+  if (!parts_.by_sensor.empty()) alone.alignment.mounts.clear();
   return alone;
 }
 

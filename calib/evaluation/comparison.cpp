@@ -14,9 +14,9 @@
 #include "calib/evaluation/limits.h"
 #include "calib/evaluation/place_scores.h"
 #include "calib/evaluation/sensor_scores.h"
+#include "calib/evaluation/sensor_splits.h"
 #include "calib/evaluation/surroundings.h"
 #include "calib/evaluation/verdict.h"
-#include "calib/tables/table_sensors.h"
 #include "calib/tables/true_box.h"
 
 namespace fieldtrue::evaluation {
@@ -159,83 +159,6 @@ void noteUnranked(Comparison& comparison) {
         "Not ranked, because what they choose saw the places held out, or because they were "
         "held out otherwise than the others: " +
         names + ". Compared with kfold:10, all are.");
-}
-
-/// Rows of the methods by which it is asked whether sensors want a correction each: the best one, or, where none beats
-/// the error before (errors that are opposite leave nothing to share), those that come nearest.
-std::vector<std::size_t> rowsToSplit(const std::vector<MethodScore>& scores, std::optional<std::size_t> best,
-                                     const Comparison& comparison) {
-  constexpr std::size_t kMost = 3;
-  if (best) return {*best};
-  std::vector<std::size_t> rows;
-  for (std::size_t row = 0; row < scores.size(); ++row)
-    if (!scores[row].skipped && scores[row].method != "none" && scores[row].method != "rigid" &&
-        isRanked(scores[row], comparison))
-      rows.push_back(row);
-  std::stable_sort(rows.begin(), rows.end(),
-                   [&](std::size_t a, std::size_t b) { return scores[a].stats.rms < scores[b].stats.rms; });
-  if (rows.size() > kMost) rows.resize(kMost);
-  return rows;
-}
-
-/// Keeps a split that is told before one that is not, and of those the one that leaves least.
-void keepBetter(std::optional<SensorSplit>& kept, const SensorSplit& other, std::optional<std::size_t>& kept_row,
-                std::size_t row) {
-  if (kept && (!other.is_told || (kept->is_told && kept->separate <= other.separate))) return;
-  kept = other;
-  kept_row = row;
-}
-
-/// Where corrections apart are better, the verdict is theirs.
-void takeSplit(const std::optional<SensorSplit>& split, GainTest& test, bool& apply, const Verdict& verdict) {
-  if (!isApart(split) || verdict.is_inside_out) return;
-  test = split->gain;
-  apply = test.apply;
-}
-
-/// Whether sensors want a correction each.
-Result<void> addSplits(Comparison& comparison, const CalibrationTable& table, const ComparisonOptions& options,
-                       const RunControl& control) {
-  if (sensorsOf(table).size() < 2) return {};
-  ComparisonOptions alike = options;
-  alike.validation = comparison.validation;
-  alike.align = comparison.align;
-  RunControl quiet = control;
-  quiet.progress = [](double) {};
-  const auto ask = [&](const std::vector<MethodScore>& scores, std::optional<std::size_t>& best,
-                       std::optional<SensorSplit>& kept, bool of_position) -> Result<void> {
-    std::optional<std::size_t> kept_row;
-    for (const std::size_t row : rowsToSplit(scores, best, comparison)) {
-      calibration::CorrectorChoice choice;
-      (of_position ? choice.position_id : choice.orientation_id) = scores[row].method;
-      (of_position ? choice.position_settings : choice.orientation_settings) = scores[row].settings;
-      FT_TRY(const auto splits, splitsOf(table, choice, alike, quiet));
-      const auto& split = of_position ? splits.position : splits.orientation;
-      if (split) keepBetter(kept, *split, kept_row, row);
-    }
-    if (!kept) return {};
-    comparison.notes.push_back(kept->text);
-    if (kept->is_better) best = kept_row;
-    return {};
-  };
-  FT_TRY_VOID(ask(comparison.position, comparison.best_position_row, comparison.split, true));
-  FT_TRY_VOID(ask(comparison.orientation, comparison.best_orientation_row, comparison.orientation_split, false));
-  Verdict& verdict = comparison.verdict;
-  takeSplit(comparison.split, verdict.position, verdict.apply_position, verdict);
-  takeSplit(comparison.orientation_split, verdict.orientation, verdict.apply_orientation, verdict);
-  if (comparison.best_position_row)
-    comparison.best_position = comparison.position[*comparison.best_position_row].method;
-  if (comparison.best_orientation_row)
-    comparison.best_orientation = comparison.orientation[*comparison.best_orientation_row].method;
-  verdict.gain_low90 = verdict.position.low90;
-  verdict.gain_high90 = verdict.position.high90;
-  verdict.gain_without_worst_place = verdict.position.gain_without_worst_place;
-  if (isApart(comparison.split) && !verdict.is_inside_out) {
-    comparison.trueness.after_position_mm = excessError(comparison.split->separate, comparison.floor_position_mm);
-    judgePlaces(comparison);
-    verdict.limited_by.clear();
-  }
-  return {};
 }
 
 }  // namespace

@@ -1,13 +1,9 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
-#include "calib/calibration/corrector.h"
 #include "calib/core/calibration_table.h"
-#include "calib/core/error.h"
-#include "calib/core/run_control.h"
 #include "calib/evaluation/candidate.h"
 #include "calib/evaluation/comparison.h"
 
@@ -15,27 +11,5 @@ namespace fieldtrue::evaluation {
 
 /// Scores of rows, gathered by sensor and place; empty where all rows are of one sensor.
 std::vector<SensorScore> scoresBySensor(std::span<const Node> nodes, std::span<const RowScore> scores, bool is_tuned);
-
-/// Of the parts that a choice corrects, with several sensors.
-struct SensorSplits {
-  std::optional<SensorSplit> position;
-  std::optional<SensorSplit> orientation;
-};
-
-/// Whether sensors want a correction each: what is chosen, fitted once to all rows and once to each sensor's alone, is
-/// held against each other by the options' folds, ten where they leave places out one by one.
-/// @param options validation, alignment and seed count
-/// @error kCancelled
-Result<SensorSplits> splitsOf(const CalibrationTable& table, const calibration::CorrectorChoice& choice,
-                              ComparisonOptions options, const RunControl& control);
-
-/// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
-std::vector<Node> fitRowsOf(const CalibrationTable& table);
-
-/// Fits to them, each part with a correction for each sensor where splitsOf says that this errs less; the report then
-/// tells both figures.
-/// @error as Corrector::fit
-Result<calibration::Corrector> fitByEvidence(const CalibrationTable& table, calibration::CorrectorChoice choice,
-                                             calibration::AlignMode align, const RunControl& control);
 
 }  // namespace fieldtrue::evaluation

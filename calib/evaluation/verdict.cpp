@@ -186,6 +186,14 @@ bool isRanked(const MethodScore& score, const Comparison& comparison) {
 
 double excessError(double rms, double floor) { return std::sqrt(std::max(0.0, rms * rms - floor * floor)); }
 
+void judgePosition(Verdict& verdict, const GainTest& test) {
+  verdict.position = test;
+  verdict.apply_position = test.apply;
+  verdict.gain_low90 = test.low90;
+  verdict.gain_high90 = test.high90;
+  verdict.gain_without_worst_place = test.gain_without_worst_place;
+}
+
 void pickBest(Comparison& comparison) {
   Verdict& verdict = comparison.verdict;
   Trueness& trueness = comparison.trueness;
@@ -195,7 +203,7 @@ void pickBest(Comparison& comparison) {
   if (const auto row = comparison.best_position_row) {
     const MethodScore& best = comparison.position[*row];
     comparison.best_position = best.method;
-    verdict.position = testGain(comparison.places, comparison.before_place_mm, best.place_errors, best.is_tuned);
+    judgePosition(verdict, testGain(comparison.places, comparison.before_place_mm, best.place_errors, best.is_tuned));
     trueness.after_position_mm = excessError(best.stats.rms, comparison.floor_position_mm);
   }
   if (comparison.before_orientation_deg) {
@@ -213,11 +221,7 @@ void pickBest(Comparison& comparison) {
   }
   tellDistanceToBest(comparison.position, comparison.best_position_row, comparison.before_place_mm);
   tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, comparison.before_place_deg);
-  verdict.apply_position = verdict.position.apply;
   verdict.apply_orientation = verdict.orientation.apply;
-  verdict.gain_low90 = verdict.position.low90;
-  verdict.gain_high90 = verdict.position.high90;
-  verdict.gain_without_worst_place = verdict.position.gain_without_worst_place;
   if (comparison.before_position_mm.rms <= comparison.floor_position_mm)
     comparison.notes.push_back("The position error before correction is no larger than noise and jig tolerance make.");
   if (const auto row = comparison.best_position_row;

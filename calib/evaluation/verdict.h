@@ -17,6 +17,9 @@ constexpr double kNeededGain = 0.10;
 /// Whether a method may be called best: scored as the comparison says, and not tuned by the places it is judged at.
 bool isRanked(const MethodScore& score, const Comparison& comparison);
 
+/// What the gain of a position correction says of it.
+void judgePosition(Verdict& verdict, const GainTest& test);
+
 /// Picks the best of the ranked methods by held-out RMS (nothing wins unless it beats the error before), tests their
 /// gain, and tells how far the others are from the best.
 void pickBest(Comparison& comparison);

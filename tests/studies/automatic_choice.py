@@ -18,7 +18,7 @@ import statistics
 import sys
 import tempfile
 
-from interval_coverage import POOL, Misplacing, fresh_mean_square_m2, record, write
+from interval_coverage import Misplacing, POOL, drawn_table, fresh_mean_square_m2, record, write
 
 METHODS = ("none", "affine", "polynomial:degree=2", "polynomial:degree=3", "polynomial:degree=4", "hmq", "rbf",
            "rbf:kernel=thin_plate", "bspline", "gaussian_process", "harmonic_field", "tetrahedral")
@@ -33,11 +33,7 @@ def cell(job):
         write(fresh, head, rows[POOL:])
         draw, misplacing = random.Random(f"auto {room} {heavy} {n_places}"), Misplacing(heavy)
         for _ in range(n_tables):
-            some = [dict(row) for row in draw.sample(rows[:POOL], n_places)]
-            for row in some:
-                for axis, slip_m in zip("xyz", misplacing.draw_m(draw)):
-                    row[f"{axis}_true_m"] = repr(float(row[f"{axis}_true_m"]) + slip_m)
-            write(table, head, some)
+            write(table, head, drawn_table(rows, n_places, draw, misplacing))
             rms_mm = {}
             for method in METHODS + ("auto",):
                 try:

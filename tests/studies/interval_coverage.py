@@ -83,6 +83,15 @@ def record(cli, rooms, room, folder):
     return rows_of(paths[2])
 
 
+def drawn_table(rows, n_places, draw, misplacing):
+    """Rows of some places of the pool, each stated where the rig would say that it stands."""
+    some = [dict(row) for row in draw.sample(rows[:POOL], n_places)]
+    for row in some:
+        for axis, slip_m in zip("xyz", misplacing.draw_m(draw)):
+            row[f"{axis}_true_m"] = repr(float(row[f"{axis}_true_m"]) + slip_m)
+    return some
+
+
 def fresh_mean_square_m2(cli, table, method, fresh, folder):
     """Of the correction that a fit to the whole table is, against exact positions."""
     calibration, corrected = os.path.join(folder, "a.ftcal.json"), os.path.join(folder, "corrected.csv")
@@ -103,11 +112,7 @@ def cell(job):
         write(fresh, head, rows[POOL:])
         draw, misplacing = random.Random(f"{room} {heavy} {n_places} {tuned}"), Misplacing(heavy)
         for _ in range(n_tables):
-            some = [dict(row) for row in draw.sample(rows[:POOL], n_places)]
-            for row in some:
-                for axis, slip_m in zip("xyz", misplacing.draw_m(draw)):
-                    row[f"{axis}_true_m"] = repr(float(row[f"{axis}_true_m"]) + slip_m)
-            write(table, head, some)
+            write(table, head, drawn_table(rows, n_places, draw, misplacing))
             methods = TUNED if tuned else UNTUNED
             judged = json.loads(run(cli, "compare", "--nodes", table, "--methods", ",".join(methods), "--json"))
             assert judged["validate"] == ("kfold:10" if tuned else "loo")

@@ -15,7 +15,7 @@ import random
 import sys
 import tempfile
 
-from interval_coverage import POOL, Misplacing, fresh_mean_square_m2, record, write
+from interval_coverage import Misplacing, POOL, drawn_table, fresh_mean_square_m2, record, write
 from orientation_gain import Program, Table, paired_interval, rms_of, squares_by_place
 
 ROOMS = ("clean", "steel_floor", "steel_bar", "two_bodies", "copper_loop", "mixed")
@@ -32,11 +32,7 @@ def in_room(job):
         write(fresh, head, rows[POOL:])
         draw, misplacing = random.Random(f"physics {room} {n_places}"), Misplacing(False)
         for _ in range(n_tables):
-            some = [dict(row) for row in draw.sample(rows[:POOL], n_places)]
-            for row in some:
-                for axis, slip_m in zip("xyz", misplacing.draw_m(draw)):
-                    row[f"{axis}_true_m"] = repr(float(row[f"{axis}_true_m"]) + slip_m)
-            write(table, head, some)
+            write(table, head, drawn_table(rows, n_places, draw, misplacing))
             both.append([1e3 * math.sqrt(fresh_mean_square_m2(cli, table, method, fresh, folder)) for method in METHODS])
     return room, both
 

@@ -17,7 +17,7 @@ import random
 import sys
 import tempfile
 
-from interval_coverage import EXTENT_M, POOL, Misplacing, record, rows_of, run, write
+from interval_coverage import EXTENT_M, Misplacing, POOL, drawn_table, record, rows_of, run, write
 
 NINE_IN_TEN = math.sqrt(6.2514 / 3)  # Quantile of chi-square of three over three.
 
@@ -48,11 +48,7 @@ def cell(job):
         write(fresh, head, rows[POOL:])
         draw, misplacing = random.Random(f"uncertainty {room} {heavy} {n_places}"), Misplacing(heavy)
         for _ in range(n_tables):
-            some = [dict(row) for row in draw.sample(rows[:POOL], n_places)]
-            for row in some:
-                for axis, slip_m in zip("xyz", misplacing.draw_m(draw)):
-                    row[f"{axis}_true_m"] = repr(float(row[f"{axis}_true_m"]) + slip_m)
-            write(table, head, some)
+            write(table, head, drawn_table(rows, n_places, draw, misplacing))
             for method in methods:
                 pairs[method] += errors_and_sds(cli, table, method, fresh, folder)
     return job, pairs

@@ -8,14 +8,13 @@
 #include <limits>
 
 #include "calib/evaluation/error_stats.h"
+#include "calib/evaluation/verdict.h"
 #include "widgets/style/theme.h"
 #include "widgets/style/unit_texts.h"
 
 namespace fieldtrue::widgets {
 namespace {
 
-// Differences of the last bits are neither better nor worse: a millionth of a millimetre or of a degree.
-constexpr double kTie = 1e-6;
 constexpr double kNotCompared = std::numeric_limits<double>::max();
 constexpr double kUnusable = 0.5 * std::numeric_limits<double>::max();
 
@@ -32,7 +31,7 @@ int decimalsOf(double value) {
   return value > 0.0 ? std::clamp(2 - static_cast<int>(std::floor(std::log10(value))), 0, 6) : 2;
 }
 
-bool asGoodAsBest(const evaluation::MethodScore& score) { return score.rms_to_best_low90 <= kTie; }
+bool asGoodAsBest(const evaluation::MethodScore& score) { return score.rms_to_best_low90 <= evaluation::kTie; }
 
 }  // namespace
 
@@ -68,7 +67,7 @@ ScoreModel::Row ScoreModel::rowOf(const evaluation::MethodScore& score, bool bes
   row.score->place_covered.clear();
   if (!score.skipped) {
     row.stats = score.stats;
-    row.worse = before && score.stats.rms > before->rms + kTie;
+    row.worse = before && score.stats.rms > before->rms + evaluation::kTie;
   }
   return row;
 }

@@ -4,7 +4,7 @@
 #include <QWidget>
 #include <vector>
 
-#include "acquisition/devices/tracker_search.h"
+#include "acquisition/search/tracker_search.h"
 #include "widgets/workbench/workbench.h"
 
 class QComboBox;

@@ -1,6 +1,6 @@
 #include "widgets/workbench/fitted_methods.h"
 
-#include "calib/evaluation/sensor_scores.h"
+#include "calib/evaluation/sensor_splits.h"
 
 namespace fieldtrue::widgets {
 

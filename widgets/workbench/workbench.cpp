@@ -16,7 +16,7 @@
 #include "calib/calibration/alignment.h"
 #include "calib/core/json_text.h"
 #include "calib/core/thread_pool.h"
-#include "calib/evaluation/sensor_scores.h"
+#include "calib/evaluation/sensor_splits.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/tables/table_sensors.h"
 #include "widgets/style/unit_texts.h"

@@ -8,7 +8,7 @@
 #include "calib/calibration/corrector.h"
 #include "calib/core/units.h"
 #include "calib/evaluation/comparison.h"
-#include "calib/evaluation/sensor_scores.h"
+#include "calib/evaluation/sensor_splits.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
 #include "tests/support/test_main.h"
@@ -193,6 +193,17 @@ class SensorsTest : public QObject {
       shared_rad2 += std::pow(angleBetween_rad(shared->correct(tracked, node.sensor).orientation, q_true), 2);
     }
     QVERIFY(squares_rad2 < 0.01 * shared_rad2);
+    const auto second = fitted->ofSensor(2);
+    FT_VERIFY_OK(second);
+    QCOMPARE(second->table().nodes.size(), table.nodes.size() / 2);
+    QVERIFY(*second->report().orientation_rms_rad < 0.2 * *shared->report().orientation_rms_rad);
+    // What both share is as good for the first's rows, by its own mounting.
+    const auto of_shared = shared->ofSensor(2);
+    FT_VERIFY_OK(of_shared);
+    QCOMPARE(of_shared->setup().at("sensor"), std::string("2"));
+    QCOMPARE(*of_shared->report().orientation_rms_rad, *shared->report().orientation_rms_rad);
+    FT_VERIFY_MATCH(sameBits(of_shared->correct(table.nodes.back().tracker_from_sensor),
+                             shared->correct(table.nodes.back().tracker_from_sensor, 2)));
     const auto again = calibration::Corrector::fromText(fitted->toText(), "again");
     FT_VERIFY_OK(again);
     QCOMPARE(again->toText(), fitted->toText());

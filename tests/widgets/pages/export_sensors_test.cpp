@@ -6,7 +6,7 @@
 
 #include "acquisition/session/imported_session.h"
 #include "acquisition/session/session_store.h"
-#include "calib/evaluation/sensor_scores.h"
+#include "calib/evaluation/sensor_splits.h"
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
 #include "tests/widgets/pages/window_driver.h"

@@ -1,4 +1,4 @@
-#include "acquisition/devices/tracker_search.h"
+#include "acquisition/search/tracker_search.h"
 
 #include <QElapsedTimer>
 #include <QProcess>
@@ -7,10 +7,10 @@
 #include <QTest>
 #include <filesystem>
 
-#include "acquisition/devices/known_adapters.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/emulators/openigtlink_emulator.h"
 #include "acquisition/emulators/pty_endpoint.h"
+#include "acquisition/search/known_adapters.h"
 #include "acquisition/transports/line_holders.h"
 #include "tests/acquisition/devices/rated_line.h"
 #include "tests/support/matchers.h"

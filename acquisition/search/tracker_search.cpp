@@ -1,8 +1,8 @@
-#include "acquisition/devices/tracker_search.h"
+#include "acquisition/search/tracker_search.h"
 
 #include <algorithm>
 
-#include "acquisition/devices/known_adapters.h"
+#include "acquisition/search/known_adapters.h"
 #include "acquisition/transports/line_holders.h"
 #include "acquisition/transports/serial_ports.h"
 

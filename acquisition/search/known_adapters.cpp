@@ -1,4 +1,4 @@
-#include "acquisition/devices/known_adapters.h"
+#include "acquisition/search/known_adapters.h"
 
 #include <QStandardPaths>
 #include <algorithm>
