@@ -58,6 +58,7 @@ std::pair<std::string, Settings> methodFrom(
   json stored_settings = settings.object();
   const json defaults = toJson(resolveSettings(id, method.settings, {}).value());
   for (const auto& [key, value] : defaults.items()) stored_settings.emplace(key, value);
+  for (const std::string& key : method.former_settings) stored_settings.erase(key);
   return {id, settings.valueOf(settingsFromJson(id, method.settings, stored_settings))};
 }
 

@@ -43,6 +43,8 @@ void subtractSymmetricProduct(Eigen::MatrixXd& a, const Eigen::MatrixXd& x, cons
   for (Eigen::Index i = 0; i < x.cols(); ++i) a.selfadjointView<Eigen::Lower>().rankUpdate(x.col(i), y.col(i), -1.0);
 }
 
+Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a) { return a * a.transpose(); }
+
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.selfadjointView<Eigen::Lower>() * b;
 }

@@ -1,19 +1,16 @@
 // Hardy's multiquadric against its peers on the same places, one thread: ALGLIB's multiquadric, VTK's thin-plate
-// spline, SciPy's RBFInterpolator where it is installed, and a plain loop over an array of structures; and its own ways
-// to be evaluated against the square roots alone. Ratios are printed at the end; times depend on the machine, ratios
+// spline, SciPy's RBFInterpolator where it is installed, and a plain loop over an array of structures; and its
+// evaluation against the square roots alone. Ratios are printed at the end; times depend on the machine, ratios
 // hardly.
 #include <benchmark/benchmark.h>
 
-#include <array>
 #include <cstdio>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "calib/correctors/baked/baked_lattice_maker.h"
 #include "calib/correctors/base/method.h"
-#include "calib/correctors/multiquadric/hmq_kernel.h"
 #include "calib/correctors/numerics/aligned_vector.h"
 #include "calib/correctors/registry.h"
 #include "calib/geometry/geometry.h"
@@ -41,62 +38,17 @@ const std::vector<Eigen::Vector3d>& batchPoints() {
   return points_m;
 }
 
-Model fitWith(const correctors::FitData& data, const std::map<std::string, std::string>& given) {
+Model fitOurs(const correctors::FitData& data) {
   const correctors::PositionMethod& method = *correctors::findPositionMethod("hmq").value();
-  return method.fit(data, resolveSettings(method.id, method.settings, given).value(), {}).value();
+  return method.fit(data, resolveSettings(method.id, method.settings, {}).value(), {}).value();
 }
-
-Model fitDouble(const correctors::FitData& data) { return fitWith(data, {}); }
-Model fitSingle(const correctors::FitData& data) { return fitWith(data, {{"precision", "single"}}); }
 
 /// The multiquadric baked within 50 um.
 Model fitLattice(const correctors::FitData& data) {
   const Region region = Region::around(data.p_tracked_m, 3, 0.02);
-  auto lattice = correctors::bakeLattice(*fitDouble(data), region, data.p_tracked_m, kLatticeBound_m, {}).value();
+  auto lattice = correctors::bakeLattice(*fitOurs(data), region, data.p_tracked_m, kLatticeBound_m, {}).value();
   std::printf("%s\n", lattice->note().c_str());
   return lattice;
-}
-
-/// A multiquadric evaluated by one kernel's sums, to compare the ways that one processor has.
-class KernelModel : public correctors::PositionModel {
- public:
-  KernelModel(const correctors::FitData& data, decltype(correctors::MultiquadricKernel::sums) sums) : sums_(sums) {
-    const nlohmann::json fitted = fitDouble(data)->parameters();
-    for (std::size_t j = 0; j < data.size(); ++j) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        numbers_[k].push_back(data.p_tracked_m[j][static_cast<Eigen::Index>(k)]);
-        numbers_[3 + k].push_back(fitted.at("alpha")[j][k].get<double>());
-      }
-    }
-    arrays_ = {numbers_[0].data(), numbers_[1].data(), numbers_[2].data(), data.size(), kR_m * kR_m};
-  }
-
-  Eigen::Vector3d displacement_m(const Eigen::Vector3d& p_m) const override {
-    Eigen::Vector3d f;
-    evaluate(&p_m, 1, &f);
-    return f - p_m;
-  }
-  void correct(std::span<const Eigen::Vector3d> p_m, std::span<Eigen::Vector3d> f) const override {
-    evaluate(p_m.data(), p_m.size(), f.data());
-  }
-  nlohmann::json parameters() const override { return {}; }
-
- private:
-  void evaluate(const Eigen::Vector3d* p_m, std::size_t count, Eigen::Vector3d* f) const {
-    sums_(arrays_, numbers_[3].data(), numbers_[4].data(), numbers_[5].data(), p_m->data(), count, f->data());
-  }
-
-  decltype(correctors::MultiquadricKernel::sums) sums_;
-  std::array<correctors::AlignedVector<double>, 6> numbers_;
-  correctors::MultiquadricArrays arrays_;
-};
-
-Model fitRoots(const correctors::FitData& data) {
-  return std::make_unique<KernelModel>(data, correctors::multiquadricKernels().front().sums_by_roots);
-}
-/// What a processor without wide registers runs.
-Model fitBaseline(const correctors::FitData& data) {
-  return std::make_unique<KernelModel>(data, correctors::multiquadricKernels().back().sums);
 }
 
 /// Fitted once a size: what is measured is evaluation.
@@ -185,26 +137,18 @@ void onePointPlain(benchmark::State& state) {
 }
 
 // The argument is places along an axis: 8 -> 512, 13 -> 2197. VTK's fit takes minutes beyond 512.
-BENCHMARK_CAPTURE(fitIt, ours, fitDouble)->Name("fit/fieldtrue")->Arg(8)->Arg(13)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(fitIt, ours, fitOurs)->Name("fit/fieldtrue")->Arg(8)->Arg(13)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(fitIt, alglib, fitAlglib)->Name("fit/alglib")->Arg(8)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(fitIt, alglib, fitAlglib)->Name("fit/alglib")->Arg(13)->Unit(benchmark::kMillisecond)->Iterations(1);
 BENCHMARK_CAPTURE(fitIt, vtk, fitVtk)->Name("fit/vtk")->Arg(8)->Unit(benchmark::kMillisecond)->Iterations(1);
 BENCHMARK(rootsAlone)->Name("one point/square roots alone")->Arg(8)->Arg(13);
-BENCHMARK_CAPTURE(onePoint, ours, fitDouble)->Name("one point/fieldtrue")->Arg(8)->Arg(13);
-BENCHMARK_CAPTURE(onePoint, roots, fitRoots)->Name("one point/all roots exact")->Arg(8)->Arg(13);
-BENCHMARK_CAPTURE(onePoint, single, fitSingle)->Name("one point/single")->Arg(8)->Arg(13);
-BENCHMARK_CAPTURE(onePoint, baseline, fitBaseline)->Name("one point/baseline x86-64")->Arg(8)->Arg(13);
+BENCHMARK_CAPTURE(onePoint, ours, fitOurs)->Name("one point/fieldtrue")->Arg(8)->Arg(13);
 BENCHMARK_CAPTURE(onePoint, lattice, fitLattice)->Name("one point/lattice")->Arg(8);
 BENCHMARK(onePointAlglib)->Name("one point/alglib")->Arg(8)->Arg(13);
 BENCHMARK(onePointVtk)->Name("one point/vtk")->Arg(8);
 BENCHMARK(onePointPlain)->Name("one point/plain loop")->Arg(8)->Arg(13);
-BENCHMARK_CAPTURE(manyPoints, ours, fitDouble)
+BENCHMARK_CAPTURE(manyPoints, ours, fitOurs)
     ->Name("100,000 points/fieldtrue")
-    ->Arg(8)
-    ->Arg(13)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(manyPoints, single, fitSingle)
-    ->Name("100,000 points/single")
     ->Arg(8)
     ->Arg(13)
     ->Unit(benchmark::kMillisecond);

@@ -107,7 +107,8 @@ def read(path, types, results, definitions):
         words = function["result"].split()
         if not words or words[0] in NOT_RESULTS or "static" in words or function["name"] == "main":
             continue
-        result = " ".join(w for w in words if w not in ("inline", "constexpr", "extern", "friend", "explicit"))
+        aside = ("inline", "constexpr", "extern", "friend", "explicit", "FIELDTRUE_CLONES")
+        result = " ".join(w for w in words if w not in aside)
         result = re.sub(r"\s+", "", result.replace("fieldtrue::", "")) + function["refs"]
         if not result or "(" in result:
             continue

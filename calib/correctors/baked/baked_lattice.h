@@ -11,7 +11,6 @@
 #include "calib/core/json_reader.h"
 #include "calib/correctors/baked/baked_lattice_kernel.h"
 #include "calib/correctors/base/position_model.h"
-#include "calib/correctors/multiquadric/hmq_field.h"
 #include "calib/correctors/numerics/aligned_vector.h"
 
 namespace fieldtrue::correctors {

@@ -10,6 +10,12 @@ namespace {
 
 constexpr double kSamePlace_m = 0.005;
 
+Eigen::MatrixXd rowsOf(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::MatrixXd rows(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i) rows.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
+  return rows;
+}
+
 }  // namespace
 
 Places mergePlaces(const FitData& data) {
@@ -41,6 +47,10 @@ Places mergePlaces(const FitData& data) {
   }
   return places;
 }
+
+Eigen::MatrixXd positionMatrix(const Places& places) { return rowsOf(places.p_tracked_m); }
+
+Eigen::MatrixXd truthMatrix(const Places& places) { return rowsOf(places.p_true_m); }
 
 int fewestLevels(const FitData& data) {
   int fewest = 0;
@@ -78,6 +88,13 @@ Result<void> checkOrientations(const FitData& data, const std::string& method) {
                   method + ": " + rowName(data, row) + " has an orientation that is not a unit quaternion");
   }
   return {};
+}
+
+Result<void> checkSpread(const std::string& method, std::size_t n_places, int dimension) {
+  if (dimension >= 2) return {};
+  return fail(ErrorCode::kDegenerate, method + " needs places that span a plane or a volume, and these " +
+                                          std::to_string(n_places) + " lie " +
+                                          (dimension == 1 ? "on one line" : "at one point"));
 }
 
 std::string planeNote(const FitData& data, const std::string& how) {

@@ -24,6 +24,10 @@ struct Places {
 /// number but stand apart stay apart.
 Places mergePlaces(const FitData& data);
 
+/// Tracked and true positions of places: one row a place [m].
+Eigen::MatrixXd positionMatrix(const Places& places);
+Eigen::MatrixXd truthMatrix(const Places& places);
+
 /// Levels of the grid along the axis that has fewest, of those with more than one; 0 where the places are on no grid.
 int fewestLevels(const FitData& data);
 
@@ -35,6 +39,10 @@ Result<void> checkPositions(const FitData& data, const std::string& method);
 /// As checkPositions, and orientations are there and can be normalised.
 /// @error kUnsupported without orientations
 Result<void> checkOrientations(const FitData& data, const std::string& method);
+
+/// @param dimension spread of the true positions
+/// @error kDegenerate below 2
+Result<void> checkSpread(const std::string& method, std::size_t n_places, int dimension);
 
 /// What a method says about places that all lie in one plane.
 std::string planeNote(const FitData& data, const std::string& how);

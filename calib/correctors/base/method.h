@@ -86,6 +86,8 @@ struct CorrectionMethod {
   std::vector<AutomaticTry> tries = {};
   /// How the source is read where a sentence of it leaves more than one way; empty where none does.
   std::string reading = {};
+  /// Settings that earlier versions stored in calibrations and that change nothing any more.
+  std::vector<std::string> former_settings = {};
 
   /// Whether hold_out gives what fits anew would.
   bool holdsOutExactly(const Settings& given) const { return hold_out != nullptr && !keeps_scales && !tunes(given); }

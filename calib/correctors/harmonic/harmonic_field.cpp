@@ -97,14 +97,6 @@ class HarmonicField : public PositionModel {
   std::string note_;
 };
 
-Result<void> checkSpread(const FitData& data) {
-  const int dimension = std::min(data.dimension, pointSpread(data.p_tracked_m).dimension);
-  if (dimension >= 2) return {};
-  return fail(ErrorCode::kDegenerate, std::string(kName) + " needs places that span a plane or a volume, and these " +
-                                          std::to_string(data.size()) + " lie " +
-                                          (dimension == 1 ? "on one line" : "at one point"));
-}
-
 /// The design, three rows a place by the unknowns of every candidate source, and the normal equations with their copy.
 double memory_bytes(std::size_t n_rows) {
   constexpr double kUnknowns = 2000.0;  // The lattices of candidates hold at most about 300 sources of six.
@@ -138,7 +130,7 @@ SoftBox boxOf(const FitData& data, const HarmonicFit& fit) {
 Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Settings& settings,
                                                    const RunControl& control) {
   FT_TRY_VOID(checkPositions(data, kName));
-  FT_TRY_VOID(checkSpread(data));
+  FT_TRY_VOID(checkSpread(kName, data.size(), std::min(data.dimension, pointSpread(data.p_tracked_m).dimension)));
   FT_TRY_VOID(MemoryBooking::book(std::string(kName) + " on " + std::to_string(data.size()) + " rows",
                                   memory_bytes(data.size()), control.stop));
   const HarmonicOptions options{numberSetting(settings, "least_gain"),

@@ -1,16 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <new>
 #include <nlohmann/json_fwd.hpp>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "calib/core/error.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/run_control.h"
-#include "calib/correctors/numerics/aligned_vector.h"
+#include "calib/correctors/base/fit_checks.h"
 
 namespace fieldtrue::correctors {
 
@@ -19,44 +16,40 @@ namespace fieldtrue::correctors {
 /// @source Hardy 1971; Zachmann 1997; survey by Kindratenko, section 3.5, eq. 16-18
 class MultiquadricField {
  public:
-  /// Solves eq. 18.
+  /// One number an output, the elements of a matrix at most; takes no memory from the heap, as no correction may.
+  using Outputs = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 9, 1>;
+
+  /// Solves eq. 18 at the tracked positions of places.
   /// @param name stands in messages
-  /// @param centers_m tracked positions, tracker frame [m]
-  /// @param node place of each centre, for messages
-  /// @param index its grid index; empty for scattered places
-  /// @param values one row a centre, one column an output
-  /// @error kDegenerate when two centres coincide or rounding would exceed a micrometre; kUnsupported beyond 10,000
-  ///        centres; kCancelled
-  static Result<MultiquadricField> fit(const std::string& name, std::span<const Eigen::Vector3d> centers_m,
-                                       std::span<const int> node, std::span<const std::array<int, 3>> index,
-                                       const Eigen::MatrixXd& values, double r2_m2, const RunControl& control);
+  /// @param values one row a place, one column an output
+  /// @error kDegenerate when two places were tracked at one position or rounding would exceed a micrometre;
+  ///        kUnsupported beyond 10,000 places; kCancelled
+  static Result<MultiquadricField> fit(const std::string& name, const Places& places, const Eigen::MatrixXd& values,
+                                       double r2_m2, const RunControl& control);
 
-  /// Of coefficients found elsewhere. @param alpha one row a centre, one column an output
-  MultiquadricField(std::span<const Eigen::Vector3d> centers_m, const Eigen::MatrixXd& alpha, double r2_m2);
+  /// Of coefficients found elsewhere.
+  /// @param centers_m tracker frame, one row a centre [m]
+  /// @param alpha one row a centre, one column an output
+  MultiquadricField(Eigen::MatrixX3d centers_m, Eigen::MatrixXd alpha, double r2_m2);
 
-  std::size_t size() const { return x_m_.size(); }
-  std::size_t outputs() const { return outputs_; }
   double r2_m2() const { return r2_m2_; }
-  Eigen::Vector3d center_m(std::size_t j) const { return {x_m_[j], y_m_[j], z_m_[j]}; }
-  const double* alpha(std::size_t output) const { return alpha_[output].data(); }
+  const Eigen::MatrixX3d& centers_m() const { return centers_m_; }
+  const Eigen::MatrixXd& alpha() const { return alpha_; }
 
-  /// f(p), one number an output. @param f length outputs()
-  void value(const Eigen::Vector3d& p_m, std::span<double> f) const;
-  /// f of three outputs at many points.
-  void value3(std::span<const Eigen::Vector3d> p_m, std::span<Eigen::Vector3d> f) const;
+  /// f(p), one number an output.
+  Outputs value(const Eigen::Vector3d& p_m) const;
+  /// f(p) of three outputs.
+  Eigen::Vector3d value3(const Eigen::Vector3d& p_m) const;
   /// d f / d p of three outputs: rows outputs, columns coordinates.
   Eigen::Matrix3d gradient3(const Eigen::Vector3d& p_m) const;
 
   nlohmann::json toJson() const;
-  static MultiquadricField fromJson(const JsonReader& json, std::size_t outputs);
+  static MultiquadricField fromJson(const JsonReader& json, Eigen::Index outputs);
 
  private:
-  MultiquadricField() = default;
-
+  Eigen::MatrixX3d centers_m_;
+  Eigen::MatrixXd alpha_;
   double r2_m2_ = 0.0;
-  std::size_t outputs_ = 0;
-  AlignedVector<double> x_m_, y_m_, z_m_;
-  std::vector<AlignedVector<double>> alpha_;  ///< One array an output.
 };
 
 }  // namespace fieldtrue::correctors

@@ -1,60 +1,52 @@
 #include "calib/correctors/multiquadric/hmq_kernel.h"
 
-#include <array>
+#include <cmath>
 
-#include "calib/correctors/multiquadric/hmq_kernel_plain.h"
+#include "calib/correctors/numerics/clones.h"
 
 namespace fieldtrue::correctors {
-namespace {
 
-using namespace hmq_kernel;
-
-void sumsByRoots(const MultiquadricArrays& centers, const double* alpha_x, const double* alpha_y, const double* alpha_z,
-                 const double* p_m, std::size_t n_points, double* f) {
-  plainSums(centers.x_m, centers.y_m, centers.z_m, centers.count, centers.r2_m2, alpha_x, alpha_y, alpha_z, p_m,
-            n_points, f);
-}
-
-void sumsSingle(const MultiquadricArraysSingle& terms, const float* p_m, std::size_t n_points, float* f) {
-  plainSums(terms.x_m, terms.y_m, terms.z_m, terms.count, terms.r2_m2, terms.alpha_x, terms.alpha_y, terms.alpha_z, p_m,
-            n_points, f);
-}
-
-void weights(const MultiquadricArrays& centers, const double* p_m, double* w_m) { plainWeights(centers, p_m, w_m); }
-
-double dot(const double* a, const double* b, std::size_t count) { return plainDot(a, b, count); }
-
-struct KernelTable {
-  std::array<MultiquadricKernel, kMostX86Kernels + 1> kernels;
-  std::size_t count = 0;
-
-  KernelTable() : count(x86Kernels(kernels.data())) {
-    kernels[count++] = {"plain", weights, sumsByRoots, sumsByRoots, sumsSingle, dot};
+FIELDTRUE_CLONES
+void multiquadricWeights(const MultiquadricArrays& centers, const double* p_m, double* __restrict w_m) {
+  const double* __restrict x_m = centers.x_m;
+  const double* __restrict y_m = centers.y_m;
+  const double* __restrict z_m = centers.z_m;
+  const double px = p_m[0], py = p_m[1], pz = p_m[2], r2 = centers.r2_m2;
+  const std::size_t count = centers.count;
+  for (std::size_t j = 0; j < count; ++j) {
+    const double dx = px - x_m[j], dy = py - y_m[j], dz = pz - z_m[j];
+    w_m[j] = std::sqrt(dx * dx + dy * dy + dz * dz + r2);
   }
-};
-
-}  // namespace
-
-std::span<const MultiquadricKernel> multiquadricKernels() {
-  static const KernelTable table;
-  return std::span(table.kernels).first(table.count);
 }
 
-void multiquadricWeights(const MultiquadricArrays& centers, const double* p_m, double* w_m) {
-  multiquadricKernels().front().weights(centers, p_m, w_m);
+FIELDTRUE_CLONES
+void multiquadricSums(const MultiquadricArrays& centers, const double* const alpha[3], const double* p_m, double* f) {
+  const double* __restrict x_m = centers.x_m;
+  const double* __restrict y_m = centers.y_m;
+  const double* __restrict z_m = centers.z_m;
+  const double* __restrict alpha_x = alpha[0];
+  const double* __restrict alpha_y = alpha[1];
+  const double* __restrict alpha_z = alpha[2];
+  const double px = p_m[0], py = p_m[1], pz = p_m[2], r2 = centers.r2_m2;
+  const std::size_t count = centers.count;
+  double fx = 0.0, fy = 0.0, fz = 0.0;
+  for (std::size_t j = 0; j < count; ++j) {
+    const double dx = px - x_m[j], dy = py - y_m[j], dz = pz - z_m[j];
+    const double w = std::sqrt(dx * dx + dy * dy + dz * dz + r2);
+    fx += alpha_x[j] * w;
+    fy += alpha_y[j] * w;
+    fz += alpha_z[j] * w;
+  }
+  f[0] = fx;
+  f[1] = fy;
+  f[2] = fz;
 }
 
-void multiquadricSums(const MultiquadricArrays& centers, const double* alpha_x, const double* alpha_y,
-                      const double* alpha_z, const double* p_m, std::size_t n_points, double* f) {
-  multiquadricKernels().front().sums(centers, alpha_x, alpha_y, alpha_z, p_m, n_points, f);
-}
-
-void multiquadricSumsSingle(const MultiquadricArraysSingle& terms, const float* p_m, std::size_t n_points, float* f) {
-  multiquadricKernels().front().sums_single(terms, p_m, n_points, f);
-}
-
+FIELDTRUE_CLONES
 double dotProduct(const double* a, const double* b, std::size_t count) {
-  return multiquadricKernels().front().dot(a, b, count);
+  double sum = 0.0;
+  for (std::size_t j = 0; j < count; ++j) sum += a[j] * b[j];
+  return sum;
 }
 
 }  // namespace fieldtrue::correctors

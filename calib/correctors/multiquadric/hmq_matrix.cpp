@@ -1,5 +1,4 @@
 #include <Eigen/SVD>
-#include <array>
 #include <cstdio>
 #include <numbers>
 
@@ -17,11 +16,10 @@
 namespace fieldtrue::correctors {
 namespace {
 
-using MatrixElements = std::array<double, 9>;
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-/// The rotation nearest in the least-squares sense to a 3x3 matrix (row after row), determinant +1.
-Eigen::Quaterniond nearestRotation(const MatrixElements& elements) {
-  const Eigen::Matrix3d matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(elements.data());
+/// The rotation nearest in the least-squares sense to a matrix, determinant +1.
+Eigen::Quaterniond nearestRotation(const Eigen::Matrix3d& matrix) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0 ? -1.0 : 1.0;
   const Eigen::Matrix3d rotation =
@@ -41,9 +39,7 @@ class HmqErrorRotation : public ErrorRotationModel {
 
  protected:
   Eigen::Quaterniond errorRotation(const Eigen::Vector3d& p_tracked_m) const override {
-    MatrixElements elements;
-    elements_.value(p_tracked_m, elements);
-    return nearestRotation(elements);
+    return nearestRotation(RowMatrix3d(elements_.value(p_tracked_m).data()));
   }
   nlohmann::json errorParameters() const override {
     nlohmann::json json = elements_.toJson();
@@ -70,7 +66,7 @@ Eigen::MatrixXd placeElements(const Places& places, const std::vector<Eigen::Qua
   for (std::size_t i = 0; i < places.size(); ++i) {
     std::vector<Eigen::Quaterniond> visits;
     for (const std::size_t row : places.rows[i]) visits.push_back(q_error[row]);
-    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation = meanRotation(visits).toRotationMatrix();
+    const RowMatrix3d rotation = meanRotation(visits).toRotationMatrix();
     elements.row(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::Matrix<double, 1, 9>>(rotation.data());
   }
   return elements;
@@ -82,15 +78,11 @@ Result<std::unique_ptr<OrientationModel>> fitHmqMatrix(const FitData& data, cons
   FT_TRY_VOID(checkOrientations(data, name));
   const ErrorFrame frame = errorFrame(settings);
   const Places places = mergePlaces(data);
-  if (data.dimension < 2)
-    return fail(ErrorCode::kDegenerate, name + " needs places that span a plane or a volume, and these " +
-                                            std::to_string(places.size()) + " lie " +
-                                            (data.dimension == 1 ? "on one line" : "at one point"));
-  FT_TRY_VOID(bookSquareMatrices(name, multiquadricMatrices(places.size()), places.size(), control));
+  FT_TRY_VOID(checkSpread(name, places.size(), data.dimension));
+  FT_TRY(const auto memory, bookSquareMatrices(name, multiquadricMatrices(places.size()), places.size(), control));
   const Eigen::MatrixXd elements = placeElements(places, errorRotations(data, frame));
   FT_TRY(const auto r2, chooseR2(name, places, elements, settings, textInDegrees, control));
-  FT_TRY(auto field,
-         MultiquadricField::fit(name, places.p_tracked_m, places.node, places.index, elements, r2.r2_m2, control));
+  FT_TRY(auto field, MultiquadricField::fit(name, places, elements, r2.r2_m2, control));
   std::string note = planeNote(data, "nothing is claimed off it");
   note += (note.empty() || r2.note.empty() ? "" : " ") + r2.note;
   return std::make_unique<HmqErrorRotation>(frame, std::move(field), note);

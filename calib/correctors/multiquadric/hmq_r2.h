@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <span>
 #include <string>
 
 #include "calib/core/error.h"
@@ -18,8 +17,8 @@ struct ChosenR2 {
 };
 
 /// The setting `r2_cm2`: its number, or with `auto` the value whose leave-one-out residuals over places are smallest.
-/// The residual of a place is alpha_i / (M^-1)_ii, without fitting anew; nine values evenly spaced in the logarithm
-/// over the setting's range are tried, then a golden-section search narrows the best one down to three digits.
+/// The residual of a place is alpha_i / (M^-1)_ii, without fitting anew. Nine values evenly spaced in the logarithm
+/// over the setting's range are tried, then twice nine more between the neighbours of the best.
 /// @param values at the places, one column an output
 /// @param residual_text how a residual of these values is named in the note, e.g. formats metres as mm
 /// @source Rippa 1999, eq. 5 (closed form)
@@ -27,11 +26,6 @@ struct ChosenR2 {
 Result<ChosenR2> chooseR2(const std::string& name, const Places& places, const Eigen::MatrixXd& values,
                           const Settings& settings, std::string (*residual_text)(double rms),
                           const RunControl& control);
-
-/// RMS over places of the leave-one-out residual's length, for one R squared.
-/// @error as chooseR2
-Result<double> leaveOneOutRms(const std::string& name, const Places& places, const Eigen::MatrixXd& values,
-                              double r2_m2, const RunControl& control);
 
 /// Matrices of all places alive at once while R squared is chosen, or later while places are held out.
 double multiquadricMatrices(std::size_t n_places);

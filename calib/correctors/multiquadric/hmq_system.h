@@ -1,23 +1,22 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <span>
+#include <Eigen/LU>
+#include <optional>
 #include <string>
-#include <vector>
 
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
+#include "calib/correctors/base/fit_checks.h"
+#include "calib/correctors/multiquadric/hmq_kernel.h"
 
 namespace fieldtrue::correctors {
 
-/// What every multiquadric asks of its centres first, and of OpenBLAS: one thread.
-/// @error kDegenerate when two centres coincide; kUnsupported beyond 10,000; kCancelled
-Result<void> checkMultiquadricCenters(const std::string& name, std::span<const Eigen::Vector3d> centers_m,
-                                      std::span<const int> node, std::span<const std::array<int, 3>> index,
-                                      const RunControl& control);
+/// Largest rounding error of a value that is accepted [m]; four digits below what any tracker resolves.
+inline constexpr double kRoundingLimit_m = 1e-6;
 
-/// c for which c 1 1^T - M is positive definite, with room: four times the largest entry that M may have.
-double multiquadricShift(std::span<const Eigen::Vector3d> centers_m, double r2_m2);
+/// Centres, one row each, from the first on. @param centers_m n x 3, column by column in memory; must outlive the
+/// arrays
+MultiquadricArrays arraysOf(const Eigen::MatrixX3d& centers_m, double r2_m2, Eigen::Index first = 0);
 
 /// The factorised system of equations M alpha = values, M_ij = w_j(p_i), through centres at scattered positions.
 ///
@@ -27,19 +26,13 @@ double multiquadricShift(std::span<const Eigen::Vector3d> centers_m, double r2_m
 /// @source survey by Kindratenko, section 3.5, eq. 18
 class MultiquadricSystem {
  public:
+  /// Through the tracked positions of places.
   /// @param name stands in messages
-  /// @param centers_m tracked positions, tracker frame [m]
-  /// @param node place of each centre, for messages
-  /// @param index its grid index; empty for scattered places
-  /// @error kDegenerate when two centres coincide or the system cannot be factorised; kUnsupported beyond 10,000
-  ///        centres; kCancelled
-  static Result<MultiquadricSystem> factorise(const std::string& name, std::span<const Eigen::Vector3d> centers_m,
-                                              std::span<const int> node, std::span<const std::array<int, 3>> index,
-                                              double r2_m2, const RunControl& control);
+  /// @error kDegenerate when two places were tracked at one position; kUnsupported beyond 10,000; kCancelled
+  static Result<MultiquadricSystem> factorise(const std::string& name, const Places& places, double r2_m2,
+                                              const RunControl& control);
 
-  std::size_t size() const { return centers_m_.size(); }
-  double r2_m2() const { return r2_m2_; }
-  std::span<const Eigen::Vector3d> centers_m() const { return centers_m_; }
+  const Eigen::MatrixX3d& centers_m() const { return centers_m_; }
 
   /// Coefficients through values, one column an output, improved once by their own residual where that exceeds
   /// a tenth of a nanometre.
@@ -48,29 +41,21 @@ class MultiquadricSystem {
 
   /// M^-1, symmetric. Replaces the factors: nothing else can be asked afterwards.
   Eigen::MatrixXd takeInverse() &&;
-  /// The diagonal of M^-1. Replaces the factors: nothing else can be asked afterwards.
-  Eigen::VectorXd takeInverseDiagonal() &&;
 
  private:
   MultiquadricSystem() = default;
   bool factoriseByCholesky();
-  bool solveForOnes();
-  bool factoriseByLu();
-  /// M^-1 from the inverse of A (Sherman and Morrison): -(A^-1 + k u u^T), u = A^-1 1.
-  double shermanMorrison() const;
   Eigen::MatrixXd solveOnce(const Eigen::MatrixXd& values) const;
-  /// M times columns, each entry of M made anew.
+  /// M times columns, each row of M made anew.
   Eigen::MatrixXd product(const Eigen::MatrixXd& columns) const;
 
   std::string name_;
-  std::vector<Eigen::Vector3d> centers_m_;
-  std::vector<double> x_m_, y_m_, z_m_;
+  Eigen::MatrixX3d centers_m_;
   double r2_m2_ = 0.0;
-  bool by_cholesky_ = true;
-  double shift_ = 0.0;  ///< c.
-  Eigen::MatrixXd factors_;
-  Eigen::VectorXd u_;  ///< A^-1 1, with Cholesky's factors.
-  std::vector<int> pivots_;
+  Eigen::MatrixXd factor_;                                  ///< Cholesky's, of A; later M^-1.
+  Eigen::MatrixXd u_;                                       ///< A^-1 1, one column.
+  double k_ = 0.0;                                          ///< M^-1 = -(A^-1 + k u u^T), by Sherman and Morrison.
+  std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> lu_;  ///< Of M, in place of Cholesky's.
 };
 
 }  // namespace fieldtrue::correctors

@@ -13,7 +13,10 @@ using Nodes = FeedForwardNetwork::Nodes;
 Nodes logistic(const Nodes& s) { return (1.0 + (-s.array()).exp()).inverse().matrix(); }
 
 /// df/ds of the logistic function, from its value.
-Eigen::ArrayXd slopeOf(const Nodes& f) { return f.array() * (1.0 - f.array()); }
+Nodes slopeOf(const Nodes& f) { return (f.array() * (1.0 - f.array())).matrix(); }
+
+/// d output / d input of the nodes of a layer; takes no memory from the heap.
+using Gradients = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, FeedForwardNetwork::kMostHidden>;
 
 /// The same numbers on every platform, which std::uniform_real_distribution does not promise.
 class Uniform {
@@ -73,18 +76,18 @@ Eigen::Vector3d FeedForwardNetwork::output(const Eigen::Vector3d& x) const { ret
 
 Eigen::Matrix3d FeedForwardNetwork::gradient(const Eigen::Vector3d& x) const {
   const Activity a = activity(x);
-  const Eigen::MatrixXd to_second = layer(thirdStart(), 3, n_second_) * slopeOf(a.second).matrix().asDiagonal();
-  const Eigen::MatrixXd to_first =
-      to_second * layer(secondStart(), n_second_, n_first_) * slopeOf(a.first).matrix().asDiagonal();
+  const Gradients to_second = layer(thirdStart(), 3, n_second_) * slopeOf(a.second).asDiagonal();
+  Gradients to_first = to_second.lazyProduct(layer(secondStart(), n_second_, n_first_));
+  to_first *= slopeOf(a.first).asDiagonal();
   return to_first * layer(0, n_first_, 3);
 }
 
 Eigen::Vector3d FeedForwardNetwork::outputWithWeightJacobian(const Eigen::Vector3d& x, WeightJacobian& jacobian) const {
   const Activity a = activity(x);
   // d output / d input of the nodes of each hidden layer; of the outputs it is the identity.
-  const Eigen::MatrixXd to_second = layer(thirdStart(), 3, n_second_) * slopeOf(a.second).matrix().asDiagonal();
-  const Eigen::MatrixXd to_first =
-      to_second * layer(secondStart(), n_second_, n_first_) * slopeOf(a.first).matrix().asDiagonal();
+  const Gradients to_second = layer(thirdStart(), 3, n_second_) * slopeOf(a.second).asDiagonal();
+  Gradients to_first = to_second.lazyProduct(layer(secondStart(), n_second_, n_first_));
+  to_first *= slopeOf(a.first).asDiagonal();
   jacobian.setZero(3, weights_.size());
   for (Eigen::Index node = 0; node < n_first_; ++node)
     jacobian.middleCols<3>(3 * node) = to_first.col(node) * x.transpose();

@@ -101,9 +101,8 @@ class NeuralNetworkPosition : public PositionModel {
 };
 
 Result<void> checkPlaces(const FitData& data, const Places& places, int n_weights) {
-  if (data.dimension < 2 || pointSpread(places.p_tracked_m).dimension < 2)
-    return fail(ErrorCode::kDegenerate, kName + " needs places that span a plane or a volume, and these " +
-                                            std::to_string(places.size()) + " do not");
+  const int dimension = std::min(data.dimension, pointSpread(places.p_tracked_m).dimension);
+  FT_TRY_VOID(checkSpread(kName, places.size(), dimension));
   const auto needed = static_cast<std::size_t>((n_weights + 2) / 3);
   if (places.size() < needed)
     return fail(ErrorCode::kTooFewNodes, kName + " has " + std::to_string(n_weights) + " weights and needs at least " +

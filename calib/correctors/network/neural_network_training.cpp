@@ -1,7 +1,6 @@
 #include "calib/correctors/network/neural_network_training.h"
 
 #include <ceres/ceres.h>
-#include <ceres/normal_prior.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,41 +9,99 @@
 #include <optional>
 #include <random>
 
+#include "calib/correctors/numerics/dense_solver.h"
+
 namespace fieldtrue::correctors {
 namespace {
 
-/// Errors of the outputs, three a pair. One block for all pairs: a block each costs a network each and more than half
-/// of the time.
+double squaredError(const FeedForwardNetwork& network, const TrainingSet& set) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < set.input.size(); ++i)
+    sum += (network.output(set.input[i]) - set.target[i]).squaredNorm();
+  return std::isfinite(sum) ? sum : HUGE_VAL;
+}
+
+/// A network's errors to first order in its weights.
+struct Linearised {
+  Eigen::MatrixXd jacobians;  ///< J^T: three columns a pair, one row a weight.
+  Eigen::MatrixXd normal;     ///< J^T J, lower triangle.
+  Eigen::VectorXd gradient;   ///< J^T e.
+  double error_squared = 0.0;
+};
+
+Linearised linearise(const FeedForwardNetwork& network, const TrainingSet& set) {
+  Linearised linear;
+  const auto n_pairs = static_cast<Eigen::Index>(set.input.size());
+  linear.jacobians.resize(network.weights().size(), 3 * n_pairs);
+  Eigen::VectorXd errors(3 * n_pairs);
+  FeedForwardNetwork::WeightJacobian jacobian;
+  for (Eigen::Index i = 0; i < n_pairs; ++i) {
+    const auto pair = static_cast<std::size_t>(i);
+    errors.segment<3>(3 * i) = network.outputWithWeightJacobian(set.input[pair], jacobian) - set.target[pair];
+    linear.jacobians.middleCols<3>(3 * i) = jacobian.transpose();
+  }
+  linear.normal = timesOwnTranspose(linear.jacobians);
+  linear.gradient = linear.jacobians * errors;
+  linear.error_squared = errors.squaredNorm();
+  return linear;
+}
+
+/// Cholesky's factor of J^T J with the penalty. Weights that do nothing leave it singular where there is none: the
+/// least that helps is added.
+bool factorise(Eigen::MatrixXd& normal, double penalty) {
+  normal.diagonal().array() += penalty;
+  const Eigen::MatrixXd given = normal;
+  double added = 1e-14 * given.diagonal().mean();
+  for (int attempt = 0; attempt < 8; ++attempt, added *= 100.0) {
+    if (choleskyInPlace(normal)) return true;
+    normal = given;
+    normal.diagonal().array() += added;
+  }
+  return false;
+}
+
+/// Squared errors of the outputs and the penalty of the weights, as their normal equations: Ceres is handed the
+/// Cholesky factor of J^T J in place of J, so cost, gradient and J^T J are the same, while a row a weight stands for
+/// three a pair, and OpenBLAS sums the products.
 class SetCost : public ceres::CostFunction {
  public:
-  SetCost(const FeedForwardNetwork& layers, const TrainingSet& set) : layers_(layers), set_(set) {
-    set_num_residuals(3 * static_cast<int>(set.input.size()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(layers.weights().size()));
+  SetCost(const FeedForwardNetwork& layers, const TrainingSet& set, double weight_penalty)
+      : layers_(layers), set_(set), penalty_(weight_penalty * static_cast<double>(set.input.size())) {
+    const auto n_weights = static_cast<int>(layers.weights().size());
+    set_num_residuals(n_weights + 1);
+    mutable_parameter_block_sizes()->push_back(n_weights);
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     FeedForwardNetwork network = layers_;
     const Eigen::Index n_weights = network.weights().size();
     network.setWeights(Eigen::Map<const Eigen::VectorXd>(parameters[0], n_weights));
-    FeedForwardNetwork::WeightJacobian jacobian;
-    bool is_finite = true;
-    for (std::size_t i = 0; i < set_.input.size(); ++i) {
-      Eigen::Map<Eigen::Vector3d> error(residuals + 3 * i);
-      if (jacobians == nullptr || jacobians[0] == nullptr) {
-        error = network.output(set_.input[i]) - set_.target[i];
-      } else {
-        error = network.outputWithWeightJacobian(set_.input[i], jacobian) - set_.target[i];
-        Eigen::Map<FeedForwardNetwork::WeightJacobian>(jacobians[0] + 3 * static_cast<Eigen::Index>(i) * n_weights, 3,
-                                                       n_weights) = jacobian;
-      }
-      is_finite = is_finite && error.allFinite();
+    Eigen::Map<Eigen::VectorXd> r(residuals, n_weights + 1);
+    if (jacobians == nullptr || jacobians[0] == nullptr) {
+      r.setZero();
+      r[n_weights] = std::sqrt(squaredError(network, set_) + penalty_ * network.weights().squaredNorm());
+      return r.allFinite();
     }
-    return is_finite;
+    Linearised linear = linearise(network, set_);
+    linear.error_squared += penalty_ * network.weights().squaredNorm();
+    linear.gradient += penalty_ * network.weights();
+    if (!std::isfinite(linear.error_squared) || !factorise(linear.normal, penalty_)) return false;
+    // r = L^-1 g, and what no change of the weights takes away.
+    Eigen::VectorXd reachable = linear.gradient;
+    choleskyForward(linear.normal, reachable);
+    r.head(n_weights) = reachable;
+    r[n_weights] = std::sqrt(std::max(0.0, linear.error_squared - reachable.squaredNorm()));
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> jacobian(
+        jacobians[0], n_weights + 1, n_weights);
+    jacobian.setZero();
+    jacobian.topRows(n_weights) = linear.normal.triangularView<Eigen::Lower>().transpose();
+    return r.allFinite();
   }
 
  private:
   const FeedForwardNetwork& layers_;
   const TrainingSet& set_;
+  double penalty_;
 };
 
 /// Counts iterations over all starts, and ends a start on request.
@@ -75,20 +132,16 @@ struct Ending {
 
 double heldOutError(const FeedForwardNetwork& network, const TrainingSet& set, double weight_penalty) {
   const std::size_t n_pairs = set.input.size();
-  const Eigen::Index n_weights = network.weights().size();
-  std::vector<FeedForwardNetwork::WeightJacobian> jacobians(n_pairs);
-  std::vector<Eigen::Vector3d> errors(n_pairs);
-  Eigen::MatrixXd normal =
-      weight_penalty * static_cast<double>(n_pairs) * Eigen::MatrixXd::Identity(n_weights, n_weights);
-  for (std::size_t i = 0; i < n_pairs; ++i) {
-    errors[i] = network.outputWithWeightJacobian(set.input[i], jacobians[i]) - set.target[i];
-    normal.noalias() += jacobians[i].transpose() * jacobians[i];
-  }
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
+  Linearised linear = linearise(network, set);
+  if (!factorise(linear.normal, weight_penalty * static_cast<double>(n_pairs))) return HUGE_VAL;
+  Eigen::MatrixXd solved = linear.jacobians;
+  choleskySolve(linear.normal, solved);
   double sum = 0.0;
   for (std::size_t i = 0; i < n_pairs; ++i) {
-    const Eigen::Matrix3d hat = jacobians[i] * factor.solve(jacobians[i].transpose());
-    sum += (Eigen::Matrix3d::Identity() - hat).partialPivLu().solve(errors[i]).squaredNorm();
+    const Eigen::Index first = 3 * static_cast<Eigen::Index>(i);
+    const Eigen::Matrix3d hat = linear.jacobians.middleCols<3>(first).transpose() * solved.middleCols<3>(first);
+    const Eigen::Vector3d error = network.output(set.input[i]) - set.target[i];
+    sum += (Eigen::Matrix3d::Identity() - hat).partialPivLu().solve(error).squaredNorm();
   }
   return std::isfinite(sum) ? sum / static_cast<double>(n_pairs) : HUGE_VAL;
 }
@@ -98,14 +151,7 @@ std::optional<FeedForwardNetwork> trainFrom(const FeedForwardNetwork& start, con
                                             double weight_penalty, int max_iterations, Watch& watch) {
   FeedForwardNetwork::Weights weights = start.weights();
   ceres::Problem problem;
-  problem.AddResidualBlock(new SetCost(start, set), nullptr, weights.data());
-  if (weight_penalty > 0.0) {
-    const auto n_weights = weights.size();
-    const double factor = std::sqrt(weight_penalty * static_cast<double>(set.input.size()));
-    problem.AddResidualBlock(
-        new ceres::NormalPrior(factor * ceres::Matrix::Identity(n_weights, n_weights), ceres::Vector::Zero(n_weights)),
-        nullptr, weights.data());
-  }
+  problem.AddResidualBlock(new SetCost(start, set, weight_penalty), nullptr, weights.data());
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
   solver.max_num_iterations = max_iterations;
@@ -144,13 +190,6 @@ FeedForwardNetwork startOf(const FeedForwardNetwork& network, const LevenbergMar
   FeedForwardNetwork start = network;
   start.setRandomWeights(1000003 * options.seed + number);
   return start;
-}
-
-double squaredError(const FeedForwardNetwork& network, const TrainingSet& set) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < set.input.size(); ++i)
-    sum += (network.output(set.input[i]) - set.target[i]).squaredNorm();
-  return std::isfinite(sum) ? sum : HUGE_VAL;
 }
 
 /// The pairs of one part, in a shuffled order, and all others.

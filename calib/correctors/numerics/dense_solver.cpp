@@ -101,6 +101,16 @@ void subtractSymmetricProduct(Eigen::MatrixXd& a, const Eigen::MatrixXd& x, cons
                1.0, a.data(), n);
 }
 
+Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a) {
+  useOneThread();
+  const int n = static_cast<int>(a.rows());
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(n, n);
+  if (a.size() > 0)
+    cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, n, static_cast<int>(a.cols()), 1.0, a.data(), n, 0.0,
+                product.data(), n);
+  return product;
+}
+
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   useOneThread();
   const int n = sizeOf(a);

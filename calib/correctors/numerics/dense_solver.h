@@ -33,6 +33,9 @@ double choleskyLogDeterminant(const Eigen::MatrixXd& factor);
 /// A - X Y^T - Y X^T in the lower triangle. @param a in and out: lower triangle; X and Y thin
 void subtractSymmetricProduct(Eigen::MatrixXd& a, const Eigen::MatrixXd& x, const Eigen::MatrixXd& y);
 
+/// A A^T, in the lower triangle.
+Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a);
+
 /// A B for symmetric A whose lower triangle is given.
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 

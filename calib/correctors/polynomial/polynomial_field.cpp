@@ -54,10 +54,7 @@ Monomials monomials(const Eigen::Vector3d& local, int dimension, int degree) {
 }
 
 Result<void> checkProblem(const PolynomialProblem& problem) {
-  if (problem.dimension < 2)
-    return fail(ErrorCode::kDegenerate, problem.name + " needs places that span a plane or a volume, and these " +
-                                            std::to_string(problem.n_places) + " lie " +
-                                            (problem.dimension == 1 ? "on one line" : "at one point"));
+  FT_TRY_VOID(checkSpread(problem.name, problem.n_places, problem.dimension));
   const int terms = PolynomialField::termCount(problem.dimension, problem.degree);
   if (problem.n_places < static_cast<std::size_t>(terms))
     return fail(ErrorCode::kTooFewNodes, problem.name + (problem.dimension == 2 ? " in a plane" : "") +

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/correctors/base/fit_names.h"
 #include "calib/correctors/numerics/dense_solver.h"
 
 namespace fieldtrue::correctors {
@@ -188,42 +187,12 @@ std::optional<Eigen::MatrixXd> RadialHoldOut::leftOutErrors(std::span<const std:
   return llt.solve(errors).eval();
 }
 
-Result<std::vector<std::size_t>> placesOfRows(const Places& places, std::span<const std::size_t> rows) {
-  std::vector<std::size_t> out;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto held = std::count_if(places.rows[i].begin(), places.rows[i].end(),
-                                    [&](std::size_t row) { return std::binary_search(rows.begin(), rows.end(), row); });
-    if (held == 0) continue;
-    if (static_cast<std::size_t>(held) != places.rows[i].size())
-      return fail(ErrorCode::kUnsupported,
-                  namesOf(places).of(places.node[i]) + " can only be held out with all of its visits, and " +
-                      std::to_string(held) + " of " + std::to_string(places.rows[i].size()) + " were asked for");
-    out.push_back(i);
-  }
-  return out;
-}
-
-Eigen::MatrixXd displacementMatrix(const Places& places) {
-  Eigen::MatrixXd y(static_cast<Eigen::Index>(places.size()), 3);
-  for (std::size_t i = 0; i < places.size(); ++i)
-    y.row(static_cast<Eigen::Index>(i)) = (places.p_true_m[i] - places.p_tracked_m[i]).transpose();
-  return y;
-}
-
-Eigen::MatrixXd positionMatrix(const Places& places) {
-  Eigen::MatrixXd x(static_cast<Eigen::Index>(places.size()), 3);
-  for (std::size_t i = 0; i < places.size(); ++i)
-    x.row(static_cast<Eigen::Index>(i)) = places.p_tracked_m[i].transpose();
-  return x;
-}
+Eigen::MatrixXd displacementMatrix(const Places& places) { return truthMatrix(places) - positionMatrix(places); }
 
 Result<Places> smoothFitPlaces(const FitData& data, const std::string& name) {
   FT_TRY_VOID(checkPositions(data, name));
   Places places = mergePlaces(data);
-  if (data.dimension < 2)
-    return fail(ErrorCode::kDegenerate, name + " needs places that span a plane or a volume, and these " +
-                                            std::to_string(places.size()) + " lie " +
-                                            (data.dimension == 1 ? "on one line" : "at one point"));
+  FT_TRY_VOID(checkSpread(name, places.size(), data.dimension));
   const auto needed = static_cast<std::size_t>(data.dimension) + 3;
   if (places.size() < needed)
     return fail(ErrorCode::kTooFewNodes,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/correctors/base/hold_out_rows.h"
 #include "calib/correctors/radial/rbf_field.h"
 
 namespace fieldtrue::correctors {
@@ -81,28 +82,8 @@ class RadialHoldOut {
   RadialSolution of_y_, of_x_;
 };
 
-/// The places that rows of fit data belong to.
-/// @error kUnsupported when only some visits of a place are among the rows
-Result<std::vector<std::size_t>> placesOfRows(const Places& places, std::span<const std::size_t> rows);
-
-/// What is left of values by place. @param out ascending
-template <class Value>
-std::vector<Value> withoutPlaces(const std::vector<Value>& values, std::span<const std::size_t> out) {
-  std::vector<Value> kept;
-  kept.reserve(values.size() - out.size());
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (next < out.size() && out[next] == i)
-      ++next;
-    else
-      kept.push_back(values[i]);
-  }
-  return kept;
-}
-
-/// Displacements, true minus tracked, and tracked positions of places: one row a place [m].
+/// Displacements, true minus tracked: one row a place [m].
 Eigen::MatrixXd displacementMatrix(const Places& places);
-Eigen::MatrixXd positionMatrix(const Places& places);
 
 /// Checks data for a smooth fit and merges its places.
 /// @error as checkPositions; kDegenerate below a plane; kTooFewNodes below two more places than a linear field has

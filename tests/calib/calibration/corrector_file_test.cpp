@@ -73,8 +73,7 @@ class CorrectorFileTest : public QObject {
     QTest::newRow("affine") << QByteArray("affine") << QByteArray("rigid:error_frame=sensor");
     QTest::newRow("polynomial") << QByteArray("polynomial") << QByteArray("polynomial_quaternion:degree=2");
     QTest::newRow("multiquadric") << QByteArray("hmq:r2_cm2=33.3") << QByteArray("hmq_matrix");
-    QTest::newRow("multiquadric, automatic and single")
-        << QByteArray("hmq:r2_cm2=auto,precision=single") << QByteArray("hmq_matrix:r2_cm2=auto");
+    QTest::newRow("multiquadric, automatic") << QByteArray("hmq:r2_cm2=auto") << QByteArray("hmq_matrix:r2_cm2=auto");
   }
   void reloadsToTheSameBits() {
     QFETCH(QByteArray, position);
@@ -128,8 +127,19 @@ class CorrectorFileTest : public QObject {
   void aSettingThatCameLaterStandsAtItsDefault() {
     const Corrector original = fitted("hmq", "none");
     const std::string before_the_setting =
-        rewritten(original.toText(), [](json& j) { j["position"]["settings"].erase("precision"); });
+        rewritten(original.toText(), [](json& j) { j["position"]["settings"].erase("r2_cm2"); });
     const auto loaded = Corrector::fromText(before_the_setting, "old.ftcal.json");
+    FT_VERIFY_OK(loaded);
+    QCOMPARE(QByteArray::fromStdString(loaded->toText()), QByteArray::fromStdString(original.toText()));
+  }
+
+  void aSettingThatIsNoMoreIsReadOver() {
+    const Corrector original = fitted("hmq", "none");
+    const std::string with_the_setting = rewritten(original.toText(), [](json& j) {
+      j["position"]["settings"]["precision"] = "single";
+      j["position"]["parameters"]["precision"] = "single";
+    });
+    const auto loaded = Corrector::fromText(with_the_setting, "old.ftcal.json");
     FT_VERIFY_OK(loaded);
     QCOMPARE(QByteArray::fromStdString(loaded->toText()), QByteArray::fromStdString(original.toText()));
   }

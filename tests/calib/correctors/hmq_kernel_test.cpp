@@ -1,6 +1,7 @@
 #include "calib/correctors/multiquadric/hmq_kernel.h"
 
 #include <QTest>
+#include <array>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -20,6 +21,7 @@ namespace {
 struct Drawn {
   std::vector<double> x, y, z, ax, ay, az;
   MultiquadricArrays arrays(double r2_m2) const { return {x.data(), y.data(), z.data(), x.size(), r2_m2}; }
+  std::array<const double*, 3> alpha() const { return {ax.data(), ay.data(), az.data()}; }
 };
 
 Drawn draw(std::size_t count) {
@@ -66,109 +68,63 @@ class HmqKernelTest : public QObject {
   Q_OBJECT
  private slots:
   void sumsAreThoseOfTheEquations_data() {
-    QTest::addColumn<int>("kernel");
-    QTest::addColumn<bool>("by_roots");
     QTest::addColumn<double>("distance_m");
     QTest::addColumn<double>("r2_m2");
-    const auto kernels = multiquadricKernels();
-    for (std::size_t k = 0; k < kernels.size(); ++k) {
-      for (const bool by_roots : {false, true}) {
-        const auto row = [&](const char* name, double distance_m, double r2_m2) {
-          QTest::addRow("%s%s, %s", kernels[k].name, by_roots ? " by roots" : "", name)
-              << static_cast<int>(k) << by_roots << distance_m << r2_m2;
-        };
-        row("among the centres", 0.3, 0.01);
-        row("a kilometre away", 1e3, 0.01);
-        row("a thousand kilometres away", 1e6, 0.1);
-        row("beyond single precision", 1e25, 0.1);
-        row("sharp", 0.3, 1e-12);
-        row("sharper than single precision", 0.3, 1e-50);
-      }
-    }
+    QTest::newRow("among the centres") << 0.3 << 0.01;
+    QTest::newRow("a kilometre away") << 1e3 << 0.01;
+    QTest::newRow("a thousand kilometres away") << 1e6 << 0.1;
+    QTest::newRow("beyond single precision") << 1e25 << 0.1;
+    QTest::newRow("sharp") << 0.3 << 1e-12;
+    QTest::newRow("sharper than single precision") << 0.3 << 1e-50;
   }
   void sumsAreThoseOfTheEquations() {
-    QFETCH(int, kernel);
-    QFETCH(bool, by_roots);
     QFETCH(double, distance_m);
     QFETCH(double, r2_m2);
-    const MultiquadricKernel& tried = multiquadricKernels()[static_cast<std::size_t>(kernel)];
-    const auto sums = by_roots ? tried.sums_by_roots : tried.sums;
-    const double points_m[] = {distance_m, -0.2, 0.1, 0.05, distance_m, -0.4};
+    const double p_m[] = {0.05, distance_m, -0.4};
     for (std::size_t count = 1; count <= 140; ++count) {
       const Drawn drawn = draw(count);
-      double f[6];
-      sums(drawn.arrays(r2_m2), drawn.ax.data(), drawn.ay.data(), drawn.az.data(), points_m, 2, f);
-      for (int point = 0; point < 2; ++point) {
-        const Expected expected = expectedSums(drawn, points_m + 3 * point, r2_m2);
-        // A few units in the last place of each term, in whatever order they are summed.
-        for (int axis = 0; axis < 3; ++axis)
-          FT_VERIFY_MATCH(near(f[3 * point + axis], expected.f[axis], 8e-16 * expected.magnitude));
-      }
+      double f[3];
+      multiquadricSums(drawn.arrays(r2_m2), drawn.alpha().data(), p_m, f);
+      const Expected expected = expectedSums(drawn, p_m, r2_m2);
+      // A few units in the last place of each term, in whatever order they are summed.
+      for (int axis = 0; axis < 3; ++axis) FT_VERIFY_MATCH(near(f[axis], expected.f[axis], 8e-16 * expected.magnitude));
     }
   }
 
-  void theSumsInUseAreThoseOfTheFastestKernel() {
-    const Drawn drawn = draw(77);
-    const double p_m[] = {0.3, -0.2, 0.1};
-    double used[3];
-    double fastest[3];
-    multiquadricSums(drawn.arrays(0.01), drawn.ax.data(), drawn.ay.data(), drawn.az.data(), p_m, 1, used);
-    multiquadricKernels().front().sums(drawn.arrays(0.01), drawn.ax.data(), drawn.ay.data(), drawn.az.data(), p_m, 1,
-                                       fastest);
-    for (int axis = 0; axis < 3; ++axis) FT_VERIFY_MATCH(sameBits(used[axis], fastest[axis]));
-    QCOMPARE(multiquadricKernels().back().name, "plain");
-  }
-
-  void singlePrecisionIsWithinItsRounding_data() {
-    QTest::addColumn<int>("kernel");
-    for (std::size_t k = 0; k < multiquadricKernels().size(); ++k)
-      QTest::newRow(multiquadricKernels()[k].name) << static_cast<int>(k);
-  }
-  void singlePrecisionIsWithinItsRounding() {
-    QFETCH(int, kernel);
-    const MultiquadricKernel& tried = multiquadricKernels()[static_cast<std::size_t>(kernel)];
-    const double p_m[] = {0.25, -0.5, 0.125};
-    const float p_single_m[] = {0.25F, -0.5F, 0.125F};
-    for (std::size_t count = 1; count <= 80; ++count) {
-      const Drawn drawn = draw(count);
-      std::vector<float> single[6];
-      const std::vector<double>* const doubles[] = {&drawn.x, &drawn.y, &drawn.z, &drawn.ax, &drawn.ay, &drawn.az};
-      for (int k = 0; k < 6; ++k)
-        for (const double value : *doubles[k]) single[k].push_back(static_cast<float>(value));
-      const MultiquadricArraysSingle terms{single[0].data(),
-                                           single[1].data(),
-                                           single[2].data(),
-                                           single[3].data(),
-                                           single[4].data(),
-                                           single[5].data(),
-                                           count,
-                                           0.01F};
-      float f[3];
-      tried.sums_single(terms, p_single_m, 1, f);
-      const Expected expected = expectedSums(drawn, p_m, 0.01);
-      // Half a unit in the last place (6e-8) of each coordinate, coefficient, root and product, and of each sum.
-      for (int axis = 0; axis < 3; ++axis)
-        FT_VERIFY_MATCH(near(static_cast<double>(f[axis]), expected.f[axis],
-                             6e-8 * (4.0 + static_cast<double>(count) / 4.0) * expected.magnitude));
+  /// Else a calibration would correct a pose differently each time that it is loaded.
+  void sumsAreTheSameBitsWhereverTheyLieInMemory() {
+    const double p_m[] = {0.4, -0.1, 0.7};
+    const Drawn drawn = draw(567);
+    double expected[3];
+    multiquadricSums(drawn.arrays(0.01), drawn.alpha().data(), p_m, expected);
+    const double product = dotProduct(drawn.ax.data(), drawn.x.data(), drawn.x.size());
+    for (std::size_t shift = 1; shift < 9; ++shift) {
+      Drawn moved = drawn;
+      for (std::vector<double>* values : {&moved.x, &moved.y, &moved.z, &moved.ax, &moved.ay, &moved.az})
+        values->insert(values->begin(), shift, 0.0);
+      const MultiquadricArrays arrays{moved.x.data() + shift, moved.y.data() + shift, moved.z.data() + shift, 567,
+                                      0.01};
+      const double* const alpha[] = {moved.ax.data() + shift, moved.ay.data() + shift, moved.az.data() + shift};
+      double f[3];
+      multiquadricSums(arrays, alpha, p_m, f);
+      for (int axis = 0; axis < 3; ++axis) FT_VERIFY_MATCH(sameBits(f[axis], expected[axis]));
+      FT_VERIFY_MATCH(sameBits(dotProduct(alpha[0], arrays.x_m, arrays.count), product));
     }
   }
 
-  void weightsAndProductsAreThoseOfTheEquations_data() { singlePrecisionIsWithinItsRounding_data(); }
   void weightsAndProductsAreThoseOfTheEquations() {
-    QFETCH(int, kernel);
-    const MultiquadricKernel& tried = multiquadricKernels()[static_cast<std::size_t>(kernel)];
     const double p_m[] = {0.4, -0.1, 0.7};
     for (std::size_t count = 1; count <= 40; ++count) {
       const Drawn drawn = draw(count);
       std::vector<double> w_m(count);
-      tried.weights(drawn.arrays(0.01), p_m, w_m.data());
+      multiquadricWeights(drawn.arrays(0.01), p_m, w_m.data());
       long double product = 0;
       for (std::size_t j = 0; j < count; ++j) {
         const auto expected_m = static_cast<double>(weight(drawn, j, p_m, 0.01));
         FT_VERIFY_MATCH(near(w_m[j], expected_m, 4e-16 * expected_m));
         product += static_cast<long double>(w_m[j]) * drawn.ax[j];
       }
-      FT_VERIFY_MATCH(near(tried.dot(drawn.ax.data(), w_m.data(), count), static_cast<double>(product),
+      FT_VERIFY_MATCH(near(dotProduct(drawn.ax.data(), w_m.data(), count), static_cast<double>(product),
                            4e-16 * static_cast<double>(count)));
     }
   }
@@ -185,29 +141,18 @@ class HmqKernelTest : public QObject {
     const FitData data = fitDataOf(shakenGrid({10, 10, 10}, 0.15, 0.005), [](const Eigen::Vector3d& p) {
       return Eigen::Vector3d(0.05 * Eigen::Vector3d(std::sin(2.0 * p.y()), std::cos(1.5 * p.z()), p.x() * p.y()));
     });
-    Eigen::MatrixXd truth(static_cast<Eigen::Index>(data.size()), 3);
-    for (std::size_t i = 0; i < data.size(); ++i)
-      truth.row(static_cast<Eigen::Index>(i)) = data.p_true_m[i].transpose();
-    const auto field =
-        MultiquadricField::fit("Multiquadric", data.p_tracked_m, data.node, data.index, truth, 1e-4 * r2_cm2, {});
+    const Places places = mergePlaces(data);
+    const auto field = MultiquadricField::fit("Multiquadric", places, truthMatrix(places), 1e-4 * r2_cm2, {});
     FT_VERIFY_OK(field);
-    Drawn fitted;
-    for (std::size_t j = 0; j < field->size(); ++j) {
-      fitted.x.push_back(field->center_m(j).x());
-      fitted.y.push_back(field->center_m(j).y());
-      fitted.z.push_back(field->center_m(j).z());
-      fitted.ax.push_back(field->alpha(0)[j]);
-      fitted.ay.push_back(field->alpha(1)[j]);
-      fitted.az.push_back(field->alpha(2)[j]);
-    }
-    for (const MultiquadricKernel& kernel : multiquadricKernels()) {
-      for (const Eigen::Vector3d& p_m : randomPoints(60)) {
-        double f[3];
-        kernel.sums(fitted.arrays(1e-4 * r2_cm2), fitted.ax.data(), fitted.ay.data(), fitted.az.data(), p_m.data(), 1,
-                    f);
-        const Expected expected = expectedSums(fitted, p_m.data(), 1e-4 * r2_cm2);
-        for (int axis = 0; axis < 3; ++axis) FT_VERIFY_MATCH(near(f[axis], expected.f[axis], 1e-9));
-      }
+    const auto column = [](const auto& matrix, Eigen::Index k) {
+      return std::vector<double>(matrix.col(k).begin(), matrix.col(k).end());
+    };
+    const Drawn fitted{column(field->centers_m(), 0), column(field->centers_m(), 1), column(field->centers_m(), 2),
+                       column(field->alpha(), 0),     column(field->alpha(), 1),     column(field->alpha(), 2)};
+    for (const Eigen::Vector3d& p_m : randomPoints(60)) {
+      const Expected expected = expectedSums(fitted, p_m.data(), 1e-4 * r2_cm2);
+      const Eigen::Vector3d f = field->value3(p_m);
+      for (int axis = 0; axis < 3; ++axis) FT_VERIFY_MATCH(near(f[axis], expected.f[axis], 1e-9));
     }
   }
 };

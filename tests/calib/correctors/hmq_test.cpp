@@ -176,31 +176,6 @@ class HmqTest : public QObject {
     QVERIFY((*by_hand)->parameters().at("alpha") == (*automatic)->parameters().at("alpha"));
   }
 
-  void singlePrecisionStaysWithinWhatItStates() {
-    const FitData data = fitDataOf(shakenGrid({8, 8, 8}, 0.15, 0.01), wave_m);
-    const auto exact = fitPosition("hmq", data);
-    const auto single = fitPosition("hmq", data, {{"precision", "single"}});
-    FT_VERIFY_OK(exact);
-    FT_VERIFY_OK(single);
-    const QString note = QString::fromStdString((*single)->note());
-    const QRegularExpressionMatch said = QRegularExpression("within (\\S+) um").match(note);
-    QVERIFY2(said.hasMatch(), qPrintable(note));
-    const double stated_m = 1e-6 * said.captured(1).toDouble();
-    QVERIFY2(stated_m > 0.0 && stated_m < 1e-4, qPrintable(note));
-    double largest_m = 0.0;
-    for (const Eigen::Vector3d& p_m : randomPoints(3000, 99)) {
-      const Eigen::Vector3d from_corner_m = p_m - Eigen::Vector3d(0.4, -0.3, -0.2);
-      if (from_corner_m.minCoeff() < 0.0 || from_corner_m.maxCoeff() > 1.05) continue;
-      largest_m = std::max(largest_m, ((*single)->displacement_m(p_m) - (*exact)->displacement_m(p_m)).norm());
-    }
-    QVERIFY2(largest_m > 0.0 && largest_m <= stated_m, qPrintable(QString("%1 m").arg(largest_m)));
-    const auto reloaded = findPositionMethod("hmq").value()->load((*single)->parameters());
-    FT_VERIFY_OK(reloaded);
-    QVERIFY((*reloaded)->parameters() == (*single)->parameters());
-    for (const Eigen::Vector3d& p_m : randomPoints(100))
-      QVERIFY((*reloaded)->displacement_m(p_m) == (*single)->displacement_m(p_m));
-  }
-
   void stopsWhenAsked() {
     const PositionMethod& method = *findPositionMethod("hmq").value();
     std::stop_source source;
