@@ -1,0 +1,121 @@
+#include "calib/identify/selection.h"
+
+#include <QTest>
+#include <algorithm>
+
+#include "tests/calib/gap/gap_fixtures.h"
+#include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::identify;
+using namespace fieldtrue::testing;
+
+namespace {
+
+struct Withheld {
+  const char* id;
+  const char* parameters;
+};
+
+constexpr Withheld kBody{"compact_metal", R"({"center_m": [1.3, 0.5, 0.3], "radius_m": 0.12})"};
+constexpr Withheld kScale{"grid_scale", R"({"scale": [0.01, -0.008, 0.004]})"};
+
+CalibrationTable recordedWith(std::initializer_list<Withheld> effects, unsigned seed = 1) {
+  simulation::Scene scene = gapScene();
+  for (const Withheld& one : effects) scene.effects.push_back({one.id, nlohmann::json::parse(one.parameters)});
+  return recordedIn(scene, gapPlan({.orientations = threeTurns()}, seed), seed);
+}
+
+QString namesOf(const EffectSelection& selection) {
+  QStringList ids;
+  for (const GapTerm& term : selection.model.model.terms) ids << QString::fromStdString(term.effect->id);
+  ids.sort();
+  return ids.join(' ');
+}
+
+}  // namespace
+
+/// Adding, exchanging and dropping effects.
+class SelectionTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void selectsWhatWasWithheld() {
+    const CalibrationTable table = recordedWith({kBody, kScale});
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const GapSearch search(rows, {});
+    const EffectSelectionOptions options;
+    const EffectSelection seen = selectEffects(search, options, {});
+    QCOMPARE(namesOf(seen), QString("compact_metal grid_scale"));
+    QCOMPARE(seen.ways.size(), seen.model.model.terms.size());
+    const double bic = search.bicOf(seen.model.model);
+    const double none = search.bicOf(search.none().model);
+    FT_VERIFY_MATCH(near(seen.bic_gain, none - bic, 1e-6));
+    double most = 0.0;
+    for (std::size_t term = 0; term < seen.ways.size(); ++term) {
+      const RefinedModel rest = search.refined(withoutTerm(seen.model.model, term));
+      const double cost = search.bicOf(rest.model) - bic;
+      // Nothing is left to drop, nothing to exchange: the two things that it ends with.
+      QVERIFY2(cost >= options.least_gain_more, qPrintable(QString::number(cost)));
+      most = std::max(most, cost);
+      if (term == seen.leading) FT_VERIFY_MATCH(near(cost, most, 1e-6));
+      for (const TriedEffect& other : search.rank(rest, {}))
+        if (other.fitted.is_plausible && other.held_out_gain > 0.0)
+          QVERIFY2(search.bicOf(other.model) > bic - 2.0, search.ways()[other.way].effect->id.c_str());
+    }
+    // Nor to add.
+    for (const TriedEffect& more : search.rank(seen.model, {}))
+      QVERIFY(more.bic_gain < options.least_gain_more || !more.fitted.is_plausible || more.held_out_gain <= 0.0);
+  }
+
+  void findsNothingInNoise() {
+    for (const unsigned seed : {1U, 2U, 3U}) {
+      const CalibrationTable table = recordedWith({}, seed);
+      const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+      const GapSearch search(rows, {});
+      const EffectSelection seen = selectEffects(search, {}, {});
+      QCOMPARE(namesOf(seen), QString());
+      QCOMPARE(seen.bic_gain, 0.0);
+    }
+  }
+
+  void keepsToTheNumberAskedFor() {
+    const CalibrationTable table = recordedWith({kBody, kScale});
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const GapSearch search(rows, {});
+    for (const int most : {0, 1}) {
+      EffectSelectionOptions options;
+      options.most_effects = most;
+      const EffectSelection seen = selectEffects(search, options, {});
+      QCOMPARE(static_cast<int>(seen.ways.size()), most);
+    }
+  }
+
+  /// An effect whose whole gain is asked for and a little more is not taken.
+  void takesNoEffectBelowItsPrice() {
+    const CalibrationTable table = recordedWith({kScale});
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const GapSearch search(rows, {});
+    const EffectSelection free = selectEffects(search, {}, {});
+    QCOMPARE(namesOf(free), QString("grid_scale"));
+    EffectSelectionOptions dear;
+    dear.least_gain_first = free.first.front().bic_gain + 1.0;
+    const EffectSelection seen = selectEffects(search, dear, {});
+    QCOMPARE(namesOf(seen), QString());
+    QCOMPARE(seen.first.size(), free.first.size());
+  }
+
+  void doesNotDependOnTheOrderOfRows() {
+    CalibrationTable table = recordedWith({kBody, kScale});
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const EffectSelection seen = selectEffects(GapSearch(rows, {}), {}, {});
+    std::reverse(table.nodes.begin(), table.nodes.end());
+    const GapRows reversed = makeGapRows(table.nodes, table.metadata).value();
+    const EffectSelection other = selectEffects(GapSearch(reversed, {}), {}, {});
+    QCOMPARE(namesOf(other), namesOf(seen));
+    FT_VERIFY_MATCH(near(other.bic_gain, seen.bic_gain, 0.05));
+  }
+};
+
+FIELDTRUE_TEST(SelectionTest)
+#include "selection_test.moc"
