@@ -20,12 +20,12 @@ QRegularExpressionMatchIterator linksOf(const QString& text) {
   return link.globalMatch(text);
 }
 
-/// Every source file of the project by its name; names that several folders have, all of them.
-QMultiMap<QString, QString> sourcesByName() {
+/// Every source file in folders of the project by its name; names that several folders have, all of them.
+QMultiMap<QString, QString> filesByName(std::initializer_list<const char*> folders) {
   QMultiMap<QString, QString> found;
   const QDir root(projectPath(QString()));
-  for (const char* layer : {"calib", "acquisition", "widgets", "app"}) {
-    QDirIterator files(root.filePath(QLatin1String(layer)), {QStringLiteral("*.cpp"), QStringLiteral("*.h")},
+  for (const char* folder : folders) {
+    QDirIterator files(root.filePath(QLatin1String(folder)), {QStringLiteral("*.cpp"), QStringLiteral("*.h")},
                        QDir::Files, QDirIterator::Subdirectories);
     while (files.hasNext()) {
       const QString path = files.next();
@@ -34,6 +34,8 @@ QMultiMap<QString, QString> sourcesByName() {
   }
   return found;
 }
+
+QMultiMap<QString, QString> sourcesByName() { return filesByName({"calib", "acquisition", "widgets", "app"}); }
 
 QStringList codeSpans(const QString& cell) {
   static const QRegularExpression span(QStringLiteral("`([^`]+)`"));
@@ -66,6 +68,22 @@ class GuidePagesTest : public QObject {
       if (line.startsWith(QLatin1Char('|')) || line.startsWith(QLatin1String("!["))) continue;
       QVERIFY2(line.size() <= kWidestLine, qPrintable(line));
     }
+  }
+
+  /// `some_test someFunction` on the page of the trackers' checks: that function of that test.
+  void everyTestThatIsNamedIsThere() {
+    static const QRegularExpression named(QStringLiteral("`([a-z_]+_test)(?:\\s+([A-Za-z]+))?`"));
+    const QMultiMap<QString, QString> tests = filesByName({"tests"});
+    int n_named = 0;
+    const QString page = textOf(projectPath("resources/guide/tracker-checks.md"));
+    for (auto names = named.globalMatch(page); names.hasNext(); ++n_named) {
+      const QRegularExpressionMatch name = names.next();
+      const QStringList files = tests.values(name.captured(1) + ".cpp");
+      QVERIFY2(files.size() == 1, qPrintable(name.captured(0)));
+      QVERIFY2(name.captured(2).isEmpty() || textOf(files.front()).contains(" " + name.captured(2) + "()"),
+               qPrintable(name.captured(0)));
+    }
+    QVERIFY2(n_named > 50, qPrintable(QString::number(n_named)));
   }
 
   void everyPageIsInIndexAndResources() {
