@@ -33,6 +33,7 @@ class LineDevice : public TrackerDevice {
   void stop() override;
   TableMetadata describe() const override;
   std::optional<Trace> trace() const override;
+  bool hasTrace() const override { return true; }
 
  private:
   void beginStartup();

@@ -35,6 +35,8 @@ class TrackerDevice : public QObject {
 
   /// The last bytes that went over its line, from whatever was connected since it was made; none where it has no line.
   virtual std::optional<Trace> trace() const { return std::nullopt; }
+  /// Whether it has one; asked often, for it copies nothing.
+  virtual bool hasTrace() const { return false; }
 
  signals:
   /// @param text what happened in words; for kFailed what was seen and what to do

@@ -34,8 +34,14 @@ void AcquisitionController::adoptDevice(std::unique_ptr<TrackerDevice> device, c
 
 AcquisitionStatus AcquisitionController::status() const { return impl_->status(); }
 
-std::optional<Trace> AcquisitionController::trace() const {
-  return impl_->tracker.device ? impl_->tracker.device->trace() : std::nullopt;
+std::optional<Trace> AcquisitionController::trace() const { return impl_->tracker.trace(); }
+
+void AcquisitionController::requestTrace() {
+  if (auto last = trace()) {
+    emit traceReady(std::make_shared<const Trace>(*std::move(last)));
+  } else {
+    emit failed(QStringLiteral("There are no bytes to save: no tracker on a line has been connected."));
+  }
 }
 
 void AcquisitionController::connectDevice(const QString& device, const QString& scene_path) {

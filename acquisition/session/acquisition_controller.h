@@ -66,6 +66,7 @@ struct AcquisitionStatus {
   bool distance_known = false;       ///< The takes done tell it well enough to show.
   bool away = false;                 ///< The sensor stands too far from the current place to be taken without asking.
   bool refused = false;              ///< A take was refused for that; asked for once more, it is taken.
+  bool has_trace = false;            ///< There are bytes of a line to be saved.
 };
 
 /// Runs an acquisition: device, sampler and store.
@@ -89,7 +90,8 @@ class AcquisitionController : public QObject {
   void setWallClock(std::function<QDateTime()> now);
   /// The value of the last or next statusChanged, at once.
   AcquisitionStatus status() const;
-  /// The last bytes of the tracker's line; none where no tracker is connected, or it has no line.
+  /// The last bytes of the tracker's line, also of one that was disconnected, until another one is connected; none
+  /// where it has no line.
   std::optional<Trace> trace() const;
 
  public slots:
@@ -115,6 +117,7 @@ class AcquisitionController : public QObject {
   /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said
   /// before; a session that is opened later and was begun with another set-up tells so.
   void setSetup(const fieldtrue::Setup& stated);
+  void requestTrace();                                             ///< Answers with traceReady, or failed.
   void setSessionState(const QString& key, const QString& value);  ///< SessionStore::setState.
   void storeFit(const QString& name, const QString& ftcal_text);
   /// Answers with tablesReady, or failed. Reads every sample: once for a session, then placeChanged and looseKept tell.
@@ -134,6 +137,7 @@ class AcquisitionController : public QObject {
                     const std::vector<fieldtrue::Sample>& samples);
   /// Readings of no stored take were kept: rows of node -1.
   void looseKept(const std::vector<fieldtrue::SampleRow>& rows);
+  void traceReady(const std::shared_ptr<const fieldtrue::acquisition::Trace>& trace);  ///< Never null.
   void metadataChanged(const fieldtrue::TableMetadata& metadata);
   void sessionOpened(const QString& path, const QString& page, const QString& plan_json);
   void fitOpened(const QString& ftcal_text);  ///< The newest calibration of the session just opened, if it has one.

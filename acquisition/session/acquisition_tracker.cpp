@@ -61,6 +61,7 @@ void TrackerLink::cut() {
 }
 
 void TrackerLink::drop() {
+  last_trace = device->trace();
   cut();
   // It may be on the call stack below us.
   device.release()->deleteLater();

@@ -18,11 +18,13 @@ struct TrackerLink {
   void retryLater();
   void beginStream();
   void add(const Sample& sample);
+  std::optional<Trace> trace() const { return device ? device->trace() : last_trace; }
   void cut();   ///< Stops the device, and hears no more of it.
   void drop();  ///< Gives the device away.
 
   QObject* owner;  ///< Hears the device.
   std::unique_ptr<TrackerDevice> device;
+  std::optional<Trace> last_trace;  ///< Of the device that was given away last.
   DeviceState state = DeviceState::kClosed;
   QString text;
   std::optional<int> sensor;            ///< The one recorded: the first that reports.

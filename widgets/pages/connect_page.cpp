@@ -101,10 +101,16 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   connect_->setObjectName(QStringLiteral("connectButton"));
   connect_->setProperty("primary", true);
   next_ = new QPushButton(tr("Go on to the plan"), column);
+  save_ = new QPushButton(tr("Save the line's bytes"), column);
+  save_->setObjectName(QStringLiteral("saveTrace"));
+  save_->setToolTip(
+      tr("Writes the last 16 MiB that went over the tracker's line, with settings and versions, into a *.trace.zip "
+         "beside the session. It can be played again: whoever looks for a fault sees what happened here."));
   auto* buttons = new QHBoxLayout;
   buttons->addWidget(connect_);
   buttons->addWidget(next_);
   buttons->addStretch();
+  buttons->addWidget(save_);
   state_ = new QLabel(column);
   state_->setProperty("role", "heading");
   state_->setWordWrap(true);
@@ -139,6 +145,7 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   connect(next_, &QPushButton::clicked, this, [this] {
     workbench_.goToPage(workbench_.sessionIsOpen() ? QStringLiteral("acquire") : QStringLiteral("plan"));
   });
+  connect(save_, &QPushButton::clicked, &workbench_, &Workbench::saveTrace);
   connect(&workbench_, &Workbench::statusChanged, this, &ConnectPage::onStatus);
   onKind();
   onStatus(workbench_.status());
@@ -342,6 +349,7 @@ void ConnectPage::onStatus(const acquisition::AcquisitionStatus& status) {
   // A line that is connected is not asked who it is.
   find_->setEnabled(search_ || (!running && !busy));
   next_->setEnabled(running);
+  save_->setEnabled(status.has_trace);
   state_->setText(status.device == acquisition::DeviceState::kClosed ? tr("Not connected") : status.device_text);
   if (running && status.live) {
     numbers_->setText(tr("%1 Hz    SD now %2    %3")

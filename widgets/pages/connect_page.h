@@ -59,6 +59,7 @@ class ConnectPage : public QWidget {
   acquisition::TrackerSearch* search_ = nullptr;  ///< Runs in its thread; null while nothing is searched.
   QPushButton* connect_;
   QPushButton* next_;
+  QPushButton* save_;
   QLabel* state_;
   QLabel* numbers_;
 };

@@ -1,16 +1,19 @@
 #include "widgets/workbench/workbench.h"
 
 #include <QDateTime>
+#include <QDesktopServices>
 #include <QDir>
 #include <QFile>
 #include <QFileInfo>
 #include <QSettings>
 #include <QStandardPaths>
+#include <QUrl>
 #include <algorithm>
 #include <array>
 #include <map>
 #include <utility>
 
+#include "acquisition/devices/trace_file.h"
 #include "acquisition/plan/place_state.h"
 #include "acquisition/session/guarded_call.h"
 #include "calib/calibration/alignment.h"
@@ -99,8 +102,11 @@ void Workbench::wireController() {
                  [this] { goToPage(QStringLiteral("compare")); }, QStringLiteral("session/finished")});
   });
   connect(controller_, &acquisition::AcquisitionController::deviceFailed, this, [this](const QString& text) {
-    showMessage({text, Severity::kDanger, {}, {}, QStringLiteral("device")});
+    const bool has_trace = status_.has_trace;
+    showMessage({text, Severity::kDanger, has_trace ? tr("Save the line's bytes") : QString(),
+                 has_trace ? std::function<void()>([this] { saveTrace(); }) : nullptr, QStringLiteral("device")});
   });
+  connect(controller_, &acquisition::AcquisitionController::traceReady, this, &Workbench::onTrace);
   connect(controller_, &acquisition::AcquisitionController::deviceBack, this, [this] {
     endCondition(QStringLiteral("device"));
     showMessage({tr("The tracker is back."), Severity::kInfo, {}, {}});
@@ -382,6 +388,29 @@ void Workbench::connectDevice(const QString& device, const QString& scene_path) 
 
 void Workbench::disconnectDevice() { post(&acquisition::AcquisitionController::disconnectDevice); }
 
+void Workbench::saveTrace() {
+  endCondition(QStringLiteral("trace"));
+  post(&acquisition::AcquisitionController::requestTrace);
+}
+
+void Workbench::onTrace(const std::shared_ptr<const acquisition::Trace>& trace) {
+  const QFileInfo beside(session_path_.isEmpty() ? QString() : QFileInfo(session_path_).absolutePath());
+  const QString folder = beside.isWritable() ? beside.filePath() : sessionFolder();
+  const QString path = freshPath(folder, QString::fromStdString(trace->tracker), QStringLiteral("trace.zip"));
+  // Not in the thread of the tracker: to compress 16 MiB takes longer than its line may wait.
+  auto write = [trace, path](const RunControl&) { return acquisition::writeTrace(path.toStdString(), *trace); };
+  trace_jobs_.run(std::move(write), [this, path, size = trace->bytes.size()](const Result<void>& written) {
+    if (!written) {
+      const QString why = QString::fromStdString(written.error().message);
+      showMessage({tr("The line's bytes are not saved: %1.").arg(why), Severity::kAttention, {}, {}, "trace"});
+      return;
+    }
+    showMessage({tr("The line's last %1 KiB are saved: %2").arg((size + 1023) / 1024).arg(path), Severity::kInfo,
+                 tr("Show the folder"),
+                 [path] { QDesktopServices::openUrl(QUrl::fromLocalFile(QFileInfo(path).absolutePath())); }, "trace"});
+  });
+}
+
 void Workbench::setSetup(const Setup& stated) { post(&acquisition::AcquisitionController::setSetup, stated); }
 
 void Workbench::createSession(const QString& path, const acquisition::Plan& plan, int samples_per_node) {
@@ -491,12 +520,16 @@ QString Workbench::sessionFolder() {
   return folder;
 }
 
-QString Workbench::freshSessionPath(const QString& stem) {
+QString Workbench::freshPath(const QString& folder, const QString& stem, const QString& ending) {
   const QString stamp = QDateTime::currentDateTime().toString(QStringLiteral("yyyy-MM-dd-HHmmss"));
-  QString path = QStringLiteral("%1/%2-%3.fieldtrue").arg(sessionFolder(), stem, stamp);
+  QString path = QStringLiteral("%1/%2-%3.%4").arg(folder, stem, stamp, ending);
   for (int n = 2; QFileInfo::exists(path); ++n)
-    path = QStringLiteral("%1/%2-%3-%4.fieldtrue").arg(sessionFolder(), stem, stamp).arg(n);
+    path = QStringLiteral("%1/%2-%3-%4.%5").arg(folder, stem, stamp).arg(n).arg(ending);
   return path;
+}
+
+QString Workbench::freshSessionPath(const QString& stem) {
+  return freshPath(sessionFolder(), stem, QStringLiteral("fieldtrue"));
 }
 
 QString Workbench::builtInScene(const QString& name) {

@@ -90,6 +90,9 @@ class Workbench : public QObject {
   void startDemonstration();
   void connectDevice(const QString& device, const QString& scene_path);
   void disconnectDevice();
+  /// Writes the last bytes of the tracker's line into a new file beside the session, or in the folder of sessions; a
+  /// message says where, or why not.
+  void saveTrace();
   void setSetup(const Setup& stated);  ///< AcquisitionController::setSetup.
   void createSession(const QString& path, const acquisition::Plan& plan, int samples_per_node);
   void openSession(const QString& path);
@@ -118,7 +121,9 @@ class Workbench : public QObject {
 
   /// Folder for sessions made without a file dialog; created when missing.
   static QString sessionFolder();
-  /// A path in that folder which does not exist yet.
+  /// A path in a folder which does not exist yet: STEM-DATE-TIME.ENDING.
+  static QString freshPath(const QString& folder, const QString& stem, const QString& ending);
+  /// A session's, in that folder.
   static QString freshSessionPath(const QString& stem);
   /// Copies a built-in scene next to the sessions and returns its path.
   static QString builtInScene(const QString& name);
@@ -151,6 +156,7 @@ class Workbench : public QObject {
   void onTakeFailed(const QString& reason, int place);
   void onTakeRefused(int place, double off_m);
   QString nameOf(int place) const;
+  void onTrace(const std::shared_ptr<const acquisition::Trace>& trace);
   void onFitOpened(const QString& ftcal_text);
   void onTables(const CalibrationTable& table, const SampleTable& samples);
   void onPlace(int place, const std::optional<Node>& node, const std::vector<Sample>& samples);
@@ -186,6 +192,7 @@ class Workbench : public QObject {
   int rows_version_ = 0;  ///< Counts the tables that arrived.
   int compared_rows_ = -1;
   BackgroundJobs fit_jobs_{this};
+  BackgroundJobs trace_jobs_{this};
   std::set<int> spoken_of_;     ///< Places that a message may stand for.
   QString demonstration_path_;  ///< A demonstration about to begin: it takes by itself once its tracker runs.
 };

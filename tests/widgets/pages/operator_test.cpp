@@ -2,6 +2,8 @@
 // pulled, a place taken again. The tracker is an emulated Fastrak on a line of this machine, whose sensor the test
 // puts where it wants.
 
+#include <sys/resource.h>
+
 #include <QApplication>
 #include <QComboBox>
 #include <QDir>
@@ -14,8 +16,10 @@
 #include <QTableView>
 #include <QTemporaryDir>
 #include <QTest>
+#include <csignal>
 #include <memory>
 
+#include "acquisition/devices/registry.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/emulators/pty_endpoint.h"
 #include "acquisition/plan/place_state.h"
@@ -32,6 +36,38 @@ using testing::kWaitMs;
 namespace {
 
 const Eigen::Vector3d kWrong_m{0.0, 0.36, 0.48};  ///< 0.6 m long.
+
+/// Every sample of a recording, played to its end.
+std::vector<Sample> playedFrom(const QString& file) {
+  auto device = acquisition::makeDevice("trace:" + file.toStdString() + ",rate=100", {});
+  FT_CHECK(device.has_value());
+  std::vector<Sample> played;
+  bool over = false;
+  QObject::connect(
+      device->get(), &acquisition::TrackerDevice::samplesReceived,
+      [&played](const std::vector<Sample>& more) { played.insert(played.end(), more.begin(), more.end()); });
+  QObject::connect(device->get(), &acquisition::TrackerDevice::stateChanged,
+                   [&over](acquisition::DeviceState state) { over = state == acquisition::DeviceState::kClosed; });
+  (*device)->start();
+  FT_CHECK(QTest::qWaitFor([&over] { return over; }, kWaitMs));
+  return played;
+}
+
+/// Whether readings are among others, one after the other, to the bit; clocks may begin at different times. Arrivals
+/// jitter by microseconds, so that no others are taken for them.
+bool isAmong(const std::vector<SampleRow>& rows, const std::vector<Sample>& samples) {
+  for (std::size_t first = 0; first + rows.size() <= samples.size(); ++first) {
+    const auto same = [&](std::size_t i) {
+      const Sample &row = rows[i].sample, &sample = samples[first + i];
+      const double apart_s = (row.time_s - rows[0].sample.time_s) - (sample.time_s - samples[first].time_s);
+      return std::abs(apart_s) < 1e-9 && row.tracker_from_sensor.position_m == sample.tracker_from_sensor.position_m;
+    };
+    std::size_t n = 0;
+    while (n < rows.size() && same(n)) ++n;
+    if (n == rows.size()) return true;
+  }
+  return false;
+}
 
 bool isWholeIn(const QLabel& label) {
   const QRect needed =
@@ -56,6 +92,7 @@ class OperatorTest : public testing::WindowDriver {
   void aMessageGoesWithItsCause();
   void theTrackerComesBack_data();
   void theTrackerComesBack();
+  void theLineIsSavedAndPlaysAgain();
 
  private:
   void picture(const char* name) {
@@ -353,6 +390,48 @@ void OperatorTest::theTrackerComesBack() {
   QVERIFY(!find<QLabel>("deviceState")->property("failed").toBool());
   QVERIFY(takeRight());
   QCOMPARE(status().recorded->n_done, std::size_t{2});
+}
+
+void OperatorTest::theLineIsSavedAndPlaysAgain() {
+  auto* save = find<QPushButton>("saveTrace");
+  QVERIFY(!save->isEnabled());
+  plugIn(QStringLiteral("0"));
+  connectTo(emulator_->endpoint().address());
+  makePlan(2, 2, 2);
+  QVERIFY(takeRight());
+  click("step_connect");
+  QTRY_VERIFY(save->isEnabled());
+  // While it runs, after a fault, and when nothing is connected any more.
+  QStringList files;
+  for (const char* when : {"running", "lost", "closed"}) {
+    if (when == QLatin1String("lost")) pullThePlug();
+    if (when == QLatin1String("closed")) {
+      click("connectButton");
+      QTRY_COMPARE(status().device, acquisition::DeviceState::kClosed);
+    }
+    QTRY_VERIFY2(save->isEnabled(), when);
+    click("saveTrace");
+    const QString said = QStringLiteral("are saved: ");
+    QTRY_VERIFY2_WITH_TIMEOUT(message().contains(said), qPrintable(message()), kWaitMs);
+    files << message().section(said, 1);
+    picture(qPrintable(QStringLiteral("saved-") + QLatin1String(when)));
+    window_->workbench().endCondition(QStringLiteral("trace"));
+  }
+  QCOMPARE(QFileInfo(files[0]).absolutePath(), QFileInfo(window_->workbench().sessionPath()).absolutePath());
+  const SampleTable taken = window_->workbench().samplesAt(status().session->places[0].node);
+  QCOMPARE(taken.rows.size(), std::size_t{60});
+  for (const QString& file : files) QVERIFY2(isAmong(taken.rows, playedFrom(file)), qPrintable(file));
+
+  // A disk without room.
+  signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit full{100, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &full);
+  click("saveTrace");
+  const bool told = QTest::qWaitFor([&] { return message().contains(QStringLiteral("are not saved: ")); }, kWaitMs);
+  setrlimit(RLIMIT_FSIZE, &before);
+  QVERIFY2(told, qPrintable(message()));
 }
 
 }  // namespace fieldtrue::widgets
