@@ -4,6 +4,7 @@
 #include <QFile>
 #include <QFileInfo>
 #include <QSocketNotifier>
+#include <QTimer>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -39,7 +40,8 @@ struct AcquireOptions {
   std::string session;
   int samples_per_node = 60;
   bool automatic = false;
-  std::string trace;  ///< Where the bytes of the tracker's line are written; empty = nowhere.
+  double reconnect_s = 300.0;  ///< For so long a tracker that was lost is waited for.
+  std::string trace;           ///< Where the bytes of the tracker's line are written; empty = nowhere.
   std::vector<std::string> setup;
 };
 
@@ -107,8 +109,7 @@ class Acquisition {
     if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
     controller_.setSamplesPerNode(options_.samples_per_node);
     controller_.setAutomatic(options_.automatic);
-    // A command ends with its tracker; who called it decides what is next.
-    controller_.setReconnects(false);
+    controller_.setReconnects(options_.reconnect_s > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
     if (!over_) QCoreApplication::exec();
@@ -145,7 +146,8 @@ class Acquisition {
     connect(&acquisition::AcquisitionController::nodeStored, &Acquisition::onStored);
     connect(&acquisition::AcquisitionController::takeFailed, &Acquisition::onTakeFailed);
     connect(&acquisition::AcquisitionController::takeRefused, &Acquisition::onTakeRefused);
-    connect(&acquisition::AcquisitionController::deviceFailed, &Acquisition::onFailed);
+    connect(&acquisition::AcquisitionController::deviceFailed, &Acquisition::onDeviceFailed);
+    connect(&acquisition::AcquisitionController::deviceBack, &Acquisition::onDeviceBack);
     connect(&acquisition::AcquisitionController::sessionOpened, &Acquisition::onOpened);
     connect(&acquisition::AcquisitionController::failed, &Acquisition::onFailed);
     connect(&acquisition::AcquisitionController::finished, &Acquisition::onFinished);
@@ -166,6 +168,7 @@ class Acquisition {
     const std::vector<acquisition::PlaceMisfit> misfits = status_.recorded->misfits;
     status_ = status;
     tellMisfits(misfits);
+    if (status.reconnecting) return;
     if (status.device == acquisition::DeviceState::kFailed) {
       fail(status.device_text.toStdString());
       return;
@@ -251,6 +254,24 @@ class Acquisition {
 
   void onFailed(const QString& message) { fail(message.toStdString()); }
 
+  void onDeviceFailed(const QString& message) {
+    if (!controller_.status().reconnecting) return onFailed(message);
+    live_line_.clear();
+    std::cerr << "Tracker lost - reconnecting: " << message.toStdString() << std::endl;
+    patience_ = std::make_unique<QTimer>();
+    patience_->setSingleShot(true);
+    const std::string why = message.toStdString() + "; it did not come back within " +
+                            fixedText(options_.reconnect_s, 0) + " s (--reconnect)";
+    QObject::connect(patience_.get(), &QTimer::timeout, &context_, [this, why] { fail(why); });
+    patience_->start(static_cast<int>(1000.0 * options_.reconnect_s));
+  }
+
+  void onDeviceBack() {
+    patience_.reset();
+    std::cerr << "Tracker is back: " << controller_.status().device_text.toStdString() << std::endl;
+    prompted_ = false;
+  }
+
   void onFinished() { end("finished"); }
 
   void fail(const std::string& message) {
@@ -330,6 +351,7 @@ class Acquisition {
   acquisition::AcquisitionController controller_;
   acquisition::AcquisitionStatus status_;
   std::unique_ptr<QSocketNotifier> input_;
+  std::unique_ptr<QTimer> patience_;  ///< While a tracker that was lost is waited for.
   std::string typed_;
   std::string session_plan_;
   std::vector<std::string> remarks_;  ///< On how the session was opened, and on what it is recorded with.
@@ -396,6 +418,11 @@ void addAcquireCommand(CommandLine& line) {
       ->check(CLI::Range(1, 100000));
   addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
   command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
+  command
+      ->add_option("--reconnect", options->reconnect_s,
+                   "Wait so long for a tracker that is lost to come back (default 300); 0 = end at once")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
   command->add_option("--trace", options->trace, "Writes the last bytes of the tracker's line (*.trace.zip) at the end")
       ->type_name("FILE");
   command->add_option("--session", options->session, "Session file (*.fieldtrue); made new, or resumed if it exists")

@@ -11,6 +11,7 @@
 #include "acquisition/devices/stream_reader.h"
 #include "acquisition/devices/tracker_device.h"
 #include "acquisition/devices/tracker_startup.h"
+#include "acquisition/transports/followed_line.h"
 #include "acquisition/transports/transport.h"
 
 namespace fieldtrue::acquisition {
@@ -89,7 +90,8 @@ Result<std::unique_ptr<TrackerDevice>> deviceAtAddress(const std::string& addres
                                                        Setup setup, Apply apply) {
   FT_TRY(const LineAddress read, readLineAddress(address, declared, setup));
   FT_TRY_VOID(apply(read.settings, setup));
-  return makeLineDevice<Startup>(setup, [line = read.line] { return makeTransport(line); });
+  return makeLineDevice<Startup>(setup,
+                                 [line = FollowedLine(read.line)]() mutable { return makeTransport(line.now()); });
 }
 
 }  // namespace fieldtrue::acquisition

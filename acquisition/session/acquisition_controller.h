@@ -56,6 +56,8 @@ struct AcquisitionStatus {
   bool attention = false;  ///< The reason needs the operator's attention.
   DeviceState device = DeviceState::kClosed;
   QString device_text;
+  bool reconnecting = false;   ///< It ran and was lost; it is started again and again by itself.
+  bool just_returned = false;  ///< It was lost, and is back since a few seconds.
   std::optional<Sample> live;  ///< Newest reading.
   double rate_hz = 0.0;
   double sd_m = 0.0;  ///< 3-D SD of the last half second.

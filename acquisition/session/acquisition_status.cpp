@@ -53,6 +53,8 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.reason = reason(&result.attention);
   result.device = tracker.state;
   result.device_text = tracker.text;
+  result.reconnecting = tracker.lost;
+  result.just_returned = tracker.justReturned();
   result.live = tracker.live;
   result.rate_hz = tracker.rate_hz();
   result.sd_m = take.stillness.spread_m();

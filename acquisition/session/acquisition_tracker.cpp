@@ -19,6 +19,7 @@ constexpr qint64 kSilence_ms = 3000;  ///< No reading for so long: the line is d
 constexpr std::size_t kRateReadings = 120;
 constexpr int kFirstRetry_ms = 500;
 constexpr int kLastRetry_ms = 8000;
+constexpr qint64 kReturnShown_ms = 4000;
 
 }  // namespace
 
@@ -28,6 +29,10 @@ TrackerLink::TrackerLink(QObject* receiver) : owner(receiver), silence_timer(rec
 }
 
 bool TrackerLink::silent() const { return running() && since_sample.elapsed() >= kSilence_ms; }
+
+bool TrackerLink::justReturned() const {
+  return running() && since_return.isValid() && since_return.elapsed() < kReturnShown_ms;
+}
 
 double TrackerLink::rate_hz() const {
   if (recent_times_s.size() < 2 || !live) return 0.0;
@@ -90,6 +95,7 @@ void AcquisitionController::Impl::dropDevice() {
   tracker.silence_timer.stop();
   tracker.retry_timer.stop();
   tracker.lost = false;
+  tracker.since_return.invalidate();
   if (!tracker.device) return;
   if (take.collecting()) failTake("the tracker was disconnected; nothing of this take was stored");
   tracker.drop();
@@ -122,7 +128,10 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
     tracker.retries = 0;
     tracker.retryLater();
   }
-  if (was_lost) emit owner->deviceBack();
+  if (was_lost) {
+    tracker.since_return.start();
+    emit owner->deviceBack();
+  }
   views.tellSoon();
 }
 

@@ -14,6 +14,7 @@ struct TrackerLink {
 
   bool running() const { return state == DeviceState::kRunning; }
   bool silent() const;
+  bool justReturned() const;
   double rate_hz() const;
   void retryLater();
   void beginStream();
@@ -36,6 +37,7 @@ struct TrackerLink {
   bool reconnects = true;
   bool lost = false;  ///< It ran and is gone; retry_timer starts it again.
   int retries = 0;
+  QElapsedTimer since_return;  ///< Since a lost one was back.
   QTimer retry_timer;
 };
 

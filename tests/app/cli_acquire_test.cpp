@@ -194,11 +194,34 @@ class CliAcquireTest : public QObject {
     const auto line = waitForLine(emulator, "device (fastrak:tcp:\\S+:\\d+)");
     QVERIFY(line.hasMatch());
     const CliRun run = runCli({"acquire", "--device", line.captured(1), "--plan", "grid:4x4x4@0.2", "--auto",
-                               "--session", at("lost.fieldtrue"), "--trace", at("lost.trace.zip")});
+                               "--session", at("lost.fieldtrue"), "--trace", at("lost.trace.zip"), "--reconnect", "2"});
     FT_VERIFY_STATUS(run, 1);
+    QVERIFY2(run.err.contains("Tracker lost - reconnecting"), run.err.constData());
+    QVERIFY2(run.err.contains("did not come back within 2 s"), run.err.constData());
     QVERIFY(QFileInfo(at("lost.trace.zip")).size() > 1000);
     QCOMPARE(::kill(static_cast<pid_t>(emulator.processId()), SIGTERM), 0);
     FT_VERIFY_STATUS(finished(emulator, 20000), 0);
+  }
+
+  void aTrackerThatComesBackGoesOn() {
+    const QString link = at("returning");
+    const auto plugIn = [&link](QProcess& emulator, const QStringList& faults) {
+      emulator.start(cliPath(), QStringList{"emulate", "fastrak", "--pty", link, "--duration", "120"} + faults);
+      QVERIFY(waitForLine(emulator, "device fastrak").hasMatch());
+    };
+    QProcess first, second, acquire;
+    plugIn(first, {"--faults", "unplug_after=400"});
+    acquire.setProcessChannelMode(QProcess::MergedChannels);
+    acquire.start(cliPath(), {"acquire", "--device", "fastrak:" + link, "--plan", "grid:2x1x1@0.2", "--auto",
+                              "--samples-per-node", "100", "--session", at("returned.fieldtrue")});
+    QVERIFY(waitForLine(acquire, "Tracker lost - reconnecting: (.*)").hasMatch());
+    QCOMPARE(::kill(static_cast<pid_t>(first.processId()), SIGTERM), 0);
+    FT_VERIFY_STATUS(finished(first, 20000), 0);
+    plugIn(second, {});
+    QVERIFY(waitForLine(acquire, "Tracker is back: .*Fastrak").hasMatch());
+    FT_VERIFY_STATUS(finished(acquire, 120000), 0);
+    QCOMPARE(::kill(static_cast<pid_t>(second.processId()), SIGTERM), 0);
+    FT_VERIFY_STATUS(finished(second, 20000), 0);
   }
 
   void listsAreMachineReadable_data() {

@@ -31,7 +31,7 @@ constexpr double kPositionTextShare = 1.0 / 24.0;
 constexpr double kReasonTextShare = 1.0 / 28.0;
 constexpr double kToGoTextShare = 1.0 / 15.0;
 constexpr double kReasonHeightShare = 1.0 / 14.0;  ///< One line to read from afar, or two or three for a long reason.
-constexpr int kSmallestReason = 12;                ///< Pixels.
+constexpr int kSmallestReason = 12;                ///< Pixels; of a place's name too.
 // How much of the way to a new guess of the transmitter's place is gone with each status, some thirty a second.
 constexpr double kEase = 0.15;
 constexpr int kInspectorWidth = 320;
@@ -276,16 +276,22 @@ void AcquirePage::onStatus(const acquisition::AcquisitionStatus& status) {
 }
 
 void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
+  QString name = tr("All places done");
+  QString detail = tr("%1 taken, %2 skipped").arg(status.recorded->n_done).arg(status.recorded->n_skipped);
   if (status.current) {
     const PlannedPlace& place = status.session->places[*status.current];
-    const QString name = QString::fromStdString(placeName(place));
-    place_->setText(status.current_is_retake ? tr("Retake %1").arg(name) : name);
-    position_->setText(positionText(place.reference_from_sensor.position_m));
-  } else {
-    place_->setText(tr("All places done"));
-    position_->setText(tr("%1 taken, %2 skipped").arg(status.recorded->n_done).arg(status.recorded->n_skipped));
+    const QString plain = QString::fromStdString(placeName(place));
+    name = status.current_is_retake ? tr("Retake %1").arg(plain) : plain;
+    detail = positionText(place.reference_from_sensor.position_m);
   }
+  if (status.reconnecting || status.just_returned) {
+    detail = status.current ? tr("next: %1").arg(name) : name;
+    name = status.reconnecting ? tr("Tracker lost - reconnecting") : tr("Tracker is back");
+  }
+  place_->setText(name);
+  position_->setText(detail);
   showDistance(status);
+  fitPlace();
   if (reason_->text() != status.reason) {
     reason_->setText(status.reason);
     reason_->setToolTip(status.reason);
@@ -308,6 +314,17 @@ void AcquirePage::showDistance(const acquisition::AcquisitionStatus& status) {
   if (!shown) return;
   to_go_->setText(distanceText(*status.distance_m));
   if (setStyled(*to_go_, "away", status.away)) fitText();
+}
+
+void AcquirePage::fitPlace() {
+  QFont font = place_->font();
+  int pixels = static_cast<int>(window()->height() * kPlaceTextShare);
+  const auto fits = [&] {
+    font.setPixelSize(pixels);
+    return QFontMetrics(font).horizontalAdvance(place_->text()) <= place_->width();
+  };
+  while (pixels > kSmallestReason && !fits()) --pixels;
+  setPixelHeight(place_, pixels);
 }
 
 void AcquirePage::fitReason() {
@@ -354,10 +371,10 @@ void AcquirePage::resizeEvent(QResizeEvent* event) {
 
 void AcquirePage::fitText() {
   const double window_height = window()->height();
-  setPixelHeight(place_, static_cast<int>(window_height * kPlaceTextShare));
   setPixelHeight(position_, static_cast<int>(window_height * kPositionTextShare));
   setPixelHeight(to_go_, static_cast<int>(window_height * kToGoTextShare));
   setPixelHeight(to_go_caption_, static_cast<int>(window_height * kReasonTextShare));
+  fitPlace();
   fitReason();
   const int ring = static_cast<int>(window_height * 0.17);
   ring_->setFixedSize(ring, ring);

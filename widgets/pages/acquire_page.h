@@ -39,7 +39,9 @@ class AcquirePage : public QWidget {
   void onStatus(const acquisition::AcquisitionStatus& status);
   void showPlace(const acquisition::AcquisitionStatus& status);
   void showDistance(const acquisition::AcquisitionStatus& status);
-  /// Makes a long reason smaller until all of it is read.
+  /// Makes a long place's name smaller until all of it is read.
+  void fitPlace();
+  /// The same for a reason, which may have lines.
   void fitReason();
   void showRing(const acquisition::AcquisitionStatus& status);
   void showButtons(const acquisition::AcquisitionStatus& status);

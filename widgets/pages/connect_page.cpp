@@ -42,6 +42,12 @@ QString changedSettings(std::span<const Setting> declared, const Settings& value
   return parts.join(QLatin1Char(','));
 }
 
+/// Whether a tracker is connected, or is being connected.
+bool isInUse(const acquisition::AcquisitionStatus& status) {
+  return status.device == acquisition::DeviceState::kRunning ||
+         status.device == acquisition::DeviceState::kConnecting || status.reconnecting;
+}
+
 }  // namespace
 
 ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
@@ -134,8 +140,7 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
     if (scene_->currentData().toString().isEmpty()) chooseScene();
   });
   connect(connect_, &QPushButton::clicked, this, [this] {
-    const acquisition::DeviceState device = workbench_.status().device;
-    if (device == acquisition::DeviceState::kRunning || device == acquisition::DeviceState::kConnecting) {
+    if (isInUse(workbench_.status())) {
       workbench_.disconnectDevice();
     } else {
       tellSetup();
@@ -340,14 +345,17 @@ QString ConnectPage::scenePath() const {
 }
 
 void ConnectPage::onStatus(const acquisition::AcquisitionStatus& status) {
-  const bool busy = status.device == acquisition::DeviceState::kConnecting;
+  const bool in_use = isInUse(status);
   const bool running = status.device == acquisition::DeviceState::kRunning;
-  connect_->setText(running ? tr("Disconnect") : busy ? tr("Stop connecting") : tr("Connect"));
+  connect_->setText(running               ? tr("Disconnect")
+                    : status.reconnecting ? tr("Stop reconnecting")
+                    : in_use              ? tr("Stop connecting")
+                                          : tr("Connect"));
   for (QWidget* widget : {static_cast<QWidget*>(kind_), static_cast<QWidget*>(address_), static_cast<QWidget*>(scene_),
                           static_cast<QWidget*>(settings_)})
-    widget->setEnabled(!running && !busy);
+    widget->setEnabled(!in_use);
   // A line that is connected is not asked who it is.
-  find_->setEnabled(search_ || (!running && !busy));
+  find_->setEnabled(search_ || !in_use);
   next_->setEnabled(running);
   save_->setEnabled(status.has_trace);
   state_->setText(status.device == acquisition::DeviceState::kClosed ? tr("Not connected") : status.device_text);

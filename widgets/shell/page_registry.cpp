@@ -47,7 +47,8 @@ PageMark markConnect(const Workbench& workbench) {
     case acquisition::DeviceState::kRunning:
       return {PageState::kDone, PageWords::tr("connected")};
     case acquisition::DeviceState::kFailed:
-      return {PageState::kAttention, PageWords::tr("not connected")};
+      return {PageState::kAttention,
+              workbench.status().reconnecting ? PageWords::tr("reconnecting") : PageWords::tr("not connected")};
     default:
       return {PageState::kReady, PageWords::tr("not connected")};
   }

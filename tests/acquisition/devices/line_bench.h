@@ -143,10 +143,10 @@ inline std::string untried(const std::vector<FaultCase>& cases, const std::strin
 inline void tryFault(LineBench& bench, const FaultCase& now, const Pose& pose, double tolerance_m,
                      double tolerance_rad) {
   using acquisition::DeviceState;
-  constexpr std::size_t kSamples = 700;
+  constexpr std::size_t kEnough = 700;
   DeviceProbe& probe = *bench.probe;
   bench.device->start();
-  QTRY_VERIFY2_WITH_TIMEOUT(now.fails ? probe.state == DeviceState::kFailed : probe.good().size() >= kSamples,
+  QTRY_VERIFY2_WITH_TIMEOUT(now.fails ? probe.state == DeviceState::kFailed : probe.good().size() >= kEnough,
                             qPrintable(probe.last_text), 20000);
   QCOMPARE(probe.failures, now.fails ? 1 : 0);
   FT_VERIFY_MATCH(holdsAll((now.fails ? probe.last_text : probe.texts.join('\n')).toStdString(), now.says));

@@ -11,6 +11,7 @@
 #include "acquisition/emulators/openigtlink_emulator.h"
 #include "acquisition/emulators/pty_endpoint.h"
 #include "acquisition/search/known_adapters.h"
+#include "acquisition/transports/followed_line.h"
 #include "acquisition/transports/line_holders.h"
 #include "tests/acquisition/devices/rated_line.h"
 #include "tests/support/matchers.h"
@@ -89,6 +90,7 @@ class TrackerSearchTest : public QObject {
   void whoHoldsALine();
   void adaptersFromTheSystem();
   void adaptersAreKnownOnAnotherPort();
+  void aLineFollowsItsAdapter();
 
  private:
   QString path(const char* name) const { return folder_->filePath(name); }
@@ -354,6 +356,23 @@ void TrackerSearchTest::adaptersAreKnownOnAnotherPort() {
   QVERIFY(KnownAdapters(file).rows().empty());
   KnownAdapters(file).remember(adapter, "/dev/ttyUSB3", "fastrak:/dev/ttyUSB3@115200");
   QCOMPARE(KnownAdapters(file).rows().size(), std::size_t{1});
+}
+
+void TrackerSearchTest::aLineFollowsItsAdapter() {
+  const std::string system = path("moving").toStdString();
+  plugIn(path("moving"), "1-2", "ttyUSB0", "A10KWXYZ\n");
+  FollowedLine line("/dev/ttyUSB0@19200", system);
+  QCOMPARE(line.now(), std::string("/dev/ttyUSB0@19200"));
+  // Pulled: it is asked for where it was, until it is somewhere.
+  std::filesystem::remove_all(system + "/devices/usb1/1-2");
+  QCOMPARE(line.now(), std::string("/dev/ttyUSB0@19200"));
+  plugIn(path("moving"), "1-3", "ttyUSB3", "A10KWXYZ\n");
+  QCOMPARE(line.now(), std::string("/dev/ttyUSB3@19200"));
+  // Another adapter under the first name is not it.
+  plugIn(path("moving"), "1-2", "ttyUSB0", "B20\n");
+  QCOMPARE(line.now(), std::string("/dev/ttyUSB3@19200"));
+  for (const char* fixed : {"tcp:localhost:4000", "/dev/ttyS0@9600", "/tmp/a link"})
+    QCOMPARE(FollowedLine(fixed, system).now(), std::string(fixed));
 }
 
 FIELDTRUE_TEST(TrackerSearchTest)

@@ -374,7 +374,12 @@ void OperatorTest::theTrackerComesBack() {
   const QString why = status().device_text;
   QVERIFY2(why.contains(line), qPrintable(why));
   QTRY_COMPARE(reason->text(), why);
+  auto* place = find<QLabel>("bannerPlace");
+  QTRY_COMPARE(place->text(), QStringLiteral("Tracker lost - reconnecting"));
   picture(line.startsWith(QLatin1Char('/')) ? "lost-pty" : "lost-tcp");
+  QVERIFY(QFontMetrics(place->font()).horizontalAdvance(place->text()) <= place->width());
+  QVERIFY2(place->font().pixelSize() >= window_->height() / 20, "to be read from 3 m");
+  QCOMPARE(find<QPushButton>("connectButton")->text(), QStringLiteral("Stop reconnecting"));
   for (QLabel* label : {reason, find<QLabel>("deviceState")}) {
     QCOMPARE(label->text(), why);
     QTRY_VERIFY2(isWholeIn(*label), qPrintable(label->objectName()));
@@ -386,6 +391,9 @@ void OperatorTest::theTrackerComesBack() {
   plugIn(line);
   QTRY_COMPARE_WITH_TIMEOUT(status().device, acquisition::DeviceState::kRunning, kWaitMs);
   QTRY_COMPARE(message(), QStringLiteral("The tracker is back."));
+  QTRY_COMPARE(place->text(), QStringLiteral("Tracker is back"));
+  picture("back");
+  QTRY_COMPARE_WITH_TIMEOUT(place->text(), QStringLiteral("B1, pipe 1"), kWaitMs);
   QTRY_VERIFY(find<QWidget>("banner")->property("state").toString() != QStringLiteral("danger"));
   QVERIFY(!find<QLabel>("deviceState")->property("failed").toBool());
   QVERIFY(takeRight());
