@@ -209,6 +209,7 @@ int main(int argc, char** argv) {
   fieldtrue::cli::addAcquireCommand(line);
   fieldtrue::cli::addEmulateCommand(line);
   fieldtrue::cli::addFindCommand(line);
+  fieldtrue::cli::addSignalCommand(line);
   fieldtrue::cli::addFitCommands(line);
   fieldtrue::cli::addDifferenceCommand(line);
   fieldtrue::cli::addResampleCommand(line);

@@ -97,6 +97,7 @@ void addDifferenceCommand(CommandLine& line);  ///< difference
 void addAcquireCommand(CommandLine& line);     ///< acquire
 void addEmulateCommand(CommandLine& line);     ///< emulate
 void addFindCommand(CommandLine& line);        ///< find
+void addSignalCommand(CommandLine& line);      ///< signal
 void addResampleCommand(CommandLine& line);    ///< resample
 void addGapCommands(CommandLine& line);        ///< diagnose, plan-check, blind
 void addListCommands(CommandLine& line);       ///< methods, effects, devices, formats

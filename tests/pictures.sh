@@ -15,7 +15,8 @@ render() { # render NAME TEST [VARIABLE=VALUE...]
     "$root/build/ci/tests/widgets_pages_tests" "$test" >"$work/$name.log" || { cat "$work/$name.log" >&2; exit 1; }
 }
 chmod 700 "$work"
-for test in guided_session_test gap_page_test difference_page_test export_page_test export_sensors_test import_page_test; do
+for test in guided_session_test gap_page_test difference_page_test export_page_test export_sensors_test import_page_test \
+  signal_page_test; do
   render light "$test"
   render dark "$test" FIELDTRUE_DARK=1
 done
@@ -34,5 +35,6 @@ cp "$work/light/6-export.png" "$target/export.png"
 cp "$work/light/6-export-sensors.png" "$target/export-sensors.png"
 cp "$work/light/7-changes.png" "$target/changes.png"
 cp "$work/light/8-import.png" "$target/import.png"
+cp "$work/light/3-signal.png" "$target/signal.png"
 if [ -n "${FIELDTRUE_ALL_PICTURES:-}" ]; then cp -r "$work/light" "$work/dark" "$target/"; fi
 echo "Pictures: $target"

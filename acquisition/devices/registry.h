@@ -27,6 +27,13 @@ struct DeviceAddress {
 /// @error kBadInput
 Result<DeviceAddress> parseDevice(const std::string& text);
 
+/// 3-D SD of a single unfiltered reading at a distance from the transmitter. Farther away it grows with the fourth
+/// power of the distance; nearer it is taken to be the same, for there something else than the receiver decides.
+struct TypicalNoise {
+  double sd_m = 0.0;
+  double range_m = 1.0;
+};
+
 /// One row of the device registry.
 struct DeviceKind {
   std::string id;
@@ -38,6 +45,7 @@ struct DeviceKind {
   /// How it is found on a line; none where it cannot be.
   std::optional<TrackerProbe> probe = std::nullopt;
   std::vector<KnownUsb> usb = {};  ///< Adapters and sockets that are its own: it is asked first there.
+  std::optional<TypicalNoise> noise = std::nullopt;  ///< None where it is not known.
   /// @param address after the first colon; @param scene only used by simulated devices
   Result<std::unique_ptr<TrackerDevice>> (*make)(const std::string& address, const simulation::Scene& scene) = nullptr;
   /// Makes its stream's parser again from what was kept beside a line's bytes; null where it has no line.
@@ -50,6 +58,8 @@ struct DeviceKind {
 std::span<const DeviceKind> deviceKinds();
 /// The kind of an id that can be emulated. @error kBadInput naming those that can
 Result<const DeviceKind*> findEmulated(const std::string& id);
+/// 3-D SD of a single reading that a tracker of a kind should have at a range [m]; none where it is not known.
+std::optional<double> expectedNoise_m(const std::string& kind, double range_m);
 /// @error kBadInput naming the known kinds
 Result<std::unique_ptr<TrackerDevice>> makeDevice(const std::string& text, const simulation::Scene& scene);
 

@@ -36,6 +36,11 @@ AcquisitionStatus AcquisitionController::status() const { return impl_->status()
 
 std::optional<Trace> AcquisitionController::trace() const { return impl_->tracker.trace(); }
 
+void AcquisitionController::requestSignal() {
+  emit signalReady(
+      {impl_->heard.sensors(), impl_->tracker.device ? impl_->tracker.device->describe() : TableMetadata{}});
+}
+
 void AcquisitionController::requestTrace() {
   if (auto last = trace()) {
     emit traceReady(std::make_shared<const Trace>(*std::move(last)));

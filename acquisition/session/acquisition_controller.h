@@ -14,6 +14,7 @@
 #include "acquisition/plan/place_state.h"
 #include "acquisition/sampling/node_sampler.h"
 #include "acquisition/session/session_store.h"
+#include "acquisition/session/signal_snapshot.h"
 
 namespace fieldtrue::acquisition {
 
@@ -119,6 +120,7 @@ class AcquisitionController : public QObject {
   /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said
   /// before; a session that is opened later and was begun with another set-up tells so.
   void setSetup(const fieldtrue::Setup& stated);
+  void requestSignal();                                            ///< Answers with signalReady.
   void requestTrace();                                             ///< Answers with traceReady, or failed.
   void setSessionState(const QString& key, const QString& value);  ///< SessionStore::setState.
   void storeFit(const QString& name, const QString& ftcal_text);
@@ -139,6 +141,7 @@ class AcquisitionController : public QObject {
                     const std::vector<fieldtrue::Sample>& samples);
   /// Readings of no stored take were kept: rows of node -1.
   void looseKept(const std::vector<fieldtrue::SampleRow>& rows);
+  void signalReady(const fieldtrue::acquisition::SignalSnapshot& snapshot);  ///< Empty where nothing is connected.
   void traceReady(const std::shared_ptr<const fieldtrue::acquisition::Trace>& trace);  ///< Never null.
   void metadataChanged(const fieldtrue::TableMetadata& metadata);
   void sessionOpened(const QString& path, const QString& page, const QString& plan_json);

@@ -80,6 +80,7 @@ struct AcquisitionController::Impl {
   Setup stated_setup;  ///< By a person.
 
   TrackerLink tracker;
+  SignalWindow heard;  ///< Of every sensor, by the device's clock.
   KnownPlaces places;
   RunningTake take;
   ViewUpdates views;

@@ -99,6 +99,7 @@ void AcquisitionController::Impl::dropDevice() {
   if (!tracker.device) return;
   if (take.collecting()) failTake("the tracker was disconnected; nothing of this take was stored");
   tracker.drop();
+  heard.clear();
   take.stillness.clear();
 }
 
@@ -119,6 +120,7 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
   } else {
     tracker.silence_timer.stop();
     tracker.live.reset();
+    heard.clear();
     take.stillness.clear();
     if (fails) emit owner->deviceFailed(tracker.text);
     if (was_collecting) failTake("the tracker was lost: " + why.toStdString() + ". Nothing of this take was stored");
@@ -174,6 +176,7 @@ double AcquisitionController::Impl::sessionTime_s(double device_time_s) {
 void AcquisitionController::Impl::onSamples(const std::vector<Sample>& samples) {
   tracker.since_sample.start();
   for (Sample sample : samples) {
+    heard.add(sample);
     if (!tracker.sensor) tracker.sensor = sample.sensor;
     if (sample.sensor != *tracker.sensor) continue;
     sample.time_s = sessionTime_s(sample.time_s);

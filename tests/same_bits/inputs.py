@@ -307,6 +307,8 @@ def add_session(plan):
              "--samples-per-node", "10", "--session", "new.fieldtrue", last_line_only=True)
     plan.do("record.emulated", record_emulated)
     plan.cli("tables.live", "tables", "--session", "live.fieldtrue", "--nodes", "live.nodes.csv")
+    # The readings' times are those of the table, whenever they are played.
+    plan.cli("signal.still", "signal", "--device", "trace:still.samples.csv,rate=100", "--seconds", "25", "--json")
     plan.do("live.times", lambda build: edited_table(build, "live.nodes.csv", "live.nodes.csv", without_times))
 
 
@@ -376,6 +378,7 @@ diagnose --nodes plane.nodes.csv --scene poses.nodes.csv --out o.gap.json
 plan-check
 plan-check --plan grid:2x2x1@0.2
 acquire --device sonar --session o.fieldtrue
+signal --device sonar
 acquire --device simulated --session o.fieldtrue
 emulate sonar --listen 0
 emulate fastrak --listen 0 --faults fire

@@ -15,6 +15,7 @@
 #include "widgets/pages/gap_page.h"
 #include "widgets/pages/import_page.h"
 #include "widgets/pages/plan_page.h"
+#include "widgets/pages/signal_page.h"
 #include "widgets/pages/start_page.h"
 
 namespace fieldtrue::widgets {
@@ -52,6 +53,12 @@ PageMark markConnect(const Workbench& workbench) {
     default:
       return {PageState::kReady, PageWords::tr("not connected")};
   }
+}
+
+PageMark markSignal(const Workbench& workbench) {
+  const bool running = workbench.status().device == acquisition::DeviceState::kRunning;
+  return {running ? PageState::kReady : PageState::kNotYet,
+          running ? PageWords::tr("look before a day's recording") : PageWords::tr("no tracker")};
 }
 
 PageMark markPlan(const Workbench& workbench) {
@@ -92,6 +99,7 @@ PageMark markExport(const Workbench& workbench) {
 constexpr std::array kRows = {
     PageRow{"start", QT_TRANSLATE_NOOP("StepRail", "Start"), "home", "index", make<StartPage>, markStart},
     PageRow{"connect", QT_TRANSLATE_NOOP("StepRail", "Connect"), "connect", "trackers", make<ConnectPage>, markConnect},
+    PageRow{"signal", QT_TRANSLATE_NOOP("StepRail", "Signal"), "signal", "signal", make<SignalPage>, markSignal},
     PageRow{"plan", QT_TRANSLATE_NOOP("StepRail", "Plan"), "plan", "recording", make<PlanPage>, markPlan},
     PageRow{"acquire", QT_TRANSLATE_NOOP("StepRail", "Acquire"), "acquire", "recording", make<AcquirePage>,
             markAcquire},
@@ -111,7 +119,7 @@ std::span<const PageRow> pageRows() { return kRows; }
 const PageRow& pageRow(const QString& id) {
   const auto row =
       std::find_if(kRows.begin(), kRows.end(), [&](const PageRow& one) { return id == QLatin1String(one.id); });
-  constexpr std::size_t kAcquire = 3;
+  constexpr std::size_t kAcquire = 4;
   static_assert(std::string_view(kRows[kAcquire].id) == "acquire");
   return row != kRows.end() ? *row : kRows[kAcquire];
 }

@@ -107,6 +107,7 @@ void Workbench::wireController() {
                  has_trace ? std::function<void()>([this] { saveTrace(); }) : nullptr, QStringLiteral("device")});
   });
   connect(controller_, &acquisition::AcquisitionController::traceReady, this, &Workbench::onTrace);
+  connect(controller_, &acquisition::AcquisitionController::signalReady, this, &Workbench::signalReady);
   connect(controller_, &acquisition::AcquisitionController::deviceBack, this, [this] {
     endCondition(QStringLiteral("device"));
     showMessage({tr("The tracker is back."), Severity::kInfo, {}, {}});
@@ -387,6 +388,8 @@ void Workbench::connectDevice(const QString& device, const QString& scene_path) 
 }
 
 void Workbench::disconnectDevice() { post(&acquisition::AcquisitionController::disconnectDevice); }
+
+void Workbench::requestSignal() { post(&acquisition::AcquisitionController::requestSignal); }
 
 void Workbench::saveTrace() {
   endCondition(QStringLiteral("trace"));

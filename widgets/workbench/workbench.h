@@ -90,6 +90,7 @@ class Workbench : public QObject {
   void startDemonstration();
   void connectDevice(const QString& device, const QString& scene_path);
   void disconnectDevice();
+  void requestSignal();  ///< Answers with signalReady.
   /// Writes the last bytes of the tracker's line into a new file beside the session, or in the folder of sessions; a
   /// message says where, or why not.
   void saveTrace();
@@ -130,6 +131,7 @@ class Workbench : public QObject {
 
  signals:
   void statusChanged(const fieldtrue::acquisition::AcquisitionStatus& status);
+  void signalReady(const fieldtrue::acquisition::SignalSnapshot& snapshot);
   void sessionChanged();     ///< Another session is open.
   void tableChanged();       ///< Nodes were stored or taken back.
   void comparisonChanged();  ///< A comparison started, ended or failed.

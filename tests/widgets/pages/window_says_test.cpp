@@ -171,8 +171,8 @@ void WindowSaysTest::chooseRow(const char* name, const std::function<bool(const 
 }
 
 void WindowSaysTest::everyStepHasItsKey() {
-  const char* steps[] = {"start", "connect", "plan", "acquire", "compare", "gap", "export"};
-  for (int number = 6; number >= 0; --number) {
+  const char* steps[] = {"start", "connect", "signal", "plan", "acquire", "compare", "gap", "export"};
+  for (int number = 7; number >= 0; --number) {
     const QString step = QString::fromLatin1(steps[number]);
     QTest::keyClick(window_.get(), static_cast<Qt::Key>(Qt::Key_0 + number), Qt::AltModifier);
     QTRY_VERIFY2(onPage(QStringLiteral("page_") + step), qPrintable(step));  // A key presses the button for a moment.
