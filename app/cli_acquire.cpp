@@ -39,6 +39,7 @@ struct AcquireOptions {
   std::string plan;
   std::string session;
   int samples_per_node = 60;
+  std::string until;  ///< When a take is complete, where not by that.
   bool automatic = false;
   double reconnect_s = 300.0;  ///< For so long a tracker that was lost is waited for.
   std::string trace;           ///< Where the bytes of the tracker's line are written; empty = nowhere.
@@ -98,7 +99,7 @@ class Acquisition {
     connectSignals();
   }
 
-  Outcome run(const QString& plan_json, const Setup& setup) {
+  Outcome run(const QString& plan_json, const Setup& setup, const acquisition::TakeLength& length) {
     const EndRequest end_request([this] { end("stopped"); });
     controller_.setSetup(setup);
     controller_.openSession(QString::fromStdString(options_.session), plan_json);
@@ -107,7 +108,7 @@ class Acquisition {
     for (const std::string& remark : remarks_) tell(remark);
     is_open_ = true;
     if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
-    controller_.setSamplesPerNode(options_.samples_per_node);
+    controller_.setTakeLength(length);
     controller_.setAutomatic(options_.automatic);
     controller_.setReconnects(options_.reconnect_s > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
@@ -207,7 +208,8 @@ class Acquisition {
     failed_takes_.erase(index);
     live_line_.clear();
     lines_ << placeText(now.session->places.at(index)) << "  done " << now.recorded->n_done << " of "
-           << now.session->places.size() << ", SD " << widgets::errorFigure(sd_mm(node)) << " mm";
+           << now.session->places.size() << ", SD " << widgets::errorFigure(sd_mm(node)) << " mm, " << node.n_used
+           << " samples worth " << fixedText(node.n_effective, 0);
     if (node.n_rejected > 0) lines_ << ", " << node.n_rejected << " rejected";
     if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
     lines_ << std::endl;
@@ -383,6 +385,9 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   if (const auto why = noTraceOf(**device, options); !why.empty()) return wrongUsage(why);
   const auto setup = readSetupArgument(options.setup);
   if (!setup) return tl::unexpected(setup.error());
+  const auto length =
+      acquisition::readTakeLength(options.until.empty() ? std::to_string(options.samples_per_node) : options.until);
+  if (!length) return wrongUsage("--until: " + length.error().message);
   const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
   if (!resumes && options.plan.empty()) {
     return wrongUsage(options.session + " does not exist yet; a new session needs --plan");
@@ -397,7 +402,7 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   }
   Acquisition acquisition(options, common);
   if (resumes && plan_json) acquisition.expectPlan(*plan_json);
-  return acquisition.run(create_plan_json, *setup);
+  return acquisition.run(create_plan_json, *setup, *length);
 }
 
 }  // namespace
@@ -413,9 +418,15 @@ void addAcquireCommand(CommandLine& line) {
       ->type_name("FILE");
   command->add_option("--plan", options->plan, "grid:... or a *.plan.json; not needed to resume a session")
       ->type_name("PLAN");
-  command->add_option("--samples-per-node", options->samples_per_node, "Good samples at each place (default 60)")
-      ->type_name("N")
-      ->check(CLI::Range(1, 100000));
+  auto* samples =
+      command->add_option("--samples-per-node", options->samples_per_node, "Good samples at each place (default 60)")
+          ->type_name("N")
+          ->check(CLI::Range(1, 100000));
+  command
+      ->add_option("--until", options->until,
+                   "When a take is complete, instead: after a time (2.5s), or when its mean is known so well (0.05mm)")
+      ->type_name("LENGTH")
+      ->excludes(samples);
   addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
   command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
   command

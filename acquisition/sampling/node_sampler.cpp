@@ -17,6 +17,23 @@ constexpr double kSuspiciousSpreadRatio = 3.0;
 constexpr std::size_t kMinNeighbours = 3;
 constexpr double kMinSpread_m = 1e-4;  ///< An SD below this is never suspicious.
 
+constexpr int kUsual = 60;  ///< Said to be wanted before anything is known.
+constexpr int kFewestByTime = 10;
+/// Fewer samples do not tell their correlation.
+constexpr int kFewestByError = 30;
+constexpr double kMostWanted = 1e6;
+/// Each block's end is compared with all samples: more of them would take longer than the samples of a long take do.
+constexpr int kMostBlocks = 30;
+
+double timeLimit_s(const SamplerOptions& options) {
+  return options.time_limit_s + (options.length.until == TakeLength::Until::kSeconds ? options.length.amount : 0.0);
+}
+
+/// Of the mean position, 3-D.
+double standardError_m(const NodeStatistics& statistics) {
+  return std::sqrt(std::max(statistics.covariance_m2.trace(), 0.0) / statistics.n_effective);
+}
+
 std::string format(const char* pattern, double value) {
   char text[96];
   std::snprintf(text, sizeof text, pattern, value);
@@ -33,7 +50,8 @@ std::string times(int count) {
 }  // namespace
 
 NodeSampler::NodeSampler(const SamplerOptions& options) : options_(options) {
-  FT_CHECK(options_.samples_per_node >= 1 && options_.block >= 1 && options_.time_limit_s > 0.0);
+  FT_CHECK(checked(options_.length) && options_.block >= 1 && options_.time_limit_s > 0.0);
+  cancel();
 }
 
 void NodeSampler::start() {
@@ -44,6 +62,8 @@ void NodeSampler::start() {
 void NodeSampler::cancel() {
   state_ = TakeState::kIdle;
   collected_ = restarts_ = bad_ = 0;
+  next_look_ = options_.block;
+  wanted_ = options_.length.until == TakeLength::Until::kSamples ? static_cast<int>(options_.length.amount) : kUsual;
   last_status_.clear();
   last_motion_.clear();
   first_time_s_.reset();
@@ -63,19 +83,57 @@ TakeState NodeSampler::add(const Sample& sample) {
     ++bad_;
     last_status_ = sample.status;
   }
-  const bool complete = collected_ >= options_.samples_per_node;
-  if (isGood(sample) && (complete || collected_ % options_.block == 0)) {
-    if (const auto moved = motion()) {
-      startOver(*moved);
-    } else if (complete) {
-      finish();
-    }
-  }
-  if (state_ == TakeState::kCollecting && sample.time_s - *first_time_s_ >= options_.time_limit_s) {
-    state_ = TakeState::kFailed;
-    message_ = timeLimitReason();
-  }
+  if (isGood(sample)) look();
+  if (state_ == TakeState::kCollecting && sample.time_s - *first_time_s_ >= timeLimit_s(options_)) timeOut();
   return state_;
+}
+
+void NodeSampler::look() {
+  const bool is_due = collected_ >= next_look_;
+  const bool complete = isComplete(is_due);
+  if (!is_due && !complete) return;
+  next_look_ = collected_ + blockNow();
+  if (const auto moved = motion()) {
+    startOver(*moved);
+  } else if (complete) {
+    finish();
+  }
+}
+
+int NodeSampler::blockNow() const { return std::max(options_.block, collected_ / kMostBlocks); }
+
+bool NodeSampler::isComplete(bool is_due) {
+  if (options_.length.until == TakeLength::Until::kSeconds) return isCompleteByTime();
+  if (options_.length.until == TakeLength::Until::kStandardError) return is_due && isCompleteByError();
+  return collected_ >= wanted_;
+}
+
+bool NodeSampler::isCompleteByTime() {
+  const double span_s = samples_.back().time_s - samples_.front().time_s;
+  if (span_s > 0.0) wanted_ = std::max(kFewestByTime, static_cast<int>(collected_ * options_.length.amount / span_s));
+  return collected_ >= kFewestByTime && span_s >= options_.length.amount;
+}
+
+bool NodeSampler::isCompleteByError() {
+  if (collected_ < kFewestByError) return false;
+  const auto averaged = averageSamples(samples_, options_.averaging);
+  if (!averaged) return false;
+  const double ratio = standardError_m(*averaged) / options_.length.amount;
+  wanted_ = static_cast<int>(std::min(collected_ * std::max(1.0, ratio * ratio), kMostWanted));
+  return ratio <= 1.0;
+}
+
+void NodeSampler::timeOut() {
+  const bool is_known = options_.length.until == TakeLength::Until::kStandardError && collected_ >= kFewestByError;
+  if (is_known && !motion()) {
+    finish();
+    if (state_ != TakeState::kDone) return;
+    message_ = "mean known to " + format("%.2g mm", 1e3 * standardError_m(*statistics_)) + ", not to " +
+               textOf(options_.length) + format(", after %g s", options_.time_limit_s);
+    return;
+  }
+  state_ = TakeState::kFailed;
+  message_ = timeLimitReason();
 }
 
 std::optional<std::string> NodeSampler::motion() const {
@@ -89,9 +147,9 @@ std::optional<std::string> NodeSampler::motion() const {
     positions_m.push_back(pose.position_m);
     turns_rad.push_back(rotationVector_rad(orientation * first->conjugate()));
   }
-  const Shift shift = largestShift(positions_m, options_.block, options_.still_floor_m, options_.still_sigmas);
+  const Shift shift = largestShift(positions_m, blockNow(), options_.still_floor_m, options_.still_sigmas);
   if (shift.moved()) return "moved " + millimetres(shift.size);
-  const Shift turn = largestShift(turns_rad, options_.block, options_.still_floor_rad, options_.still_sigmas);
+  const Shift turn = largestShift(turns_rad, blockNow(), options_.still_floor_rad, options_.still_sigmas);
   if (turn.moved()) return "turned " + format("%.1f degrees", turn.size * kDegPerRad);
   return std::nullopt;
 }
@@ -101,6 +159,7 @@ void NodeSampler::startOver(const std::string& motion) {
   last_motion_ = motion;
   message_ = "retaking: " + motion;
   collected_ = 0;
+  next_look_ = options_.block;
   abandoned_.insert(abandoned_.end(), samples_.begin(), samples_.end());
   samples_.clear();
 }
@@ -118,8 +177,8 @@ void NodeSampler::finish() {
 }
 
 std::string NodeSampler::timeLimitReason() const {
-  std::string text = format("not finished within %g s: ", options_.time_limit_s) + std::to_string(collected_) + " of " +
-                     std::to_string(options_.samples_per_node) + " good samples";
+  std::string text = format("not finished within %g s: ", timeLimit_s(options_)) + std::to_string(collected_) + " of " +
+                     std::to_string(wanted_) + " good samples";
   if (restarts_ > 0) text += ", started over " + times(restarts_) + " (" + last_motion_ + "); let the sensor rest";
   if (bad_ > 0) {
     text += ", " + std::to_string(bad_) + " not usable";

@@ -4,18 +4,23 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/sampling/take_length.h"
 #include "calib/core/calibration_table.h"
 #include "calib/core/statistics.h"
 
 namespace fieldtrue::acquisition {
 
 struct SamplerOptions {
-  int samples_per_node = 60;
+  TakeLength length;
   double still_floor_m = 0.0005;   ///< Motion smaller than this is never called motion.
   double still_floor_rad = 0.005;  ///< Turning smaller than this is never called motion.
   double still_sigmas = 4.0;       ///< Motion larger than this many standard errors of the difference of the means is.
-  int block = 10;                  ///< Samples in a block; at each block's end the means before and after are compared.
-  double time_limit_s = 30.0;      ///< Without enough good samples by then the take fails with its reason.
+  /// Samples in a block, at least; at each block's end the means before and after are compared. Of a long take a block
+  /// is a thirtieth.
+  int block = 10;
+  /// Without enough good samples by then, beyond the time that was asked for, the take fails with its reason; one whose
+  /// mean is not known as well as was asked for ends with what it has, and says so.
+  double time_limit_s = 30.0;
   AveragingOptions averaging;
 };
 
@@ -33,9 +38,10 @@ class NodeSampler {
   TakeState add(const Sample& sample);
   TakeState state() const { return state_; }
   int collected() const { return collected_; }  ///< Good samples so far.
-  int wanted() const { return options_.samples_per_node; }
-  int restarts() const { return restarts_; }               ///< Times motion made it start over.
-  const std::string& message() const { return message_; }  ///< Why it restarted or failed, what it waits for.
+  int wanted() const { return wanted_; }        ///< Good samples; so far estimated where they are not counted.
+  int restarts() const { return restarts_; }    ///< Times motion made it start over.
+  /// Why it restarted or failed, what it waits for; in what it fell short where it is done all the same.
+  const std::string& message() const { return message_; }
   const std::vector<Sample>& samples() const {
     return samples_;
   }  ///< Every sample since the last start over, bad ones too.
@@ -44,6 +50,12 @@ class NodeSampler {
   const std::optional<NodeStatistics>& statistics() const { return statistics_; }
 
  private:
+  void look();
+  int blockNow() const;
+  bool isComplete(bool is_due);
+  bool isCompleteByTime();
+  bool isCompleteByError();
+  void timeOut();
   std::optional<std::string> motion() const;
   void startOver(const std::string& motion);
   void finish();
@@ -52,6 +64,8 @@ class NodeSampler {
   SamplerOptions options_;
   TakeState state_ = TakeState::kIdle;
   int collected_ = 0;
+  int wanted_ = 0;
+  int next_look_ = 0;  ///< Good samples at which the next block ends.
   int restarts_ = 0;
   int bad_ = 0;  ///< Samples with an error status since start(), over all restarts.
   std::string last_status_;

@@ -149,7 +149,11 @@ Answer axesAnswer(const Moves& moves) {
   std::string differing;
   for (int axis = 0; axis < 3; ++axis) {
     const std::string meant = axisName(axis, 1.0), came = mainAxis(seen->col(axis));
-    if (came != meant) differing += (differing.empty() ? "" : ", ") + meant + " came out as " + came;
+    if (came == meant) continue;
+    if (!differing.empty()) differing += ", ";
+    differing += meant;
+    differing += " came out as ";
+    differing += came;
   }
   if (differing.empty() && turn.angle() < kHand_rad) {
     return {Verdict::kGood,

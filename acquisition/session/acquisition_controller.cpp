@@ -135,12 +135,9 @@ void AcquisitionController::setReconnects(bool reconnects) { impl_->tracker.reco
 
 void AcquisitionController::setSetup(const Setup& stated) { impl_->correctSetup(stated); }
 
-void AcquisitionController::setSamplesPerNode(int count) {
-  if (count < 1 || count > 100000) {
-    emit failed(QStringLiteral("Samples per place must be 1 to 100000, got %1.").arg(count));
-    return;
-  }
-  impl_->take.options.samples_per_node = count;
+void AcquisitionController::setTakeLength(const TakeLength& length) {
+  if (!impl_->told(checked(length))) return;
+  impl_->take.options.length = length;
   if (!impl_->take.collecting()) impl_->take.sampler = NodeSampler(impl_->take.options);
   impl_->views.tellSoon();
 }

@@ -116,7 +116,7 @@ class AcquisitionController : public QObject {
   void goTo(int place);  ///< Makes any place current: retake it. -1 goes back to the first one not done.
   void setAutomatic(bool automatic);
   void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
-  void setSamplesPerNode(int count);
+  void setTakeLength(const fieldtrue::acquisition::TakeLength& length);  ///< Answers with failed where it is none.
   /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said
   /// before; a session that is opened later and was begun with another set-up tells so.
   void setSetup(const fieldtrue::Setup& stated);

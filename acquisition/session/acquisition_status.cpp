@@ -47,7 +47,7 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.current_is_retake = places.current && places.states[*places.current] != PlaceState::kPlanned;
   result.take = take.failure.isEmpty() ? take.sampler.state() : TakeState::kFailed;
   result.collected = take.sampler.collected();
-  result.wanted = take.options.samples_per_node;
+  result.wanted = take.sampler.wanted();
   result.automatic = take.automatic;
   result.still = take.stillness.still();
   result.reason = reason(&result.attention);

@@ -108,6 +108,8 @@ void AcquisitionController::Impl::finishTake() {
   const std::size_t place = *places.current;
   const NodeStatistics statistics = *take.sampler.statistics();
   std::string suspicious = suspicionOf(statistics, take.sampler.restarts(), places.neighbours(place));
+  if (const std::string& short_of = take.sampler.message(); !short_of.empty())
+    suspicious += (suspicious.empty() ? "" : "; ") + short_of;
   if (take.taken_away) {
     suspicious += (suspicious.empty() ? "" : "; ") + std::string("taken away from its place, as asked");
   }

@@ -203,6 +203,23 @@ class CliAcquireTest : public QObject {
     FT_VERIFY_STATUS(finished(emulator, 20000), 0);
   }
 
+  void takesByTimeAndByError() {
+    const QStringList command = {"acquire", "--device", "simulated:speed=20", "--plan", "grid:2x1x1@0.2", "--auto"};
+    const auto run = [&](const QStringList& more) { return runCli(command + more); };
+    // A second of the simulated tracker, at 120 readings a second, both ends.
+    const CliRun timed = run({"--until", "1s", "--session", at("timed.fieldtrue")});
+    FT_VERIFY_STATUS(timed, 0);
+    QVERIFY2(timed.out.contains("121 samples worth "), timed.out.constData());
+    const CliRun known = run({"--until", "0.5mm", "--session", at("known.fieldtrue")});
+    FT_VERIFY_STATUS(known, 0);
+    QVERIFY2(known.out.contains("30 samples worth "), known.out.constData());
+    const CliRun wrong = run({"--until", "5kg", "--session", at("none.fieldtrue")});
+    FT_VERIFY_STATUS(wrong, 2);
+    QVERIFY2(wrong.err.contains("'5kg' is no length of a take"), wrong.err.constData());
+    FT_VERIFY_STATUS(run({"--until", "1s", "--samples-per-node", "20", "--session", at("none.fieldtrue")}), 2);
+    QVERIFY(!QFileInfo::exists(at("none.fieldtrue")));
+  }
+
   void aTrackerThatComesBackGoesOn() {
     const QString link = at("returning");
     const auto plugIn = [&link](QProcess& emulator, const QStringList& faults) {

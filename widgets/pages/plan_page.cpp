@@ -35,6 +35,12 @@ constexpr double kWidest_m = 30.0;  ///< What tables are refused for too.
 constexpr double kSecondsPerPlacement = 15.0;
 constexpr double kSamplesPerSecond = 120.0;
 
+/// About how long a take lasts; one until its mean is known lasts as long as it must.
+double secondsOf(const acquisition::TakeLength& length) {
+  if (length.until == acquisition::TakeLength::Until::kSamples) return length.amount / kSamplesPerSecond;
+  return length.until == acquisition::TakeLength::Until::kSeconds ? length.amount : 1.0;
+}
+
 QWidget* inRow(std::initializer_list<QWidget*> widgets) {
   auto* row = new QWidget;
   auto* layout = new QHBoxLayout(row);
@@ -129,6 +135,21 @@ QWidget* PlanPage::makeForm() {
   reseat_ = makeCount(tr("Times each place is seated anew"), 1, 1, 8);
   samples_ = makeCount(tr("Samples at each place"), 60, 1, 10000);
   samples_->setObjectName(QStringLiteral("samplesPerNode"));
+  amount_ = new NumberBox(this);
+  amount_->setObjectName(QStringLiteral("takeAmount"));
+  amount_->setAccessibleName(tr("Length of a take"));
+  amount_->setDecimals(3);
+  connect(amount_, &QDoubleSpinBox::valueChanged, this, &PlanPage::onChanged);
+  until_ = new QComboBox(this);
+  until_->setObjectName(QStringLiteral("takeUntil"));
+  until_->addItems({tr("samples"), tr("seconds"), tr("mm known")});
+  until_->setItemData(2,
+                      tr("Until the mean position is known so well: its standard error, with the correlation of the "
+                         "readings counted in"),
+                      Qt::ToolTipRole);
+  until_->setAccessibleName(tr("What a take is counted in"));
+  connect(until_, &QComboBox::currentIndexChanged, this, &PlanPage::onUntil);
+  onUntil();
 
   problem_ = new QLabel(panel);
   problem_->setObjectName(QStringLiteral("planProblem"));
@@ -149,7 +170,7 @@ QWidget* PlanPage::makeForm() {
   form->addRow(tr("Seed"), seed_);
   form->addRow(tr("Orientations"), orientations_);
   form->addRow(tr("Seatings"), reseat_);
-  form->addRow(tr("Samples a place"), samples_);
+  form->addRow(tr("Each take"), inRow({samples_, amount_, until_}));
   layout->addLayout(form);
 
   summary_ = new QLabel(panel);
@@ -264,8 +285,7 @@ QString PlanPage::summary(const acquisition::Plan& now, const std::vector<Planne
   std::set<double> levels_m;
   for (const PlannedPlace& place : planned)
     levels_m.insert(std::round(place.reference_from_sensor.position_m.z() * 1000.0) / 1000.0);
-  const double minutes =
-      static_cast<double>(planned.size()) * (kSecondsPerPlacement + samples_->value() / kSamplesPerSecond) / 60.0;
+  const double minutes = static_cast<double>(planned.size()) * (kSecondsPerPlacement + secondsOf(takeLength())) / 60.0;
   QString text = tr("%1 placements on %2 levels, about %3 minutes for a practised operator.")
                      .arg(planned.size())
                      .arg(levels_m.size())
@@ -275,6 +295,29 @@ QString PlanPage::summary(const acquisition::Plan& now, const std::vector<Planne
   if (!pipes.isEmpty()) text += tr(" Pipes: %1.").arg(pipes.join(QStringLiteral(", ")));
   const std::string orientations = evaluation::plannedOrientations(planned, Pose{}).text;
   return text + QStringLiteral("\n\n") + QString::fromStdString(orientations);
+}
+
+void PlanPage::onUntil() {
+  const auto until = static_cast<acquisition::TakeLength::Until>(until_->currentIndex());
+  const bool counts = until == acquisition::TakeLength::Until::kSamples;
+  samples_->setVisible(counts);
+  amount_->setVisible(!counts);
+  const QSignalBlocker quiet(amount_);
+  if (until == acquisition::TakeLength::Until::kSeconds) {
+    amount_->setRange(0.1, 600.0);
+    amount_->setValue(1.0);
+  } else if (!counts) {
+    amount_->setRange(0.001, 100.0);
+    amount_->setValue(0.1);
+  }
+  if (summary_) onChanged();
+}
+
+acquisition::TakeLength PlanPage::takeLength() const {
+  const auto until = static_cast<acquisition::TakeLength::Until>(until_->currentIndex());
+  if (until == acquisition::TakeLength::Until::kSamples) return {until, static_cast<double>(samples_->value())};
+  const double unit = until == acquisition::TakeLength::Until::kStandardError ? 1e-3 : 1.0;
+  return {until, unit * amount_->value()};
 }
 
 void PlanPage::loadPlanFile() {
@@ -314,7 +357,7 @@ void PlanPage::showPlan(const acquisition::Plan& plan) {
 
 void PlanPage::create() {
   if (!pitchProblem(plan()).isEmpty()) return;
-  workbench_.createSession(Workbench::freshSessionPath(QStringLiteral("session")), plan(), samples_->value());
+  workbench_.createSession(Workbench::freshSessionPath(QStringLiteral("session")), plan(), takeLength());
 }
 
 }  // namespace fieldtrue::widgets

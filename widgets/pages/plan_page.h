@@ -30,6 +30,8 @@ class PlanPage : public QWidget {
   QWidget* makeForm();
   QDoubleSpinBox* makeLength(const QString& name, double metres);
   void onUnit();
+  void onUntil();
+  acquisition::TakeLength takeLength() const;
   void onChanged();
   void loadPlanFile();
   /// Fills the form; a plan beyond the fields' usual ranges widens them rather than being changed.
@@ -51,7 +53,9 @@ class PlanPage : public QWidget {
   QSpinBox* orientations_;
   QSpinBox* reseat_;
   QSpinBox* samples_;
-  QLabel* summary_;
+  QDoubleSpinBox* amount_;  ///< In place of it where a take is not counted in samples.
+  QComboBox* until_;
+  QLabel* summary_ = nullptr;
   QLabel* problem_;
   QDoubleSpinBox* pipe_foot_;
   QPushButton* create_;

@@ -380,7 +380,7 @@ void Workbench::startDemonstration() {
   demonstration_path_ = freshSessionPath(QStringLiteral("demonstration"));
   connectDevice(QStringLiteral("simulated:speed=3,travel_s=1"), builtInScene(QStringLiteral("steel_floor")));
   acquisition::Plan plan;
-  createSession(demonstration_path_, plan, 60);
+  createSession(demonstration_path_, plan);
 }
 
 void Workbench::connectDevice(const QString& device, const QString& scene_path) {
@@ -416,8 +416,9 @@ void Workbench::onTrace(const std::shared_ptr<const acquisition::Trace>& trace) 
 
 void Workbench::setSetup(const Setup& stated) { post(&acquisition::AcquisitionController::setSetup, stated); }
 
-void Workbench::createSession(const QString& path, const acquisition::Plan& plan, int samples_per_node) {
-  post(&acquisition::AcquisitionController::setSamplesPerNode, samples_per_node);
+void Workbench::createSession(const QString& path, const acquisition::Plan& plan,
+                              const acquisition::TakeLength& length) {
+  post(&acquisition::AcquisitionController::setTakeLength, length);
   post(&acquisition::AcquisitionController::openSession, path, QString::fromStdString(toJson(plan).dump()));
 }
 

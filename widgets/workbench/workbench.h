@@ -95,7 +95,7 @@ class Workbench : public QObject {
   /// message says where, or why not.
   void saveTrace();
   void setSetup(const Setup& stated);  ///< AcquisitionController::setSetup.
-  void createSession(const QString& path, const acquisition::Plan& plan, int samples_per_node);
+  void createSession(const QString& path, const acquisition::Plan& plan, const acquisition::TakeLength& length = {});
   void openSession(const QString& path);
   void take();
   void cancelTake();

@@ -55,6 +55,85 @@ Eigen::Vector3d stepAt(int n, int when, double size_m) {
 class NodeSamplerTest : public QObject {
   Q_OBJECT
  private slots:
+  void lengthsOfATake_data() {
+    QTest::addColumn<QByteArray>("text");
+    QTest::addColumn<int>("until");
+    QTest::addColumn<double>("amount");
+    QTest::newRow("samples") << QByteArray("60") << 0 << 60.0;
+    QTest::newRow("a time") << QByteArray("2.5s") << 1 << 2.5;
+    QTest::newRow("an error") << QByteArray("0.05mm") << 2 << 5e-5;
+    for (const char* wrong :
+         {"", "s", "-5", "0", "2.5", "100001", "1e99s", "0.01s", "601s", "0mm", "5m", "5kg", "60 s"})
+      QTest::newRow(qPrintable(QString("no length: '%1'").arg(wrong))) << QByteArray(wrong) << -1 << 0.0;
+  }
+
+  void lengthsOfATake() {
+    QFETCH(QByteArray, text);
+    QFETCH(int, until);
+    QFETCH(double, amount);
+    const auto length = readTakeLength(text.toStdString());
+    QCOMPARE(length.has_value(), until >= 0);
+    if (!length) return;
+    QCOMPARE(static_cast<int>(length->until), until);
+    QVERIFY(std::abs(length->amount - amount) < 1e-12);
+    QCOMPARE(textOf(*length), text.toStdString());
+  }
+
+  void aTakeByTime() {
+    SamplerOptions options;
+    options.length = {TakeLength::Until::kSeconds, 1.5};
+    NodeSampler sampler(options);
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 4);
+    int n = 0;
+    while (sampler.add(sensor.next()) == TakeState::kCollecting) {
+      ++n;
+      if (n == 90) QVERIFY2(sampler.wanted() >= 178 && sampler.wanted() <= 184, "what 1.5 s hold at this rate");
+    }
+    QVERIFY(sampler.state() == TakeState::kDone);
+    QCOMPARE(sampler.collected(), 181);  // 1.5 s at 120 a second, both ends.
+  }
+
+  void aTakeUntilItsMeanIsKnown_data() {
+    QTest::addColumn<double>("correlation");
+    QTest::addColumn<int>("expected");
+    // 3-D SD 1 mm, 0.1 mm wanted: 100 independent readings, each of them worth (1 - rho)/(1 + rho).
+    QTest::newRow("independent readings") << 0.0 << 100;
+    QTest::newRow("a tracker that filters") << 0.8 << 900;
+  }
+
+  void aTakeUntilItsMeanIsKnown() {
+    QFETCH(double, correlation);
+    QFETCH(int, expected);
+    SamplerOptions options;
+    options.length = {TakeLength::Until::kStandardError, 1e-4};
+    NodeSampler sampler(options);
+    sampler.start();
+    NoisySensor sensor(1e-3, correlation, 12);
+    while (sampler.add(sensor.next()) == TakeState::kCollecting) {
+    }
+    QVERIFY(sampler.state() == TakeState::kDone);
+    QVERIFY(sampler.message().empty());
+    QVERIFY2(sampler.collected() > expected * 0.6 && sampler.collected() < expected * 1.6,
+             qPrintable(QString::number(sampler.collected())));
+    const NodeStatistics& mean = *sampler.statistics();
+    QVERIFY(std::sqrt(mean.covariance_m2.trace() / mean.n_effective) <= 1e-4);
+  }
+
+  void aMeanThatCannotBeKnownSoWell() {
+    SamplerOptions options;
+    options.length = {TakeLength::Until::kStandardError, 1e-6};
+    NodeSampler sampler(options);
+    sampler.start();
+    NoisySensor sensor(1e-3, 0.0, 2);
+    int n = 0;
+    while (sampler.add(sensor.next()) == TakeState::kCollecting) ++n;
+    QVERIFY2(sampler.state() == TakeState::kDone, "what was collected is kept, to be judged by a person");
+    QCOMPARE(n, 3600);  // 30 s at 120 a second.
+    // 1 mm / sqrt(3601) = 0.017 mm.
+    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"known to 0.017 mm", "not to 0.001mm", "after 30 s"}));
+  }
+
   void sixtyGoodSamplesAreAveraged() {
     NodeSampler sampler;
     QVERIFY(sampler.state() == TakeState::kIdle);

@@ -448,12 +448,28 @@ class AcquisitionControllerTest : public QObject {
              qPrintable(QString("%1 in %2 s").arg(n_status).arg(seconds)));
   }
 
+  void aTakeThatFallsShortIsMarked() {
+    Bench bench(newPath());
+    bench.controller.setTakeLength({TakeLength::Until::kSeconds, 0.5});
+    bench.takeHere();
+    QCOMPARE(bench.nodes.at(0).n_used, 61);  // Half a second at 120 a second, both ends.
+    QCOMPARE(bench.suspicions, QStringList{""});
+    // Noise of 0.1 mm, evenly: an SD of 0.1 mm in 3-D, which 3600 readings tell to 1.7 um.
+    bench.controller.setTakeLength({TakeLength::Until::kStandardError, 1e-6});
+    bench.tracker->carryTo(bench.placePose(1));
+    bench.controller.take();
+    bench.tracker->stand(31.0);
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
+    QVERIFY2(bench.suspicions[1].contains("mean known to 0.0017 mm, not to 0.001mm"), qPrintable(bench.suspicions[1]));
+    QVERIFY(bench.controller.status().recorded->states[1] == PlaceState::kSuspicious);
+  }
+
   void samplesPerNodeIsASetting() {
     Bench bench(newPath());
-    bench.controller.setSamplesPerNode(25);
+    bench.controller.setTakeLength({TakeLength::Until::kSamples, 25});
     bench.takeHere();
     QCOMPARE(bench.nodes.at(0).n_used, 25);
-    bench.controller.setSamplesPerNode(0);
+    bench.controller.setTakeLength({TakeLength::Until::kSamples, 0});
     QCOMPARE(bench.failures.size(), 1);
   }
 

@@ -31,7 +31,7 @@ SampleTable standing() {
   SampleTable table;
   for (int i = 0; i < 36000; ++i) {
     Pose pose = kStandsAt;
-    pose.position_m.x() += i % 2 == 0 ? 2e-4 : -2e-4;
+    pose.position_m.x() += 1e-4 * (7 * i % 5 - 2);
     table.rows.push_back({0, 0, {i / 60.0, 0, pose, {}}});
   }
   return table;
@@ -83,7 +83,7 @@ struct Operator {
     Plan plan;
     plan.counts = {2, 1, 1};
     controller.openSession(session, QString::fromStdString(toJson(plan).dump()));
-    controller.setSamplesPerNode(kReadings);
+    controller.setTakeLength({TakeLength::Until::kSamples, kReadings});
   }
 
   bool runs() const { return controller.status().device == DeviceState::kRunning && controller.status().live; }

@@ -75,7 +75,7 @@ class DifferencePageTest : public WindowDriver {
   void aSessionKeepsIt() {
     Workbench workbench;
     workbench.setSetup({{"room", "Lab 9"}});
-    workbench.createSession(folder_.filePath("s.fieldtrue"), acquisition::Plan(), 60);
+    workbench.createSession(folder_.filePath("s.fieldtrue"), acquisition::Plan());
     QTRY_VERIFY_WITH_TIMEOUT(workbench.sessionIsOpen(), kWaitMs);
     QTRY_COMPARE_WITH_TIMEOUT(workbench.recordedTable().metadata.setup.count("room"), std::size_t{1}, kWaitMs);
     QCOMPARE(workbench.recordedTable().metadata.setup.at("room"), std::string("Lab 9"));

@@ -93,6 +93,7 @@ class OperatorTest : public testing::WindowDriver {
   void theTrackerComesBack_data();
   void theTrackerComesBack();
   void theLineIsSavedAndPlaysAgain();
+  void aTakeLastsAsThePlanSays();
 
  private:
   void picture(const char* name) {
@@ -440,6 +441,23 @@ void OperatorTest::theLineIsSavedAndPlaysAgain() {
   const bool told = QTest::qWaitFor([&] { return message().contains(QStringLiteral("are not saved: ")); }, kWaitMs);
   setrlimit(RLIMIT_FSIZE, &before);
   QVERIFY2(told, qPrintable(message()));
+}
+
+void OperatorTest::aTakeLastsAsThePlanSays() {
+  plugIn(QStringLiteral("0"));
+  connectTo(emulator_->endpoint().address());
+  click("step_plan");
+  find<QComboBox>("takeUntil")->setCurrentIndex(1);
+  QVERIFY(!find<QSpinBox>("samplesPerNode")->isVisible());
+  find<QDoubleSpinBox>("takeAmount")->setValue(0.5);
+  picture("plan-by-time");
+  makePlan(2, 2, 2);
+  QVERIFY(takeRight());
+  const auto& table = window_->workbench().table();
+  QTRY_COMPARE(table.nodes.size(), std::size_t{1});
+  // Half a second at 120 a second, both ends, and what a busy machine moves by a reading.
+  QVERIFY2(std::abs(table.nodes[0].n_used + table.nodes[0].n_rejected - 61) <= 1,
+           qPrintable(QString::number(table.nodes[0].n_used)));
 }
 
 }  // namespace fieldtrue::widgets
