@@ -206,10 +206,12 @@ class CliAcquireTest : public QObject {
   void takesByTimeAndByError() {
     const QStringList command = {"acquire", "--device", "simulated:speed=20", "--plan", "grid:2x1x1@0.2", "--auto"};
     const auto run = [&](const QStringList& more) { return runCli(command + more); };
-    // A second of the simulated tracker, at 120 readings a second, both ends.
+    // A second of the simulated tracker, at 120 readings a second, both ends; a busy machine moves arrivals.
     const CliRun timed = run({"--until", "1s", "--session", at("timed.fieldtrue")});
     FT_VERIFY_STATUS(timed, 0);
-    QVERIFY2(timed.out.contains("121 samples worth "), timed.out.constData());
+    const int samples =
+        QRegularExpression("(\\d+) samples worth ").match(QString::fromUtf8(timed.out)).captured(1).toInt();
+    QVERIFY2(std::abs(samples - 121) <= 6, timed.out.constData());
     const CliRun known = run({"--until", "0.5mm", "--session", at("known.fieldtrue")});
     FT_VERIFY_STATUS(known, 0);
     QVERIFY2(known.out.contains("30 samples worth "), known.out.constData());

@@ -365,6 +365,7 @@ void TrackerSearchTest::aLineFollowsItsAdapter() {
   QCOMPARE(line.now(), std::string("/dev/ttyUSB0@19200"));
   // Pulled: it is asked for where it was, until it is somewhere.
   std::filesystem::remove_all(system + "/devices/usb1/1-2");
+  std::filesystem::remove_all(system + "/class/tty/ttyUSB0");
   QCOMPARE(line.now(), std::string("/dev/ttyUSB0@19200"));
   plugIn(path("moving"), "1-3", "ttyUSB3", "A10KWXYZ\n");
   QCOMPARE(line.now(), std::string("/dev/ttyUSB3@19200"));

@@ -455,8 +455,8 @@ void OperatorTest::aTakeLastsAsThePlanSays() {
   QVERIFY(takeRight());
   const auto& table = window_->workbench().table();
   QTRY_COMPARE(table.nodes.size(), std::size_t{1});
-  // Half a second at 120 a second, both ends, and what a busy machine moves by a reading.
-  QVERIFY2(std::abs(table.nodes[0].n_used + table.nodes[0].n_rejected - 61) <= 1,
+  // Half a second at 120 a second, both ends; a busy machine moves arrivals.
+  QVERIFY2(std::abs(table.nodes[0].n_used + table.nodes[0].n_rejected - 61) <= 4,
            qPrintable(QString::number(table.nodes[0].n_used)));
 }
 
