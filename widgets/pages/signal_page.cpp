@@ -26,7 +26,7 @@ namespace {
 constexpr int kInterval_ms = 500;
 constexpr int kPicture = 140;
 constexpr int kInspectorWidth = 360;
-constexpr int kNarrowestColumn = 84;
+constexpr int kNarrowestColumn = 100;
 constexpr int kMostRows = 4;  ///< Of the table without scrolling.
 constexpr double kDegree = std::numbers::pi / 180.0;
 
