@@ -41,6 +41,7 @@ struct AcquireOptions {
   int samples_per_node = 60;
   std::string until;  ///< When a take is complete, where not by that.
   bool automatic = false;
+  std::optional<int> sensor;   ///< The one recorded.
   double reconnect_s = 300.0;  ///< For so long a tracker that was lost is waited for.
   std::string trace;           ///< Where the bytes of the tracker's line are written; empty = nowhere.
   std::vector<std::string> setup;
@@ -58,7 +59,8 @@ bool holdsNothing(const QString& session_path) {
   const auto session = acquisition::SessionStore::open(session_path);
   if (!session) return false;
   const auto table = session->nodeTable();
-  return table && table->nodes.empty();
+  const auto newest_s = session->newestSample_s();
+  return table && table->nodes.empty() && newest_s && !*newest_s;
 }
 
 /// What the tracker does now, on a terminal's last line.
@@ -110,6 +112,11 @@ class Acquisition {
     if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
     controller_.setTakeLength(length);
     controller_.setAutomatic(options_.automatic);
+    if (options_.sensor) controller_.setSensor(*options_.sensor);
+    if (const auto sensor = controller_.status().sensor; options_.sensor && sensor != options_.sensor)
+      return notPossible(options_.session + ": its places were taken by sensor " + std::to_string(*sensor) +
+                         ", not by " + std::to_string(*options_.sensor) +
+                         "; leave --sensor out, or name a new session file");
     controller_.setReconnects(options_.reconnect_s > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
@@ -120,6 +127,8 @@ class Acquisition {
     live_line_.clear();
     if (!failure_) return answer();
     if (!plan_json.isEmpty()) removeIfEmpty();
+    if (QFileInfo::exists(QString::fromStdString(options_.session)))
+      lines_ << "What was read stays in " << options_.session << std::endl;
     return tl::unexpected(*failure_);
   }
 
@@ -164,6 +173,14 @@ class Acquisition {
            " was recorded with another plan; leave --plan out to resume it, or name a new session file";
   }
 
+  /// Which of several sensors is recorded, once.
+  void tellSensor() {
+    if (told_sensor_ || !status_.sensor || status_.n_sensors < 2) return;
+    told_sensor_ = true;
+    tell("Recording sensor " + std::to_string(*status_.sensor) + " of " + std::to_string(status_.n_sensors) +
+         " (--sensor chooses another)");
+  }
+
   void onStatus(const acquisition::AcquisitionStatus& status) {
     const auto before = status_.current;
     const std::vector<acquisition::PlaceMisfit> misfits = status_.recorded->misfits;
@@ -180,6 +197,7 @@ class Acquisition {
     }
     if (status.device != acquisition::DeviceState::kRunning) return;
     if (!told_start_) tellStart();
+    tellSensor();
     live_line_.show(status);
     if (options_.automatic || !status.current || status.take == acquisition::TakeState::kCollecting) return;
     if (before != status.current || !prompted_) prompt();
@@ -355,6 +373,7 @@ class Acquisition {
   std::unique_ptr<QSocketNotifier> input_;
   std::unique_ptr<QTimer> patience_;  ///< While a tracker that was lost is waited for.
   std::string typed_;
+  bool told_sensor_ = false;
   std::string session_plan_;
   std::vector<std::string> remarks_;  ///< On how the session was opened, and on what it is recorded with.
   bool is_open_ = false;
@@ -373,7 +392,10 @@ std::string noTraceOf(const acquisition::TrackerDevice& device, const AcquireOpt
   if (options.trace.empty()) return {};
   if (!device.trace()) return "--trace writes what goes over a tracker's line, and " + options.device + " has none";
   const QFileInfo folder(QFileInfo(QString::fromStdString(options.trace)).path());
-  return folder.isDir() ? std::string() : "--trace " + options.trace + ": its folder does not exist";
+  if (!folder.isDir()) return "--trace " + options.trace + ": its folder does not exist";
+  if (!folder.isWritable()) return "--trace " + options.trace + ": its folder cannot be written to";
+  return QFileInfo(QString::fromStdString(options.trace)).isDir() ? "--trace " + options.trace + ": it is a folder"
+                                                                  : "";
 }
 
 Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
@@ -428,12 +450,15 @@ void addAcquireCommand(CommandLine& line) {
       ->type_name("LENGTH")
       ->excludes(samples);
   addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
+  command->add_option("--sensor", options->sensor, "Record this sensor of several; default the lowest that reports")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1000));
   command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
   command
       ->add_option("--reconnect", options->reconnect_s,
                    "Wait so long for a tracker that is lost to come back (default 300); 0 = end at once")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(numberWithin(0.0, 1e6));
   command->add_option("--trace", options->trace, "Writes the last bytes of the tracker's line (*.trace.zip) at the end")
       ->type_name("FILE");
   command->add_option("--session", options->session, "Session file (*.fieldtrue); made new, or resumed if it exists")

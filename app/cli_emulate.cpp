@@ -123,7 +123,7 @@ void addEmulateCommand(CommandLine& line) {
   command->add_option("--seed", options->seed, "Seed of noise and faults (default 1)")->type_name("N");
   command->add_option("--duration", options->duration_s, "End by itself after so many seconds")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(numberWithin(0.0, 1e6));
 }
 
 }  // namespace fieldtrue::cli

@@ -149,10 +149,10 @@ void addExportCommand(CommandLine& line) {
           "How far a lattice may be off inside the region (default 50); formats of fixed form are refused where "
           "they are farther off than this, if it is given")
       ->type_name("UM")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(numberWithin(0.01, 1e6));
   command->add_option("--max-size-mib", arguments->max_size_mib, "Largest lattice in the file (default 256)")
       ->type_name("MIB")
-      ->check(CLI::Range(0.01, 1e5));
+      ->check(numberWithin(0.01, 1e5));
   command
       ->add_option("--orientation", arguments->orientation,
                    "Where the correction depends on how the sensor is turned: mean, or the orientation that counts")
@@ -165,7 +165,7 @@ void addExportCommand(CommandLine& line) {
       ->add_option("--bake-um", arguments->bake_um,
                    "Bake the position part to a lattice first, which deviates by at most so much inside the region")
       ->type_name("UM")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(numberWithin(0.01, 1e6));
   addForceOption(*command, arguments->force, "Write over a file that is there");
 }
 

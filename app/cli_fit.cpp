@@ -117,7 +117,7 @@ void addFit(CommandLine& line) {
       ->add_option("--bake-um", options->bake_um,
                    "Bake the position part to a lattice that deviates by at most so much inside the region")
       ->type_name("UM")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(numberWithin(0.01, 1e6));
   command->add_option("--out", options->out, "Calibration to write (*.ftcal.json)")->type_name("FILE")->required();
 }
 

@@ -118,7 +118,7 @@ void addResampleCommand(CommandLine& line) {
       ->add_option("--width-pitches", options->width_pitches,
                    "SD of livingston's kernel in pitches of the grid; not published, one pitch is our choice")
       ->type_name("W")
-      ->check(CLI::Range(0.05, 20.0));
+      ->check(numberWithin(0.05, 20.0));
   command
       ->add_option("--align", options->align,
                    "none or rigid; default rigid unless the table says the alignment is known")

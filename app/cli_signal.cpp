@@ -44,20 +44,30 @@ class Listener {
     context_.disconnect();
     acquisition::SignalSnapshot snapshot{window_.sensors(), device_.describe()};
     if (snapshot.sensors.empty()) return notPossible(failure_.empty() ? "no reading has come" : failure_);
+    if (!is_over_ && has_failed_) return notPossible(shortText());
     return snapshot;
+  }
+
+  /// What was not heard of what was asked for, and why; empty where nothing is wanting.
+  std::string shortText() const {
+    if (is_over_) return {};
+    const std::string why = failure_.empty() ? "stopped on request" : failure_;
+    return "heard " + fixedText(heard_s_, 1) + " of " + fixedText(seconds_, 0) + " s: " + why;
   }
 
  private:
   void onSamples(const std::vector<Sample>& samples) {
     for (const Sample& sample : samples) {
       if (!first_s_) first_s_ = sample.time_s;
-      is_over_ = is_over_ || sample.time_s - *first_s_ >= seconds_;
+      heard_s_ = sample.time_s - *first_s_;
+      is_over_ = is_over_ || heard_s_ >= seconds_;
       if (is_over_) return QCoreApplication::quit();
       window_.add(sample);
     }
   }
   void onState(acquisition::DeviceState state, const QString& text) {
     if (state != acquisition::DeviceState::kFailed && state != acquisition::DeviceState::kClosed) return;
+    has_failed_ = state == acquisition::DeviceState::kFailed;
     failure_ = text.toStdString();
     QCoreApplication::quit();
   }
@@ -67,7 +77,9 @@ class Listener {
   double seconds_;
   acquisition::SignalWindow window_;
   std::optional<double> first_s_;
+  double heard_s_ = 0.0;
   bool is_over_ = false;
+  bool has_failed_ = false;
   std::string failure_;
 };
 
@@ -137,6 +149,7 @@ Outcome runSignal(const SignalOptions& options, const CommonOptions&) {
   const auto snapshot = listener.listen();
   if (!snapshot) return tl::unexpected(snapshot.error());
   Answer answer;
+  if (const std::string wanting = listener.shortText(); !wanting.empty()) answer.text = "Only " + wanting + "\n";
   answer.json = {{"schema", "fieldtrue.signal/1"}, {"sensors", nlohmann::json::array()}};
   for (const acquisition::JudgedSignal& signal : judged(*snapshot)) {
     nlohmann::json json = numbersJson(signal);
@@ -167,7 +180,7 @@ void addSignalCommand(CommandLine& line) {
       ->type_name("FILE");
   command->add_option("--seconds", options->seconds, "Listen so long, by the tracker's clock (default 10)")
       ->type_name("S")
-      ->check(CLI::Range(1.0, 1e5));
+      ->check(numberWithin(1.0, 1e5));
 }
 
 }  // namespace fieldtrue::cli

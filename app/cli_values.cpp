@@ -1,5 +1,6 @@
 #include "app/cli_values.h"
 
+#include <cmath>
 #include <sstream>
 #include <string_view>
 
@@ -48,6 +49,16 @@ Read<void> addMethod(const std::string& text, evaluation::ComparisonOptions& opt
 }
 
 }  // namespace
+
+CLI::Validator numberWithin(double low, double high) {
+  const CLI::Range range(low, high);
+  const auto check = [range](std::string& text) {
+    double value = 0.0;
+    const bool is_nan = CLI::detail::lexical_cast(text, value) && std::isnan(value);
+    return is_nan ? "Value " + text + " is not a number" : range(text);
+  };
+  return CLI::Validator(check, range.get_description());
+}
 
 Read<acquisition::Plan> readPlanArgument(const std::string& text_or_path) {
   auto plan = acquisition::readPlan(text_or_path);

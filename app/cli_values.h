@@ -22,6 +22,9 @@ namespace fieldtrue::cli {
 template <class T>
 using Read = tl::expected<T, Failure>;
 
+/// Numbers from low to high; unlike CLI::Range it takes no NaN.
+CLI::Validator numberWithin(double low, double high);
+
 /// A plan text (`grid:...`) or file.
 Read<acquisition::Plan> readPlanArgument(const std::string& text_or_path);
 

@@ -21,6 +21,9 @@ constexpr int kUsual = 60;  ///< Said to be wanted before anything is known.
 constexpr int kFewestByTime = 10;
 /// Fewer samples do not tell their correlation.
 constexpr int kFewestByError = 30;
+/// Independent samples below which their scatter is not known either, and a small error is chance.
+constexpr double kFewestWorth = 20.0;
+constexpr std::size_t kParts = 8;
 constexpr double kMostWanted = 1e6;
 /// Each block's end is compared with all samples: more of them would take longer than the samples of a long take do.
 constexpr int kMostBlocks = 30;
@@ -29,9 +32,27 @@ double timeLimit_s(const SamplerOptions& options) {
   return options.time_limit_s + (options.length.until == TakeLength::Until::kSeconds ? options.length.amount : 0.0);
 }
 
-/// Of the mean position, 3-D.
-double standardError_m(const NodeStatistics& statistics) {
-  return std::sqrt(std::max(statistics.covariance_m2.trace(), 0.0) / statistics.n_effective);
+/// Of the mean position, 3-D, from the scatter of the means of equal parts of the take: it sees noise that lasts longer
+/// than from one sample to the next.
+double errorByParts_m(std::span<const Sample> samples) {
+  std::vector<Eigen::Vector3d> positions_m;
+  for (const Sample& sample : samples)
+    if (isGood(sample)) positions_m.push_back(sample.tracker_from_sensor.position_m);
+  const std::size_t of_part = positions_m.size() / kParts;
+  if (of_part == 0) return HUGE_VAL;
+  Eigen::Matrix<double, 3, kParts> means_m;
+  for (std::size_t part = 0; part < kParts; ++part) {
+    Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < of_part; ++i) sum_m += positions_m[part * of_part + i];
+    means_m.col(static_cast<Eigen::Index>(part)) = sum_m / static_cast<double>(of_part);
+  }
+  return std::sqrt((means_m.colwise() - means_m.rowwise().mean()).squaredNorm() / (kParts * (kParts - 1)));
+}
+
+/// Of the mean position, 3-D: by the correlation of neighbours, or by parts where those say more.
+double standardError_m(const NodeStatistics& statistics, std::span<const Sample> samples) {
+  const double by_neighbours_m = std::sqrt(std::max(statistics.covariance_m2.trace(), 0.0) / statistics.n_effective);
+  return std::max(by_neighbours_m, errorByParts_m(samples));
 }
 
 std::string format(const char* pattern, double value) {
@@ -118,9 +139,10 @@ bool NodeSampler::isCompleteByError() {
   if (collected_ < kFewestByError) return false;
   const auto averaged = averageSamples(samples_, options_.averaging);
   if (!averaged) return false;
-  const double ratio = standardError_m(*averaged) / options_.length.amount;
-  wanted_ = static_cast<int>(std::min(collected_ * std::max(1.0, ratio * ratio), kMostWanted));
-  return ratio <= 1.0;
+  const double ratio = standardError_m(*averaged, samples_) / options_.length.amount;
+  const double times = std::max({1.0, ratio * ratio, kFewestWorth / averaged->n_effective});
+  wanted_ = static_cast<int>(std::min(collected_ * times, kMostWanted));
+  return ratio <= 1.0 && averaged->n_effective >= kFewestWorth;
 }
 
 void NodeSampler::timeOut() {
@@ -128,7 +150,7 @@ void NodeSampler::timeOut() {
   if (is_known && !motion()) {
     finish();
     if (state_ != TakeState::kDone) return;
-    message_ = "mean known to " + format("%.2g mm", 1e3 * standardError_m(*statistics_)) + ", not to " +
+    message_ = "mean known to " + format("%.2g mm", 1e3 * standardError_m(*statistics_, samples_)) + ", not to " +
                textOf(options_.length) + format(", after %g s", options_.time_limit_s);
     return;
   }

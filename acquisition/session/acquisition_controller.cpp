@@ -131,6 +131,11 @@ void AcquisitionController::setAutomatic(bool automatic) {
   impl_->views.tellSoon();
 }
 
+void AcquisitionController::setSensor(int sensor) {
+  impl_->tracker.asked_sensor = sensor;
+  impl_->settleSensor();
+}
+
 void AcquisitionController::setReconnects(bool reconnects) { impl_->tracker.reconnects = reconnects; }
 
 void AcquisitionController::setSetup(const Setup& stated) { impl_->correctSetup(stated); }

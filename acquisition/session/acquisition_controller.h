@@ -70,6 +70,8 @@ struct AcquisitionStatus {
   bool away = false;                 ///< The sensor stands too far from the current place to be taken without asking.
   bool refused = false;              ///< A take was refused for that; asked for once more, it is taken.
   bool has_trace = false;            ///< There are bytes of a line to be saved.
+  std::optional<int> sensor;         ///< The one recorded.
+  std::size_t n_sensors = 0;         ///< That report.
 };
 
 /// Runs an acquisition: device, sampler and store.
@@ -115,6 +117,9 @@ class AcquisitionController : public QObject {
   void redo();
   void goTo(int place);  ///< Makes any place current: retake it. -1 goes back to the first one not done.
   void setAutomatic(bool automatic);
+  /// Which sensor of several is recorded; otherwise the lowest that reports. The one that took a session's places goes
+  /// on.
+  void setSensor(int sensor);
   void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
   void setTakeLength(const fieldtrue::acquisition::TakeLength& length);  ///< Answers with failed where it is none.
   /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said

@@ -32,6 +32,9 @@ struct AcquisitionController::Impl {
   /// Sets other_tracker where the session was begun with another one; before the first take that one is forgotten.
   void compareTrackers(TableMetadata& known, const TableMetadata& said);
   void remarkOnTracker();
+  /// The sensor that took the places done goes on; before the first, the one asked for.
+  void settleSensor();
+  void remarkOnSensor(int other);
   /// Tells in the table, as soon as it is true, that another tracker has recorded too.
   Result<void> markOtherTracker();
 

@@ -65,6 +65,8 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.away = places.tooFar_m(tracker.live).has_value();
   result.refused = take.isRefusedAt(places.current);
   result.has_trace = tracker.device ? tracker.device->hasTrace() : tracker.last_trace.has_value();
+  result.sensor = tracker.sensor;
+  result.n_sensors = tracker.heard.size();
   return result;
 }
 

@@ -20,6 +20,8 @@ constexpr std::size_t kRateReadings = 120;
 constexpr int kFirstRetry_ms = 500;
 constexpr int kLastRetry_ms = 8000;
 constexpr qint64 kReturnShown_ms = 4000;
+constexpr int kTimesHeard = 3;
+constexpr int kMissedAfter = 30;  ///< Readings of another sensor.
 
 }  // namespace
 
@@ -46,11 +48,32 @@ void TrackerLink::retryLater() {
 }
 
 void TrackerLink::beginStream() {
-  sensor.reset();
+  heard.clear();
+  unsorted.clear();
   time_offset_s.reset();
   recent_times_s.clear();
   since_sample.start();
   silence_timer.start();
+}
+
+std::vector<Sample> TrackerLink::recorded(const Sample& sample) {
+  int& times = heard[sample.sensor];
+  times = std::min(times + 1, kMissedAfter);
+  if (sensor) return sample.sensor == *sensor ? std::vector{sample} : std::vector<Sample>();
+  unsorted.push_back(sample);
+  // Sensors report in turn: by then each has, even if a line lost its first reading.
+  if (times < kTimesHeard) return {};
+  sensor = heard.begin()->first;
+  std::erase_if(unsorted, [this](const Sample& one) { return one.sensor != *sensor; });
+  return std::exchange(unsorted, {});
+}
+
+bool TrackerLink::findsItMissing() {
+  if (!sensor || heard.contains(*sensor)) return false;
+  const bool is_sure =
+      std::any_of(heard.begin(), heard.end(), [](const auto& one) { return one.second == kMissedAfter; });
+  if (is_sure) heard[*sensor] = 0;
+  return is_sure;
 }
 
 void TrackerLink::add(const Sample& sample) {
@@ -96,8 +119,9 @@ void AcquisitionController::Impl::dropDevice() {
   tracker.retry_timer.stop();
   tracker.lost = false;
   tracker.since_return.invalidate();
+  tracker.sensor.reset();
   if (!tracker.device) return;
-  if (take.collecting()) failTake("the tracker was disconnected; nothing of this take was stored");
+  if (take.collecting()) failTake("the tracker was disconnected; this take counts for no place");
   tracker.drop();
   heard.clear();
   take.stillness.clear();
@@ -123,7 +147,7 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
     heard.clear();
     take.stillness.clear();
     if (fails) emit owner->deviceFailed(tracker.text);
-    if (was_collecting) failTake("the tracker was lost: " + why.toStdString() + ". Nothing of this take was stored");
+    if (was_collecting) failTake("the tracker was lost: " + why.toStdString() + ". This take counts for no place");
     if (fails) note("device", "failed: " + text.toStdString());
   }
   if (tracker.lost) {
@@ -139,6 +163,7 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
 
 void AcquisitionController::Impl::beginStream() {
   tracker.beginStream();
+  settleSensor();
   take.stillness.clear();
   take.failure.clear();
   mergeMetadata();
@@ -156,7 +181,7 @@ void AcquisitionController::Impl::checkSilence() {
   if (!tracker.silent()) return;
   tracker.live.reset();
   take.stillness.clear();
-  if (take.collecting()) failTake("the tracker stopped sending; nothing of this take was stored");
+  if (take.collecting()) failTake("the tracker stopped sending; this take counts for no place");
   views.tellSoon();
 }
 
@@ -175,14 +200,32 @@ double AcquisitionController::Impl::sessionTime_s(double device_time_s) {
 
 void AcquisitionController::Impl::onSamples(const std::vector<Sample>& samples) {
   tracker.since_sample.start();
-  for (Sample sample : samples) {
+  for (const Sample& sample : samples) {
     heard.add(sample);
-    if (!tracker.sensor) tracker.sensor = sample.sensor;
-    if (sample.sensor != *tracker.sensor) continue;
-    sample.time_s = sessionTime_s(sample.time_s);
-    addSample(sample);
+    for (Sample& of_sensor : tracker.recorded(sample)) {
+      of_sensor.time_s = sessionTime_s(of_sensor.time_s);
+      addSample(of_sensor);
+    }
+    if (tracker.findsItMissing()) remarkOnSensor(sample.sensor);
   }
   views.tellSoon();
+}
+
+void AcquisitionController::Impl::settleSensor() {
+  for (const std::optional<Node>& node : places.nodes) {
+    if (!node) continue;
+    tracker.sensor = node->sensor;
+    return;
+  }
+  if (tracker.asked_sensor) tracker.sensor = tracker.asked_sensor;
+}
+
+void AcquisitionController::Impl::remarkOnSensor(int other) {
+  emit owner->remarked(
+      QStringLiteral("Sensor %1 is recorded in this session, and the tracker does not send it, only sensor %2: plug it "
+                     "in again, or begin a new session.")
+          .arg(*tracker.sensor)
+          .arg(other));
 }
 
 void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {

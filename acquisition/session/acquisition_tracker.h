@@ -3,6 +3,7 @@
 #include <QElapsedTimer>
 #include <QTimer>
 #include <deque>
+#include <map>
 
 #include "acquisition/devices/tracker_device.h"
 
@@ -18,6 +19,10 @@ struct TrackerLink {
   double rate_hz() const;
   void retryLater();
   void beginStream();
+  /// Of a reading and those before it, what is of the sensor that is recorded: nothing until it is known which one is.
+  std::vector<Sample> recorded(const Sample& sample);
+  /// Whether the recorded sensor is not among those that report; true once a stream.
+  bool findsItMissing();
   void add(const Sample& sample);
   std::optional<Trace> trace() const { return device ? device->trace() : last_trace; }
   void cut();   ///< Stops the device, and hears no more of it.
@@ -28,7 +33,10 @@ struct TrackerLink {
   std::optional<Trace> last_trace;  ///< Of the device that was given away last.
   DeviceState state = DeviceState::kClosed;
   QString text;
-  std::optional<int> sensor;            ///< The one recorded: the first that reports.
+  std::optional<int> sensor;            ///< The one recorded: the lowest that reports, unless another is asked for.
+  std::optional<int> asked_sensor;      ///< By a person.
+  std::map<int, int> heard;             ///< Readings of each sensor of this stream; of a long one no longer counted.
+  std::vector<Sample> unsorted;         ///< Before it was known which one is recorded.
   std::optional<double> time_offset_s;  ///< Session time minus the device's.
   std::optional<Sample> live;
   std::deque<double> recent_times_s;
