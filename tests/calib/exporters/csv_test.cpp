@@ -128,7 +128,7 @@ class CsvTest : public QObject {
     std::string head;
     for (const std::string& comment : readPlain(path).comments) head += comment + "\n";
     FT_VERIFY_MATCH(holdsAll(head, {"# unit: metres", "# direction: measured", "true", "# frame: jig",
-                                    "# fit_position: hmq:precision=double,r2_cm2=50", "# fit_rows: 27",
+                                    "# fit_position: hmq:r2_cm2=50", "# fit_rows: 27",
                                     "# date: 2001-05-17", "# tracker: Fastrak", "# software: Fieldtrue "}));
   }
 
