@@ -127,9 +127,9 @@ class CsvTest : public QObject {
     FT_VERIFY_OK(exportCalibration(*findExporter("csv").value(), corrector, {}, path, {}));
     std::string head;
     for (const std::string& comment : readPlain(path).comments) head += comment + "\n";
-    FT_VERIFY_MATCH(holdsAll(head, {"# unit: metres", "# direction: measured", "true", "# frame: jig",
-                                    "# fit_position: hmq:r2_cm2=50", "# fit_rows: 27",
-                                    "# date: 2001-05-17", "# tracker: Fastrak", "# software: Fieldtrue "}));
+    FT_VERIFY_MATCH(holdsAll(
+        head, {"# unit: metres", "# direction: measured", "true", "# frame: jig", "# fit_position: hmq:r2_cm2=50",
+               "# fit_rows: 27", "# date: 2001-05-17", "# tracker: Fastrak", "# software: Fieldtrue "}));
   }
 
   void readsBackAsTheTableThatWasFitted() {
