@@ -431,13 +431,7 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
 
 void addAcquireCommand(CommandLine& line) {
   auto [command, options] = line.add("acquire", "Record a plan with a tracker into a session file", runAcquire);
-  command
-      ->add_option("--device", options->device,
-                   "simulated, fastrak:/dev/ttyUSB0@115200, fastrak:tcp:HOST:PORT; see fieldtrue-cli devices")
-      ->type_name("DEVICE")
-      ->required();
-  command->add_option("--scene", options->scene, "Scene of the simulated tracker (*.scene.json); default a clean room")
-      ->type_name("FILE");
+  addDeviceOptions(*command, options->device, options->scene);
   command->add_option("--plan", options->plan, "grid:... or a *.plan.json; not needed to resume a session")
       ->type_name("PLAN");
   auto* samples =

@@ -171,13 +171,7 @@ Outcome runSignal(const SignalOptions& options, const CommonOptions&) {
 void addSignalCommand(CommandLine& line) {
   auto [command, options] =
       line.add("signal", "Tell what a tracker's sensors send: noise, spectrum, drift, and what is wrong", runSignal);
-  command
-      ->add_option("--device", options->device,
-                   "simulated, fastrak:/dev/ttyUSB0@115200, fastrak:tcp:HOST:PORT; see fieldtrue-cli devices")
-      ->type_name("DEVICE")
-      ->required();
-  command->add_option("--scene", options->scene, "Scene of the simulated tracker (*.scene.json); default a clean room")
-      ->type_name("FILE");
+  addDeviceOptions(*command, options->device, options->scene);
   command->add_option("--seconds", options->seconds, "Listen so long, by the tracker's clock (default 10)")
       ->type_name("S")
       ->check(numberWithin(1.0, 1e5));

@@ -50,6 +50,16 @@ Read<void> addMethod(const std::string& text, evaluation::ComparisonOptions& opt
 
 }  // namespace
 
+void addDeviceOptions(CLI::App& command, std::string& device, std::string& scene) {
+  command
+      .add_option("--device", device,
+                  "simulated, fastrak:/dev/ttyUSB0@115200, fastrak:tcp:HOST:PORT; see fieldtrue-cli devices")
+      ->type_name("DEVICE")
+      ->required();
+  command.add_option("--scene", scene, "Scene of the simulated tracker (*.scene.json); default a clean room")
+      ->type_name("FILE");
+}
+
 CLI::Validator numberWithin(double low, double high) {
   const CLI::Range range(low, high);
   const auto check = [range](std::string& text) {

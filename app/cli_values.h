@@ -25,6 +25,9 @@ using Read = tl::expected<T, Failure>;
 /// Numbers from low to high; unlike CLI::Range it takes no NaN.
 CLI::Validator numberWithin(double low, double high);
 
+/// `--device`, which must be given, and the `--scene` of a simulated one.
+void addDeviceOptions(CLI::App& command, std::string& device, std::string& scene);
+
 /// A plan text (`grid:...`) or file.
 Read<acquisition::Plan> readPlanArgument(const std::string& text_or_path);
 

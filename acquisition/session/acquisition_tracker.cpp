@@ -49,6 +49,7 @@ void TrackerLink::retryLater() {
 
 void TrackerLink::beginStream() {
   heard.clear();
+  told_missing = false;
   unsorted.clear();
   time_offset_s.reset();
   recent_times_s.clear();
@@ -69,11 +70,9 @@ std::vector<Sample> TrackerLink::recorded(const Sample& sample) {
 }
 
 bool TrackerLink::findsItMissing() {
-  if (!sensor || heard.contains(*sensor)) return false;
-  const bool is_sure =
-      std::any_of(heard.begin(), heard.end(), [](const auto& one) { return one.second == kMissedAfter; });
-  if (is_sure) heard[*sensor] = 0;
-  return is_sure;
+  if (told_missing || !sensor || heard.contains(*sensor)) return false;
+  told_missing = std::any_of(heard.begin(), heard.end(), [](const auto& one) { return one.second == kMissedAfter; });
+  return told_missing;
 }
 
 void TrackerLink::add(const Sample& sample) {

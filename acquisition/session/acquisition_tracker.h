@@ -36,6 +36,7 @@ struct TrackerLink {
   std::optional<int> sensor;            ///< The one recorded: the lowest that reports, unless another is asked for.
   std::optional<int> asked_sensor;      ///< By a person.
   std::map<int, int> heard;             ///< Readings of each sensor of this stream; of a long one no longer counted.
+  bool told_missing = false;            ///< That the recorded one is not among them.
   std::vector<Sample> unsorted;         ///< Before it was known which one is recorded.
   std::optional<double> time_offset_s;  ///< Session time minus the device's.
   std::optional<Sample> live;
