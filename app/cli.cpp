@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "app/cli_barrier.h"
+#include "calib/core/memory_limit.h"
 #include "calib/core/thread_pool.h"
 
 namespace fieldtrue::cli {
@@ -200,6 +201,7 @@ int CommandLine::run(int argc, char** argv) {
 }  // namespace fieldtrue::cli
 
 int main(int argc, char** argv) {
+  fieldtrue::keepFreedMemory();
   const fieldtrue::cli::Application application(argc, argv);
   std::setlocale(LC_NUMERIC, "C");  // QCoreApplication takes over the user's, and numbers in files have a point.
   fieldtrue::cli::CommandLine line;

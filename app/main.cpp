@@ -3,12 +3,14 @@
 #include <QTimer>
 #include <clocale>
 
+#include "calib/core/memory_limit.h"
 #include "widgets/shell/application.h"
 #include "widgets/shell/main_window.h"
 #include "widgets/style/theme.h"
 #include "widgets/views/host/gl_format.h"
 
 int main(int argc, char** argv) {
+  fieldtrue::keepFreedMemory();
   fieldtrue::widgets::setDefaultGlFormat();
   fieldtrue::widgets::Application application(argc, argv);
   // Qt takes over the desktop's locale; printf must keep the decimal point that files and messages are written with.

@@ -1,5 +1,9 @@
 #include "calib/core/memory_limit.h"
 
+#if __has_include(<malloc.h>)
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <cmath>
 #include <condition_variable>
@@ -114,6 +118,14 @@ std::optional<double> availableMemory_bytes(const fs::path& root) {
   auto free_bytes = numberAfter(root / "proc/meminfo", "MemAvailable");
   if (free_bytes) *free_bytes *= 1024.0;
   return smaller(free_bytes, leftByControlGroups(root));
+}
+
+void keepFreedMemory() {
+#if defined(__GLIBC__)
+  constexpr int kKept_bytes = 128 * 1024 * 1024;
+  mallopt(M_MMAP_THRESHOLD, kKept_bytes / 4);
+  mallopt(M_TRIM_THRESHOLD, kKept_bytes);
+#endif
 }
 
 Result<void> checkMemory(const std::string& what, double bytes) {

@@ -14,6 +14,11 @@ namespace fieldtrue {
 /// @param root of the file system that is asked
 std::optional<double> availableMemory_bytes(const std::filesystem::path& root = "/");
 
+/// Lets the process keep up to 128 MiB that it has freed: matrices of hundreds of places are made and freed thousands
+/// of times, and the system clears every page that it is asked for anew. Where the C library has no such setting,
+/// nothing happens.
+void keepFreedMemory();
+
 /// @param what whose memory it is, as the subject of a sentence: "The Gaussian process on 9000 places"
 /// @error kUnsupported where `bytes` is more than 80 % of what is available, with both figures
 Result<void> checkMemory(const std::string& what, double bytes);

@@ -45,6 +45,8 @@ void subtractSymmetricProduct(Eigen::MatrixXd& a, const Eigen::MatrixXd& x, cons
 
 Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a) { return a * a.transpose(); }
 
+Eigen::MatrixXd times(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) { return a * b; }
+
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.selfadjointView<Eigen::Lower>() * b;
 }

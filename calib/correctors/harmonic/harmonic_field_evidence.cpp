@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+
+#include "calib/correctors/multiquadric/hmq_kernel.h"
+#include "calib/correctors/numerics/dense_solver.h"
 
 namespace fieldtrue::correctors {
 namespace {
 
-using GroupMatrix = Eigen::Matrix<double, kPerSource, kPerSource>;
 using GroupVector = Eigen::Matrix<double, kPerSource, 1>;
 
 /// The smallest prior variance worth telling from none, in squared units; the search is logarithmic from there up to 1.
@@ -31,9 +34,12 @@ class Posterior {
 
   /// Gathers the chosen columns: to be called after the groups changed.
   void gather() {
-    columns_.resize(system_.gram.rows(), size());
-    for (std::size_t k = 0; k < groups.size(); ++k)
-      columns_.middleCols(start(k), kPerSource) = system_.gram.middleCols(kPerSource * groups[k], kPerSource);
+    columns_.resize(system_.right().size(), size());
+    for (std::size_t k = 0; k < groups.size(); ++k) {
+      auto made = made_.find(groups[k]);
+      if (made == made_.end()) made = made_.emplace(groups[k], system_.columns(groups[k])).first;
+      columns_.middleCols(start(k), kPerSource) = made->second;
+    }
   }
 
   void solve() {
@@ -48,7 +54,7 @@ class Posterior {
     Eigen::MatrixXd h(size(), size());
     for (std::size_t k = 0; k < groups.size(); ++k) {
       sd.segment(start(k), kPerSource).setConstant(std::sqrt(variance[k]));
-      right.segment(start(k), kPerSource) = system_.right.segment(kPerSource * groups[k], kPerSource);
+      right.segment(start(k), kPerSource) = system_.right().segment(kPerSource * groups[k], kPerSource);
       h.middleRows(start(k), kPerSource) = columns_.middleRows(kPerSource * groups[k], kPerSource);
     }
     h = sd.asDiagonal() * h * sd.asDiagonal() / noise_factor_;
@@ -75,7 +81,7 @@ class Posterior {
         product.segment(start(k), kPerSource) = columns_.middleRows(kPerSource * groups[k], kPerSource) * mean_;
       explained = 2.0 * mean_.dot(right_) - mean_.dot(product);
     }
-    return std::max(0.0, system_.y_squared - explained) / std::max(1.0, system_.n_rows - freedom_all);
+    return std::max(0.0, system_.y_squared() - explained) / std::max(1.0, system_.n_rows() - freedom_all);
   }
 
  private:
@@ -84,6 +90,7 @@ class Posterior {
 
   const GroupedSystem& system_;
   double noise_factor_;
+  std::map<Eigen::Index, Eigen::MatrixXd> made_;  ///< Columns of every group that was chosen once.
   Eigen::MatrixXd columns_;
   Eigen::MatrixXd covariance_;
   Eigen::VectorXd mean_;
@@ -92,7 +99,7 @@ class Posterior {
 
 /// MacKay's update of the prior variances, repeated; groups that the data does not determine leave.
 void improveVariances(Posterior& posterior, const GroupedSystem& system, int steps) {
-  const double least = kSmallestVariance * system.unit_m * system.unit_m;
+  const double least = kSmallestVariance * system.unit_m() * system.unit_m();
   for (int step = 0; step < steps && !posterior.groups.empty(); ++step) {
     std::vector<Eigen::Index> groups;
     std::vector<double> variance;
@@ -139,27 +146,53 @@ Offer bestOffer(const GroupMatrix& precision, const GroupVector& pull, double un
 std::vector<Offer> offersOf(const GroupedSystem& system, const Posterior& posterior) {
   const Eigen::Index n_groups = system.groups();
   const double noise = posterior.noise_factor();
-  Eigen::VectorXd pull = system.right;
+  Eigen::VectorXd pull = system.right();
   Eigen::MatrixXd explained;
   if (!posterior.groups.empty()) {
     pull.noalias() -= posterior.columns() * posterior.mean();
-    explained.noalias() = posterior.columns() * posterior.covariance();
+    explained = times(posterior.columns(), posterior.covariance());
   }
   std::vector<Offer> offers(static_cast<std::size_t>(n_groups));
   for (Eigen::Index g = 0; g < n_groups; ++g) {
     if (std::count(posterior.groups.begin(), posterior.groups.end(), g) > 0) continue;
     const Eigen::Index at = kPerSource * g;
-    GroupMatrix precision = system.gram.block<kPerSource, kPerSource>(at, at) / noise;
+    GroupMatrix precision = system.block(g) / noise;
     if (!posterior.groups.empty())
       precision.noalias() -= explained.middleRows<kPerSource>(at) *
                              posterior.columns().middleRows<kPerSource>(at).transpose() / (noise * noise);
     const GroupVector q = pull.segment<kPerSource>(at) / noise;
-    offers[static_cast<std::size_t>(g)] = bestOffer(precision, q, system.unit_m);
+    offers[static_cast<std::size_t>(g)] = bestOffer(precision, q, system.unit_m());
   }
   return offers;
 }
 
 }  // namespace
+
+GroupedSystem::GroupedSystem(const Eigen::MatrixXd& design, const Eigen::MatrixXd& nuisance, const Eigen::VectorXd& y,
+                             double unit_m)
+    : design_(design),
+      by_nuisance_(design.transpose() * nuisance),
+      n_rows_(static_cast<double>(design.rows() - nuisance.cols())),
+      unit_m_(unit_m) {
+  const Eigen::VectorXd rest = y - nuisance * (nuisance.transpose() * y);
+  right_ = design.transpose() * rest;
+  y_squared_ = rest.squaredNorm();
+  for (Eigen::Index at = 0; at < design.cols(); at += kPerSource) {
+    const auto own = design.middleCols<kPerSource>(at);
+    const auto of_nuisance = by_nuisance_.middleRows<kPerSource>(at);
+    blocks_.emplace_back(own.transpose() * own - of_nuisance * of_nuisance.transpose());
+  }
+}
+
+Eigen::MatrixXd GroupedSystem::columns(Eigen::Index group) const {
+  Eigen::MatrixXd columns = -by_nuisance_ * by_nuisance_.middleRows(kPerSource * group, kPerSource).transpose();
+  const auto n_rows = static_cast<std::size_t>(design_.rows());
+  for (Eigen::Index other = 0; other < design_.cols(); ++other)
+    for (Eigen::Index own = 0; own < kPerSource; ++own)
+      columns(other, own) +=
+          dotProduct(design_.col(other).data(), design_.col(kPerSource * group + own).data(), n_rows);
+  return columns;
+}
 
 GroupSelection selectGroups(const GroupedSystem& system, const GroupSelectionOptions& options,
                             const RunControl& control) {
@@ -168,7 +201,7 @@ GroupSelection selectGroups(const GroupedSystem& system, const GroupSelectionOpt
   constexpr double kLeastNoise = 1e-30;
   Posterior posterior(system, options.noise_factor);
   if (options.noise_unknown)
-    posterior.setNoiseFactor(std::max(kLeastNoise, system.y_squared / std::max(1.0, system.n_rows)));
+    posterior.setNoiseFactor(std::max(kLeastNoise, system.y_squared() / std::max(1.0, system.n_rows())));
   std::vector<Offer> offers;
   for (std::size_t tries = 0; tries < 2 * options.most_groups + 1 && !control.stop.stop_requested(); ++tries) {
     offers = offersOf(system, posterior);

@@ -10,16 +10,35 @@ namespace fieldtrue::correctors {
 /// Unknowns of one candidate source: the symmetric tensor of what it answers.
 inline constexpr Eigen::Index kPerSource = 6;
 
-/// A linear model y = A u + noise of unit variance whose unknowns come in groups of kPerSource, as its normal
-/// equations.
-struct GroupedSystem {
-  Eigen::MatrixXd gram;    ///< A^T A, both triangles.
-  Eigen::VectorXd right;   ///< A^T y.
-  double y_squared = 0.0;  ///< y^T y.
-  double n_rows = 0.0;     ///< Rows less the nuisance unknowns already projected out.
-  double unit_m = 1.0;     ///< Amplitudes of this size are large; prior variances are looked for below its square.
+using GroupMatrix = Eigen::Matrix<double, kPerSource, kPerSource>;
 
-  Eigen::Index groups() const { return right.size() / kPerSource; }
+/// A linear model y = A u + nuisance + noise of unit variance whose unknowns come in groups of kPerSource, as its
+/// normal equations. Of A^T A, most of which no choice of groups looks at, columns are made when they are asked for.
+class GroupedSystem {
+ public:
+  /// @param design A, which must outlive this
+  /// @param nuisance orthonormal columns whose amounts are unknown: projected out of A and y
+  /// @param unit_m amplitudes of this size are large; prior variances are looked for below its square
+  GroupedSystem(const Eigen::MatrixXd& design, const Eigen::MatrixXd& nuisance, const Eigen::VectorXd& y,
+                double unit_m);
+
+  Eigen::Index groups() const { return right_.size() / kPerSource; }
+  const Eigen::VectorXd& right() const { return right_; }  ///< A^T y.
+  double y_squared() const { return y_squared_; }          ///< y^T y.
+  double n_rows() const { return n_rows_; }                ///< Rows less the nuisance unknowns.
+  double unit_m() const { return unit_m_; }
+  /// Of A^T A, on the diagonal.
+  const GroupMatrix& block(Eigen::Index group) const { return blocks_[static_cast<std::size_t>(group)]; }
+  Eigen::MatrixXd columns(Eigen::Index group) const;  ///< Of A^T A, kPerSource of them.
+
+ private:
+  const Eigen::MatrixXd& design_;
+  Eigen::MatrixXd by_nuisance_;  ///< A^T nuisance.
+  std::vector<GroupMatrix> blocks_;
+  Eigen::VectorXd right_;
+  double y_squared_;
+  double n_rows_;
+  double unit_m_;
 };
 
 /// What decides how many groups enter.

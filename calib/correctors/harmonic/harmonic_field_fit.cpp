@@ -1,7 +1,5 @@
 #include "calib/correctors/harmonic/harmonic_field_fit.h"
 
-#include <cblas.h>
-
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -39,15 +37,6 @@ struct Chosen {
   std::vector<TensorAmplitudes> tensors;
   std::vector<double> variances;  ///< Prior variance of each tensor.
 };
-
-/// `calib` starts no thread; where OpenBLAS is built with threads it must be told, once.
-void useOneThread() {
-  static const bool kTold = [] {
-    openblas_set_num_threads(1);
-    return true;
-  }();
-  static_cast<void>(kTold);
-}
 
 class Fitter {
  public:
@@ -162,26 +151,6 @@ class Fitter {
     return linear;
   }
 
-  static GroupedSystem normalEquations(const Linearisation& linear, const Eigen::MatrixXd& rigid_basis, double unit_m) {
-    useOneThread();
-    GroupedSystem system;
-    const Eigen::VectorXd y = linear.y - rigid_basis * (rigid_basis.transpose() * linear.y);
-    const Eigen::MatrixXd by_rigid = linear.design.transpose() * rigid_basis;
-    const auto n_rows = static_cast<int>(linear.design.rows());
-    const auto n_columns = static_cast<int>(linear.design.cols());
-    system.gram.resize(n_columns, n_columns);
-    cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, n_columns, n_rows, 1.0, linear.design.data(), n_rows, 0.0,
-                system.gram.data(), n_columns);
-    cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, n_columns, 6, -1.0, by_rigid.data(), n_columns, 1.0,
-                system.gram.data(), n_columns);
-    system.gram.triangularView<Eigen::StrictlyUpper>() = system.gram.transpose();
-    system.right = linear.design.transpose() * y;
-    system.y_squared = y.squaredNorm();
-    system.n_rows = static_cast<double>(n_rows - 6);
-    system.unit_m = unit_m;
-    return system;
-  }
-
   /// How far the truth is from the positions that a field corrects, after the best rigid motion.
   struct Misfit {
     Pose field_from_truth;
@@ -210,7 +179,7 @@ class Fitter {
   double improve(const Linearisation& linear, int step) {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(linear.rigid);
     const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(linear.rigid.rows(), 6);
-    const GroupedSystem system = normalEquations(linear, basis, box_.extent_m());
+    const GroupedSystem system(linear.design, basis, linear.y, box_.extent_m());
     const bool unknown = data_.jig_sd_m <= 0.0;
     const GroupSelection selection =
         selectGroups(system, {options_.least_gain, options_.most_sources, noiseForStep(), unknown}, control_);

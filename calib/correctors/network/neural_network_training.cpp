@@ -146,15 +146,22 @@ double heldOutError(const FeedForwardNetwork& network, const TrainingSet& set, d
   return std::isfinite(sum) ? sum / static_cast<double>(n_pairs) : HUGE_VAL;
 }
 
+/// When a start has gone far enough.
+struct TrainingEnd {
+  int max_iterations = 1;
+  double least_fall = 1e-6;  ///< Of the cost in one iteration, as a share of it.
+};
+
 /// Nothing where the solver failed.
 std::optional<FeedForwardNetwork> trainFrom(const FeedForwardNetwork& start, const TrainingSet& set,
-                                            double weight_penalty, int max_iterations, Watch& watch) {
+                                            double weight_penalty, const TrainingEnd& end, Watch& watch) {
   FeedForwardNetwork::Weights weights = start.weights();
   ceres::Problem problem;
   problem.AddResidualBlock(new SetCost(start, set, weight_penalty), nullptr, weights.data());
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = max_iterations;
+  solver.max_num_iterations = end.max_iterations;
+  solver.function_tolerance = end.least_fall;
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
   solver.callbacks.push_back(&watch);
@@ -179,6 +186,8 @@ void shuffle(std::vector<std::size_t>& order, std::mt19937_64& generator) {
 constexpr int kFurtherShare = 4;
 /// Parts that are left out one after the other to choose the penalty.
 constexpr std::size_t kParts = 4;
+/// Where penalties are compared: what a start gains below it, it gains with each of them.
+constexpr double kLeastFallOfParts = 2e-4;
 
 int furtherIterations(const LevenbergMarquardtOptions& options) {
   return std::max(1, options.max_iterations / kFurtherShare);
@@ -220,7 +229,7 @@ std::vector<double> leftOutErrors(const FeedForwardNetwork& network, const Split
   for (const double penalty : options.weight_penalties) {
     if (watch.isStopped()) break;
     const int iterations = errors.empty() ? options.max_iterations : furtherIterations(options);
-    const auto end = trainFrom(start, split.kept, penalty, iterations, watch);
+    const auto end = trainFrom(start, split.kept, penalty, {iterations, kLeastFallOfParts}, watch);
     if (end) start = *end;
     errors.push_back(end ? squaredError(*end, split.left_out) : HUGE_VAL);
   }
@@ -266,7 +275,7 @@ Result<FeedForwardNetwork> trainByLevenbergMarquardt(const FeedForwardNetwork& n
   if (!penalty) return FeedForwardNetwork(network.firstHidden(), network.secondHidden());
   std::vector<Ending> endings(n_starts);
   control.parallel_for(n_starts, [&](std::size_t k) {
-    const auto end = trainFrom(startOf(network, options, k), set, *penalty, options.max_iterations, watch);
+    const auto end = trainFrom(startOf(network, options, k), set, *penalty, {options.max_iterations}, watch);
     if (end) endings[k] = {*end, heldOutError(*end, set, *penalty)};
   });
   if (control.stop.stop_requested()) return stopped();

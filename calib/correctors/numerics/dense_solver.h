@@ -36,6 +36,9 @@ void subtractSymmetricProduct(Eigen::MatrixXd& a, const Eigen::MatrixXd& x, cons
 /// A A^T, in the lower triangle.
 Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a);
 
+/// A B.
+Eigen::MatrixXd times(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+
 /// A B for symmetric A whose lower triangle is given.
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 

@@ -107,16 +107,20 @@ double rms_m(const PositionModel& model, const field::CouplingDistortion& metal,
 
 std::size_t sourcesOf(const PositionModel& model) { return model.parameters().at("sources").size(); }
 
-/// One group whose columns are orthogonal with the squared length s; another that explains nothing.
-GroupedSystem twoGroups(double s, double q) {
-  GroupedSystem system;
-  system.gram = s * Eigen::MatrixXd::Identity(2 * kPerSource, 2 * kPerSource);
-  system.right = Eigen::VectorXd::Zero(2 * kPerSource);
-  system.right[kPerSource + 2] = q;
-  system.y_squared = q * q / s + 500.0;
-  system.n_rows = 500.0;
-  return system;
-}
+/// Rows of a model of two groups with orthogonal columns of the squared length s; of the rows' values the second
+/// group's third column foretells q / s, and nothing the rest, of the squared length 500.
+struct TwoGroups {
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(500, 2 * kPerSource);
+  Eigen::MatrixXd no_nuisance = Eigen::MatrixXd::Zero(500, 0);
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(500);
+
+  TwoGroups(double s, double q) {
+    design.topRows(2 * kPerSource).diagonal().setConstant(std::sqrt(s));
+    y[kPerSource + 2] = q / std::sqrt(s);
+    y[499] = std::sqrt(500.0);
+  }
+  GroupedSystem system() const { return {design, no_nuisance, y, 1.0}; }
+};
 
 }  // namespace
 
@@ -250,7 +254,8 @@ void HarmonicFieldTest::believesNoShiftFarAboveTheLargestSeen() {
 // -3 log(1 + v s) + v q^2 / (2 (1 + v s)), greatest where 1 + v s = q^2 / (6 s), where it is
 // (q^2/s - 6)/2 - 3 log(q^2 / (6 s)): for s = 10 and q^2 = 300 that is 12 - 3 log 5 = 7.1717.
 void HarmonicFieldTest::addsAGroupByItsEvidence() {
-  const GroupedSystem system = twoGroups(10.0, std::sqrt(300.0));
+  const TwoGroups rows(10.0, std::sqrt(300.0));
+  const GroupedSystem system = rows.system();
   GroupSelectionOptions options;
   options.least_gain = 7.05;  // The variance is looked for in quarter decades, which costs up to a tenth.
   const GroupSelection chosen = selectGroups(system, options, {});
