@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
@@ -16,6 +15,7 @@
 
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/sha256.h"
+#include "tests/blind/temporary_folder.h"
 
 namespace blind {
 namespace {
@@ -36,31 +36,23 @@ struct Request {
   bool replaces = false;
 };
 
-/// A folder with the tables of one session under names that tell nothing; gone with its last owner.
+/// A folder with the tables of one session under names that tell nothing.
 class Desk {
  public:
   Desk(const fs::path& folder, const std::string& file) {
-    std::string path = (fs::temp_directory_path() / "fieldtrue-blind-XXXXXX").string();
-    if (::mkdtemp(path.data()) == nullptr) throw std::runtime_error("cannot make a folder like " + path);
-    path_ = path;
-    replaceFile(path_ / "nodes.csv", textOf(folder / (file + ".nodes.csv")));
+    replaceFile(path() / "nodes.csv", textOf(folder / (file + ".nodes.csv")));
     const fs::path samples = folder / (file + ".samples.csv");
     has_samples_ = fs::exists(samples);
-    if (has_samples_) replaceFile(path_ / "samples.csv", textOf(samples));
+    if (has_samples_) replaceFile(path() / "samples.csv", textOf(samples));
   }
-  ~Desk() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Desk(const Desk&) = delete;
-  Desk& operator=(const Desk&) = delete;
 
-  const fs::path& path() const { return path_; }
+  const fs::path& path() const { return folder_.path(); }
   bool hasSamples() const { return has_samples_; }
-  fs::path report() const { return path_ / "report.gap.json"; }
+  fs::path report() const { return path() / "report.gap.json"; }
+  fs::path scene() const { return path() / "updated.scene.json"; }
 
  private:
-  fs::path path_;
+  TemporaryFolder folder_;
   bool has_samples_ = false;
 };
 
@@ -151,15 +143,23 @@ std::vector<std::string> unanswered(const Request& request, const std::vector<st
   return open;
 }
 
+/// Copies a file and tells its hash.
+std::string keptSha256(const fs::path& from, const fs::path& to) {
+  const std::string text = textOf(from);
+  replaceFile(to, text);
+  return sha256Hex(text);
+}
+
 void recordAnswer(const Request& request, const Running& done, double seconds, int status) {
   const fs::path report = request.folder / (done.file + ".gap.json");
   json entry = {{"file", done.file}, {"seconds", seconds}, {"exit_status", status}};
-  if (status == 0 && fs::exists(done.desk->report())) {
-    const std::string text = textOf(done.desk->report());
-    replaceFile(report, text);
-    entry["answer_sha256"] = sha256Hex(text);
+  const fs::path scene = request.folder / (done.file + ".scene.json");
+  if (status == 0 && fs::exists(done.desk->report()) && fs::exists(done.desk->scene())) {
+    entry["answer_sha256"] = keptSha256(done.desk->report(), report);
+    entry["scene_sha256"] = keptSha256(done.desk->scene(), scene);
   } else {
     fs::remove(report);
+    fs::remove(scene);
   }
   const RecordLock lock(request.folder);
   json records = recordsIn(request.folder);
@@ -195,7 +195,8 @@ Running startDiagnosis(const Request& request, const std::string& file) {
   Running running{0, file, {}, std::make_unique<Desk>(request.folder, file)};
   std::vector<std::string> words = {request.cli.string(), "diagnose", "--nodes", "nodes.csv"};
   if (running.desk->hasSamples()) words.insert(words.end(), {"--samples", "samples.csv"});
-  words.insert(words.end(), {"--out", running.desk->report().filename().string(), "--threads", "1"});
+  words.insert(words.end(), {"--out", running.desk->report().filename().string(), "--updated-scene",
+                             running.desk->scene().filename().string(), "--threads", "1"});
   const std::string log_path = fs::absolute(request.folder / (file + ".stderr")).string();
   running.start = Clock::now();
   running.pid = ::fork();

@@ -40,7 +40,9 @@ struct Unanswered {
                 "echo \"$@\": $(ls) >> \"$(dirname \"$0\")/calls\"\n"
                 "[ -e \"$(dirname \"$0\")/broken\" ] && exit 3\n"
                 "while [ \"$1\" != --out ]; do shift; done\n"
-                "echo '{\"verdict\": \"no_gap\", \"candidates\": [], \"selected\": []}' > \"$2\"\n");
+                "echo '{\"verdict\": \"no_gap\", \"candidates\": [], \"selected\": []}' > \"$2\"\n"
+                "while [ \"$1\" != --updated-scene ]; do shift; done\n"
+                "echo '{}' > \"$2\"\n");
     fs::permissions(cli, fs::perms::owner_all);
   }
 
@@ -92,8 +94,10 @@ void BlindAnswerTest::theDiagnosisSeesNoLabel() {
   QCOMPARE(folder.answer(), 0);
   // What it is told, and all that lies in the folder it works in.
   const std::string calls = folder.calls();
-  QVERIFY(calls.find("diagnose --nodes nodes.csv --out report.gap.json --threads 1: nodes.csv\n") != std::string::npos);
-  QVERIFY(calls.find("diagnose --nodes nodes.csv --samples samples.csv --out report.gap.json --threads 1: nodes.csv "
+  QVERIFY(calls.find("diagnose --nodes nodes.csv --out report.gap.json "
+                     "--updated-scene updated.scene.json --threads 1: nodes.csv\n") != std::string::npos);
+  QVERIFY(calls.find("diagnose --nodes nodes.csv --samples samples.csv --out report.gap.json "
+                     "--updated-scene updated.scene.json --threads 1: nodes.csv "
                      "samples.csv\n") != std::string::npos);
 }
 

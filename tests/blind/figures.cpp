@@ -198,6 +198,29 @@ void addShrinkage(std::vector<Figure>& figures, const Sessions& single, const Se
   section.addByStrength("one effect, itself", "", single, medianOf(shrinkage));
 }
 
+void addForetold(std::vector<Figure>& figures, const Sessions& sessions) {
+  const Sessions foretold =
+      where(sessions, [](const Session& session) { return session.answer.left_inside.has_value(); });
+  if (foretold.empty()) return;
+  Section section(figures, "At places that no table held, nothing fitted again");
+  for (const bool is_inside : {true, false})
+    section.addByStrength(is_inside ? "excess taken away in the hull, median" : "outside it, median", "", foretold,
+                          [is_inside](const Sessions& some) {
+                            std::vector<double> values;
+                            for (const Session* session : some)
+                              if (const auto value = foretoldShrinkage(*session, is_inside)) values.push_back(*value);
+                            return bootstrap(values, [](std::span<const double> v) { return quantileOf(v, 0.5); });
+                          });
+  const auto stated = where(foretold, [](const Session& session) { return leftIsCovered(session).has_value(); });
+  const std::optional<Target> covered = coverageTarget();
+  section.addShares(
+      "the interval of what is left holds it", stated, [](const Session& session) { return *leftIsCovered(session); },
+      {covered, covered, covered, covered}, covered);
+  section.addShares("what is left is stated within 0.1", stated,
+                    [](const Session& session) { return std::abs(*leftStatedOff(session)) <= 0.1; },
+                    {std::nullopt, std::nullopt, atLeast(0.9), atLeast(0.9)});
+}
+
 void addCoverage(std::vector<Figure>& figures, const Sessions& single) {
   Section section(figures, "Coverage of 90 % intervals, where the class was named right");
   const auto add = [&](const std::string& name, const auto& coverage) {
@@ -382,6 +405,7 @@ Scoreboard scoreboardOf(std::span<const Session> sessions) {
   addLocation(board.figures, single);
   const Sessions pairs = onShelf(answered_for, "pairs");
   addShrinkage(board.figures, single, pairs);
+  addForetold(board.figures, single);
   addCoverage(board.figures, single);
   addProbability(board.figures, single_or_none);
   addSets(board.figures, pairs, single);

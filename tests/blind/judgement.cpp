@@ -127,6 +127,27 @@ std::optional<double> shrinkage(const Session& session) {
   return 1.0 - session.answer.remaining_fraction.value_or(1.0);
 }
 
+std::optional<double> foretoldShrinkage(const Session& session, bool is_inside) {
+  const Answer& answer = session.answer;
+  if (!answer.is_answered || isSilent(session) || answer.verdict == "unexplained") return 0.0;
+  const auto& left = is_inside ? answer.left_inside : answer.left_outside;
+  if (!left) return std::nullopt;
+  return 1.0 - *left;
+}
+
+std::optional<bool> leftIsCovered(const Session& session) {
+  const Answer& answer = session.answer;
+  if (answer.selected.empty() || !answer.left_inside || !answer.remaining_low90 || !answer.remaining_high90)
+    return std::nullopt;
+  return *answer.remaining_low90 <= *answer.left_inside && *answer.left_inside <= *answer.remaining_high90;
+}
+
+std::optional<double> leftStatedOff(const Session& session) {
+  const Answer& answer = session.answer;
+  if (answer.selected.empty() || !answer.left_inside || !answer.remaining_fraction) return std::nullopt;
+  return *answer.remaining_fraction - *answer.left_inside;
+}
+
 std::vector<bool> locationCoverage(const Session& session) {
   const NamedCause* named = rightCandidate(session);
   if (named == nullptr || session.effects.empty() || !session.effects.front().location_m) return {};

@@ -47,6 +47,16 @@ std::optional<double> relativeShrinkage(const Session& session);
 /// @return nothing where there is no effect to shrink
 std::optional<double> shrinkage(const Session& session);
 
+/// Share of the excess at places that no table held which the answer's scene takes away, uncapped; 0 where there is no
+/// answer, no gap or no explanation.
+/// @return nothing where `foretell` did not run
+std::optional<double> foretoldShrinkage(const Session& session, bool is_inside);
+/// Whether the stated interval of what is left holds what `foretell` found left inside.
+/// @return nothing unless both are there and an effect was selected
+std::optional<bool> leftIsCovered(const Session& session);
+/// Stated less found share of what is left inside.
+std::optional<double> leftStatedOff(const Session& session);
+
 /// For each 90 % interval that has a true value beside it: whether it holds that value.
 std::vector<bool> locationCoverage(const Session& session);
 std::vector<bool> amplitudeCoverage(const Session& session);

@@ -7,6 +7,7 @@
 
 #include "tests/blind/answer.h"
 #include "tests/blind/controls.h"
+#include "tests/blind/foretell.h"
 #include "tests/blind/generate.h"
 #include "tests/blind/score.h"
 
@@ -18,12 +19,14 @@ with the simulator and the diagnosis: it has its own physics, its own pose solve
 
   generate   write sessions as node tables without any label, and seal the truth (SHA-256)
   answer     run `fieldtrue-cli diagnose` on them; each answer is written once
+  foretell   simulate what the diagnosis found at places that no table held
   score      open the seal and print the scoreboard
   controls   make negative controls of a sealed set: shuffled, wrong floor, mirrored, reversed in time
 
 A whole round:
   fieldtrue-blind generate --seed 7 --sessions 40 --levels --out set
   fieldtrue-blind answer --in set --jobs 2
+  fieldtrue-blind foretell --in set --jobs 2
   fieldtrue-blind score --in set --markdown score.md
 
 `fieldtrue-blind COMMAND --help` tells the options of one command.
@@ -63,6 +66,18 @@ tables. Sessions that are answered already are left as they are, so that a run t
 Example: fieldtrue-blind answer --in set --jobs 2 --limit 120
 )";
 
+constexpr const char* kForetellHelp =
+    R"(Simulates the scene that each diagnosis left behind at the 200 sealed places of its session, without noise and without
+fitting anything again, and compares with what the generator's tracker would report there. The start is an alignment alone,
+fitted to the same rows. Writes DIR/foretold.json, which score reads.
+
+  --in DIR         answered set
+  --cli PATH       the program to run; default fieldtrue-cli beside this program
+  --jobs J         simulations side by side; default 1
+
+Example: fieldtrue-blind foretell --in set --jobs 2
+)";
+
 constexpr const char* kScoreHelp =
     R"(Checks truth and answers against their hashes and prints every figure with its 95 % interval (Wilson for shares,
 bootstrap otherwise), its target where there is one, and the confusion matrix. What was not answered counts as wrong.
@@ -94,6 +109,7 @@ struct Command {
 
 constexpr Command kCommands[] = {{"generate", kGenerateHelp, blind::runGenerate},
                                  {"answer", kAnswerHelp, blind::runAnswer},
+                                 {"foretell", kForetellHelp, blind::runForetell},
                                  {"score", kScoreHelp, blind::runScore},
                                  {"controls", kControlsHelp, blind::runControls}};
 
@@ -121,6 +137,7 @@ int main(int argc, char** argv) {
     }
   }
   std::cerr << "'" << arguments.front()
-            << "' is no command of fieldtrue-blind; it has generate, answer, score and controls (--help tells more)\n";
+            << "' is no command of fieldtrue-blind; it has generate, answer, foretell, score and controls (--help "
+               "tells more)\n";
   return 2;
 }

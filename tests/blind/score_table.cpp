@@ -7,7 +7,7 @@
 namespace blind {
 namespace {
 
-using Row = std::vector<std::string>;
+using TableRow = std::vector<std::string>;
 
 std::string number(double value, const std::string& unit) {
   char text[48];
@@ -37,7 +37,7 @@ std::string outcomeText(const Figure& figure) {
   return *missed > 0.0 ? "missed by " + number(*missed, figure.unit) : "met";
 }
 
-Row rowOf(const Figure& figure) {
+TableRow rowOf(const Figure& figure) {
   return {figure.name,
           figure.group,
           number(figure.interval.value, figure.unit) +
@@ -48,13 +48,13 @@ Row rowOf(const Figure& figure) {
           outcomeText(figure)};
 }
 
-const Row kHeader = {"figure", "sessions", "value", "95 % interval", "n", "target", "outcome"};
+const TableRow kHeader = {"figure", "sessions", "value", "95 % interval", "n", "target", "outcome"};
 
-std::vector<Row> confusionRows(const ConfusionMatrix& matrix) {
-  std::vector<Row> rows(1, Row{"truth"});
+std::vector<TableRow> confusionRows(const ConfusionMatrix& matrix) {
+  std::vector<TableRow> rows(1, TableRow{"truth"});
   for (const std::string& column : matrix.columns) rows[0].push_back(column);
   for (const std::string& row : matrix.rows) {
-    Row cells = {row};
+    TableRow cells = {row};
     for (const std::string& column : matrix.columns) {
       const auto& counts = matrix.counts.at(row);
       const auto found = counts.find(column);
@@ -65,14 +65,14 @@ std::vector<Row> confusionRows(const ConfusionMatrix& matrix) {
   return rows;
 }
 
-std::string aligned(const std::vector<Row>& rows) {
+std::string aligned(const std::vector<TableRow>& rows) {
   std::vector<std::size_t> widths;
-  for (const Row& row : rows) {
+  for (const TableRow& row : rows) {
     widths.resize(std::max(widths.size(), row.size()));
     for (std::size_t at = 0; at < row.size(); ++at) widths[at] = std::max(widths[at], row[at].size());
   }
   std::string text;
-  for (const Row& row : rows) {
+  for (const TableRow& row : rows) {
     std::string line = " ";
     for (std::size_t at = 0; at < row.size(); ++at)
       line += " " + row[at] + std::string(widths[at] - row[at].size() + 1, ' ');
@@ -82,7 +82,7 @@ std::string aligned(const std::vector<Row>& rows) {
   return text;
 }
 
-std::string piped(const std::vector<Row>& rows) {
+std::string piped(const std::vector<TableRow>& rows) {
   std::string text;
   for (std::size_t at = 0; at < rows.size(); ++at) {
     text += "|";
@@ -104,7 +104,7 @@ std::string sections(const Scoreboard& board, const std::string& mark, const Tab
   if (!board.unanswered.empty()) text += "\n";
   for (std::size_t at = 0; at < board.figures.size();) {
     const std::string& title = board.figures[at].section;
-    std::vector<Row> rows = {kHeader};
+    std::vector<TableRow> rows = {kHeader};
     for (; at < board.figures.size() && board.figures[at].section == title; ++at)
       rows.push_back(rowOf(board.figures[at]));
     text += mark + title + "\n\n" + table(rows) + "\n";

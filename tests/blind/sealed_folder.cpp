@@ -99,8 +99,11 @@ void readReport(const json& report, Answer& answer) {
   for (const json& finding : listAt(report, "findings")) {
     if (std::string effect = wordAt(finding, "effect"); !effect.empty()) answer.findings.push_back(std::move(effect));
   }
-  if (const json* remaining = member(report, "remaining"))
+  if (const json* remaining = member(report, "remaining")) {
     answer.remaining_fraction = numberAt(*remaining, "fraction_of_start");
+    answer.remaining_low90 = numberAt(*remaining, "fraction_low90");
+    answer.remaining_high90 = numberAt(*remaining, "fraction_high90");
+  }
   answer.is_answered = true;
 }
 
@@ -130,6 +133,24 @@ Answer answerOf(const std::filesystem::path& path, const json* record) {
   }
   readReport(report, answer);
   return answer;
+}
+
+/// What `foretell` found, by file; nothing where it did not run.
+std::map<std::string, json> foretoldIn(const std::filesystem::path& folder) {
+  std::map<std::string, json> foretold;
+  if (!std::filesystem::exists(folder / "foretold.json")) return foretold;
+  const json document = documentOf(folder / "foretold.json");
+  for (const json& entry : listAt(document, "sessions")) foretold[wordAt(entry, "file")] = entry;
+  return foretold;
+}
+
+/// Share of the squares at the start that is left, in position.
+std::optional<double> leftOf(const json& foretold, const char* where) {
+  const json* squares = member(foretold, where);
+  if (squares == nullptr) return std::nullopt;
+  const double start_m2 = numberAt(*squares, "start_m2").value_or(0.0);
+  const auto after_m2 = numberAt(*squares, "after_m2");
+  return after_m2 && start_m2 > 0.0 ? std::optional(*after_m2 / start_m2) : std::nullopt;
 }
 
 Session sessionOf(const json& object, std::size_t index) {
@@ -238,12 +259,17 @@ std::vector<Session> sessionsOf(const json& truth, const std::filesystem::path& 
   if (std::filesystem::exists(folder / "answers.json")) records = documentOf(folder / "answers.json");
   std::map<std::string, const json*> record_of;
   for (const json& record : listAt(records, "sessions")) record_of[wordAt(record, "file")] = &record;
+  const std::map<std::string, json> foretold = foretoldIn(folder);
   std::vector<Session> sessions;
   for (const json& object : listAt(truth, "sessions")) {
     Session session = sessionOf(object, sessions.size());
     const auto record = record_of.find(session.file);
     session.answer =
         answerOf(folder / (session.file + ".gap.json"), record == record_of.end() ? nullptr : record->second);
+    if (const auto found = foretold.find(session.file); found != foretold.end()) {
+      session.answer.left_inside = leftOf(found->second, "inside");
+      session.answer.left_outside = leftOf(found->second, "outside");
+    }
     sessions.push_back(std::move(session));
   }
   return sessions;

@@ -67,6 +67,8 @@ struct Answer {
   std::vector<NamedCause> selected;
   std::vector<std::string> findings;  ///< Effects named in findings.
   std::optional<double> remaining_fraction;
+  std::optional<double> remaining_low90, remaining_high90;
+  std::optional<double> left_inside, left_outside;  ///< Excess that `foretell` found left of its start, in squares.
 };
 
 struct Session {

@@ -19,4 +19,5 @@ echo "Sealed: $(tr -d '\n' <"$folder/set/seal.json")"
 "$blind" answer --in "$folder/set" --jobs "$jobs" --limit "$limit"
 [ -f "$folder/controls/seal.json" ] || "$blind" controls --in "$folder/set" --out "$folder/controls" --count 40
 "$blind" answer --in "$folder/controls" --jobs "$jobs" --limit "$limit"
+"$blind" foretell --in "$folder/set" --jobs "$jobs"
 "$blind" score --in "$folder/set" --controls "$folder/controls" --json "$folder/score.json" --markdown "$folder/score.md"
