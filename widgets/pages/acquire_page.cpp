@@ -67,6 +67,20 @@ QString bannerState(const acquisition::AcquisitionStatus& status) {
   return status.take == acquisition::TakeState::kCollecting ? QStringLiteral("collecting") : QStringLiteral("next");
 }
 
+/// A row of the table of sensors.
+QString sensorLine(const acquisition::SensorProgress& one, const acquisition::AcquisitionStatus& status) {
+  const bool leads = one.sensor == status.sensors.front().sensor;
+  const QString name =
+      leads ? AcquirePage::tr("Sensor %1, leads").arg(one.sensor) : AcquirePage::tr("Sensor %1").arg(one.sensor);
+  QString doing = AcquirePage::tr("ready");
+  if (status.take == acquisition::TakeState::kCollecting)
+    doing = AcquirePage::tr("%1 of %2").arg(one.collected).arg(one.wanted);
+  if (status.device != acquisition::DeviceState::kRunning) doing = QStringLiteral("-");
+  if (one.silent) doing = AcquirePage::tr("silent");
+  const QString color = one.silent ? QStringLiteral(" style='color:%1'").arg(theme().attention.name()) : QString();
+  return QStringLiteral("<tr%1><td>%2</td><td align='right'>%3</td></tr>").arg(color, name, doing);
+}
+
 Pose eased(const Pose& from, const Pose& to) {
   return {from.position_m + kEase * (to.position_m - from.position_m), from.orientation.slerp(kEase, to.orientation)};
 }
@@ -185,6 +199,11 @@ QWidget* AcquirePage::makeInspector() {
   progress_->setAccessibleName(tr("Places done"));
   layout->addWidget(counts_);
   layout->addWidget(progress_);
+  sensors_ = new QLabel(inspector);
+  sensors_->setObjectName(QStringLiteral("sensorLines"));
+  sensors_->setAccessibleName(tr("Sensors recorded"));
+  sensors_->hide();
+  layout->addWidget(sensors_);
 
   take_ = new QPushButton(icon(QStringLiteral("take"), theme().on_accent), tr("Take  (Space or Page Down)"), inspector);
   take_->setObjectName(QStringLiteral("take"));
@@ -272,6 +291,7 @@ void AcquirePage::onStatus(const acquisition::AcquisitionStatus& status) {
   room_->setLive(live ? std::optional<Pose>(*shown_reference_ * status.live->tracker_from_sensor) : std::nullopt);
   showPlace(status);
   showRing(status);
+  showSensors(status);
   showButtons(status);
 }
 
@@ -343,6 +363,14 @@ void AcquirePage::fitReason() {
 
 void AcquirePage::showRing(const acquisition::AcquisitionStatus& status) {
   ring_->setProgress(status.collected, status.wanted, ringState(status.take));
+}
+
+void AcquirePage::showSensors(const acquisition::AcquisitionStatus& status) {
+  sensors_->setVisible(status.sensors.size() > 1);
+  if (status.sensors.size() < 2) return;
+  QString lines;
+  for (const acquisition::SensorProgress& one : status.sensors) lines += sensorLine(one, status);
+  sensors_->setText(QStringLiteral("<table width='100%'>%1</table>").arg(lines));
 }
 
 void AcquirePage::showButtons(const acquisition::AcquisitionStatus& status) {
