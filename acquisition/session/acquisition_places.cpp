@@ -14,6 +14,8 @@ namespace {
 constexpr std::size_t kMostAround = 64;
 constexpr std::size_t kMostForGuess = 250;
 constexpr std::size_t kNeighbours = 6;
+constexpr double kCarried_m = 0.05;   ///< From place to place the jig is carried so far at least.
+constexpr double kShareBehind = 0.2;  ///< A sensor that moved no more of it was not carried along.
 const Eigen::Vector3d kNoTake_m = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
 }  // namespace
@@ -128,11 +130,29 @@ std::vector<NeighbourTake> KnownPlaces::neighbours(std::size_t place, int sensor
   std::vector<NeighbourTake> takes;
   for (const std::size_t other : nearestTakes(place, kNeighbours + 1)) {
     if (other == place || takes.size() == kNeighbours) continue;
-    for (const Node& node : rows[other])
-      if (node.sensor == sensor && node.covariance_m2)
-        takes.push_back({std::sqrt(node.covariance_m2->trace()), node.tracker_from_sensor.position_m.norm()});
+    const Node* node = rowOf(other, sensor);
+    if (node && node->covariance_m2)
+      takes.push_back({std::sqrt(node->covariance_m2->trace()), node->tracker_from_sensor.position_m.norm()});
   }
   return takes;
+}
+
+const Node* KnownPlaces::rowOf(std::size_t place, int sensor) const {
+  for (const Node& node : rows[place])
+    if (node.sensor == sensor) return &node;
+  return nullptr;
+}
+
+bool KnownPlaces::staysBehind(std::size_t place, const std::map<int, Eigen::Vector3d>& means_m, int leading,
+                              int sensor) const {
+  for (const std::size_t other : nearestTakes(place, kNeighbours + 1)) {
+    const Node *lead = rowOf(other, leading), *same = rowOf(other, sensor);
+    if (other == place || !lead || !same) continue;
+    const double carried_m = (means_m.at(leading) - lead->tracker_from_sensor.position_m).norm();
+    if (carried_m < kCarried_m) continue;
+    return (means_m.at(sensor) - same->tracker_from_sensor.position_m).norm() < kShareBehind * carried_m;
+  }
+  return false;
 }
 
 RigFit KnownPlaces::fitOf(const std::vector<std::size_t>& takes) const {

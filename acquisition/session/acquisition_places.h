@@ -27,6 +27,7 @@ struct KnownPlaces {
   /// Reads again what is stored of one place. @return the samples of its live take
   Result<std::vector<Sample>> reload(std::size_t place);
   void setRows(std::size_t place, const std::vector<Node>& rows_now);
+  const Node* rowOf(std::size_t place, int sensor) const;  ///< Null where it has none.
   /// The row of the sensor that leads there; null without a take.
   const Node* leading(std::size_t place) const { return rows[place].empty() ? nullptr : &rows[place].front(); }
   /// The sensors that took the places, the leading one first; empty before the first take.
@@ -37,6 +38,9 @@ struct KnownPlaces {
   /// Takes that count, nearest to a place first, its own among them.
   std::vector<std::size_t> nearestTakes(std::size_t place, std::size_t most) const;
   std::vector<NeighbourTake> neighbours(std::size_t place, int sensor) const;
+  /// Whether a sensor is where it was though the leading one has been carried there from another place: it does not
+  /// ride on the jig. @param means_m of the take at the place, by sensor
+  bool staysBehind(std::size_t place, const std::map<int, Eigen::Vector3d>& means_m, int leading, int sensor) const;
   RigFit fitOf(const std::vector<std::size_t>& takes) const;
   /// @param is_judged when given, marks the places that were judged
   void judgeAround(std::size_t place, std::vector<bool>* is_judged = nullptr);

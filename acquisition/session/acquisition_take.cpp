@@ -1,6 +1,7 @@
 #include "acquisition/session/acquisition_take.h"
 
 #include <cmath>
+#include <map>
 
 #include "acquisition/session/acquisition_impl.h"
 
@@ -116,11 +117,16 @@ void AcquisitionController::Impl::refuse(double off_m) {
 std::string AcquisitionController::Impl::suspicionOfTake(std::size_t place) const {
   std::vector<std::string> reasons;
   const auto& of_sensors = take.sampler.ofSensors();
+  const int leading = of_sensors.front().sensor;
+  std::map<int, Eigen::Vector3d> means_m;
+  for (const TakeSampler::OfSensor& one : of_sensors) means_m[one.sensor] = one.sampler.statistics()->mean.position_m;
   for (const TakeSampler::OfSensor& one : of_sensors) {
     // All started over together: that is said once.
-    const int restarts = &one == &of_sensors.front() ? one.sampler.restarts() : 0;
+    const int restarts = one.sensor == leading ? one.sampler.restarts() : 0;
+    const bool is_behind = one.sensor != leading && places.staysBehind(place, means_m, leading, one.sensor);
     for (const std::string& reason :
-         {suspicionOf(*one.sampler.statistics(), restarts, places.neighbours(place, one.sensor)),
+         {std::string(is_behind ? "was not carried with the jig; leave it out of a new session" : ""),
+          suspicionOf(*one.sampler.statistics(), restarts, places.neighbours(place, one.sensor)),
           one.sampler.message()})
       if (!reason.empty()) reasons.push_back(take.sampler.told(one, reason));
   }

@@ -260,6 +260,8 @@ void AcquisitionController::Impl::settleSensors() {
   tracker.live.reset();
   tracker.recent_times_s.clear();
   take.stillness.clear();
+  // Another sensor stands elsewhere on the jig: that is no motion.
+  take.stand.forget();
 }
 
 std::vector<int> AcquisitionController::Impl::sensorsOfState() {

@@ -25,6 +25,7 @@ class FakeTracker : public acquisition::TrackerDevice {
     Pose jig_from_sensor;
     double noise_m = 1e-4;  ///< Bounded: nothing of it is ever an outlier.
     bool is_plugged = true;
+    bool lies_in_room = false;  ///< Where it was taken off the jig, and not carried along.
   };
   std::map<int, OnJig> on_jig{{0, {}}};
 
@@ -44,7 +45,8 @@ class FakeTracker : public acquisition::TrackerDevice {
     std::vector<Sample> samples;
     for (const auto& [number, sensor] : on_jig) {
       if (!sensor.is_plugged) continue;
-      Sample sample{time_s, number, inverse(reference_from_tracker) * pose * sensor.jig_from_sensor, status};
+      const Pose at = sensor.lies_in_room ? sensor.jig_from_sensor : pose * sensor.jig_from_sensor;
+      Sample sample{time_s, number, inverse(reference_from_tracker) * at, status};
       for (double& x : sample.tracker_from_sensor.position_m) x += sensor.noise_m * uniform_(random_);
       samples.push_back(sample);
     }

@@ -196,6 +196,19 @@ class SeveralSensorsTest : public QObject {
     QVERIFY(!bench.suspicions[4].contains("sensor 0"));
   }
 
+  void oneThatDoesNotRideOnTheJigIsTold() {
+    TwoSensors bench(newPath());
+    bench.tracker->on_jig[2] = kThird;
+    bench.tracker->on_jig[2].lies_in_room = true;
+    for (int place = 0; place < 4; ++place) bench.takeHere();
+    QCOMPARE(bench.suspicions.size(), 4);
+    QCOMPARE(bench.suspicions[0], QString());
+    for (int place = 1; place < 4; ++place) {
+      FT_VERIFY_MATCH(holdsAll(bench.suspicions[place].toStdString(), {"sensor 2: was not carried with the jig"}));
+      QVERIFY(!bench.suspicions[place].contains("sensor 1"));
+    }
+  }
+
   void retakeUndoAndSkipAreOfTheWholeTake() {
     TwoSensors bench(newPath());
     bench.takeHere();

@@ -1,7 +1,9 @@
 #include <QCheckBox>
 #include <QComboBox>
+#include <QFile>
 #include <QLabel>
 #include <QLineEdit>
+#include <QListWidget>
 #include <QPushButton>
 #include <QSpinBox>
 #include <QTableWidget>
@@ -123,12 +125,9 @@ class EveryTrackerTest : public WindowDriver {
     window_->workbench().fit(choice, calibration::AlignMode::kRigid);
     QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().corrector().has_value(), kWaitMs);
     const Pose truth = status().session->places[5].reference_from_sensor;
-    for (std::size_t i = 0; i < 2; ++i) {
-      const Pose seen = inverse(kReferenceFromTracker) * truth * Pose{jigToSensor_m(i), Eigen::Quaterniond::Identity()};
-      FT_VERIFY_MATCH(near(window_->workbench().corrector()->correct(seen, sensors_[i]), truth, 5e-4, 2e-3));
-    }
-    QCOMPARE(calibration::Corrector::fromText(window_->workbench().corrector()->toText(), "kept")->table().nodes.size(),
-             2 * kPlaces);
+    correctsBoth(*window_->workbench().corrector(), truth);
+    if (QTest::currentTestFailed()) return;
+    exportedIsOfBoth(truth);
   }
 
  private:
@@ -167,6 +166,7 @@ class EveryTrackerTest : public WindowDriver {
       QTest::keyClick(second, Qt::Key_Space);
       QTRY_COMPARE(status().sensors.size(), recorded);
     }
+    picture(QStringLiteral("connect-both"));
   }
 
   /// Each of them its mean, and its samples.
@@ -186,6 +186,28 @@ class EveryTrackerTest : public WindowDriver {
       };
       QCOMPARE(std::count_if(samples.rows.begin(), samples.rows.end(), is_of_it), node.n_used + node.n_rejected);
     }
+  }
+
+  void correctsBoth(const calibration::Corrector& corrector, const Pose& truth) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Pose seen = inverse(kReferenceFromTracker) * truth * Pose{jigToSensor_m(i), Eigen::Quaterniond::Identity()};
+      FT_VERIFY_MATCH(near(corrector.correct(seen, sensors_[i]), truth, 5e-4, 2e-3));
+    }
+  }
+
+  void exportedIsOfBoth(const Pose& truth) {
+    click("step_export");
+    auto* formats = find<QListWidget>("exportList");
+    const QList<QListWidgetItem*> rows = formats->findItems(QStringLiteral(".ftcal.json"), Qt::MatchContains);
+    QVERIFY(!rows.isEmpty());
+    formats->setCurrentItem(rows.front());
+    const QString path = find<QLineEdit>("exportPath")->text();
+    click("exportWrite");
+    QTRY_VERIFY_WITH_TIMEOUT(QFile::exists(path), kWaitMs);
+    const auto written = calibration::Corrector::load(path.toStdString());
+    FT_VERIFY_OK(written);
+    QCOMPARE(written->table().nodes.size(), 2 * kPlaces);
+    correctsBoth(*written, truth);
   }
 
   void comparisonIsOfBoth() {
