@@ -12,7 +12,7 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr int kBoxesInARow = 4;
+constexpr int kBoxesInARow = 6;
 
 /// Those that report, and those that are recorded whether they do or not.
 std::vector<int> knownSensors(const acquisition::AcquisitionStatus& status) {

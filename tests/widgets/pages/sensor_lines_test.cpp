@@ -1,12 +1,14 @@
 #include <QCheckBox>
 #include <QLabel>
+#include <QTableView>
 #include <QTest>
 
 #include "calib/tables/table_writer.h"
 #include "tests/support/matchers.h"
 #include "tests/widgets/pages/window_driver.h"
 
-/// A tracker whose second sensor says nothing for a while, in the middle of a take, in the real window.
+/// Several sensors on the page where places are taken, in the real window: one that says nothing for a while in the
+/// middle of a take, and as many as any tracker has.
 using namespace fieldtrue;
 using namespace fieldtrue::widgets;
 using namespace fieldtrue::testing;
@@ -17,13 +19,13 @@ constexpr int kReadings = 400;
 constexpr int kPlayedRate_hz = 60;
 constexpr double kSilentFrom_s = 4.0, kSilentUntil_s = 9.0;
 
-/// Two sensors that lie still.
-SampleTable lying() {
+/// Sensors that lie still; the second is silent for a while.
+SampleTable lying(int sensors) {
   SampleTable table;
   for (int n = 0; n < 60 * kPlayedRate_hz; ++n) {
     const double t_s = n / static_cast<double>(kPlayedRate_hz);
     const double tremble_m = n % 2 == 0 ? 1e-4 : -1e-4;
-    for (int sensor = 0; sensor < 2; ++sensor) {
+    for (int sensor = 0; sensor < sensors; ++sensor) {
       if (sensor == 1 && t_s >= kSilentFrom_s && t_s < kSilentUntil_s) continue;
       const Pose pose{{0.4, 0.04 * sensor, 0.1 + tremble_m}, Eigen::Quaterniond::Identity()};
       table.rows.push_back({-1, 0, {t_s, sensor, pose, {}}});
@@ -34,7 +36,7 @@ SampleTable lying() {
 
 }  // namespace
 
-class SilentSensorTest : public WindowDriver {
+class SensorLinesTest : public WindowDriver {
   Q_OBJECT
 
  private slots:
@@ -42,16 +44,9 @@ class SilentSensorTest : public WindowDriver {
   void cleanupTestCase() { closeWindow(); }
 
   void isNamedInLargeLettersUntilItIsBack() {
-    const QString recording = folder_.filePath("lying.samples.csv");
-    FT_VERIFY_OK(writeSampleTable(std::filesystem::path(recording.toStdString()), lying()));
+    begin(2);
+    if (QTest::currentTestFailed()) return;
     Workbench& workbench = window_->workbench();
-    acquisition::Plan plan;
-    plan.counts = {2, 1, 1};
-    workbench.createSession(folder_.filePath("silent.fieldtrue"), plan,
-                            {acquisition::TakeLength::Until::kSamples, kReadings});
-    workbench.connectDevice("trace:" + recording, {});
-    QTRY_COMPARE(workbench.status().sensors.size(), std::size_t{2});
-    click("step_acquire");
     const auto* lines = find<QLabel>("sensorLines");
     QTRY_VERIFY(lines->isVisible() && lines->text().contains("ready"));
     workbench.take();
@@ -78,7 +73,41 @@ class SilentSensorTest : public WindowDriver {
     QTRY_VERIFY(!find<QCheckBox>("recordSensor1")->isEnabled());
     QVERIFY(find<QLabel>("recordedSensorsHint")->text().contains("were taken by these"));
   }
+
+  void sixteenLeaveRoomForTheList() {
+    begin(16);
+    if (QTest::currentTestFailed()) return;
+    const auto* lines = find<QLabel>("sensorLines");
+    window_->workbench().take();
+    QTRY_VERIFY(lines->text().contains(QStringLiteral("/%1").arg(kReadings)));
+    for (int sensor = 0; sensor < 16; ++sensor)
+      QVERIFY(lines->text().contains(QStringLiteral("Sensor %1").arg(sensor)));
+    picture("several-sixteen");
+    QVERIFY2(lines->sizeHint().width() <= lines->width(), "nothing of a line is cut off");
+    click("step_connect");
+    QTRY_VERIFY(find<QCheckBox>("recordSensor15")->isVisible());
+    QCOMPARE(window_->size(), QSize(1280, 800));
+    picture("several-sixteen-connect");
+    click("step_acquire");
+    const auto* list = find<QTableView>("placeList");
+    QVERIFY(list->viewport()->height() >= 2 * list->rowHeight(0));
+  }
+
+ private:
+  /// A tracker that plays so many sensors, a session of two places, and the page where they are taken.
+  void begin(int sensors) {
+    const QString recording = folder_.filePath(QStringLiteral("lying-%1.samples.csv").arg(sensors));
+    FT_VERIFY_OK(writeSampleTable(std::filesystem::path(recording.toStdString()), lying(sensors)));
+    Workbench& workbench = window_->workbench();
+    acquisition::Plan plan;
+    plan.counts = {2, 1, 1};
+    workbench.createSession(folder_.filePath(QStringLiteral("lying-%1.fieldtrue").arg(sensors)), plan,
+                            {acquisition::TakeLength::Until::kSamples, kReadings});
+    workbench.connectDevice("trace:" + recording, {});
+    QTRY_COMPARE(workbench.status().sensors.size(), static_cast<std::size_t>(sensors));
+    click("step_acquire");
+  }
 };
 
-FIELDTRUE_WINDOW_TEST(SilentSensorTest)
-#include "silent_sensor_test.moc"
+FIELDTRUE_WINDOW_TEST(SensorLinesTest)
+#include "sensor_lines_test.moc"
