@@ -67,6 +67,16 @@ bool holdsNothing(const QString& session_path) {
   return table && table->nodes.empty() && newest_s && !*newest_s;
 }
 
+/// Why a trace would not fit onto its disk; empty where it would.
+std::string noRoomFor(const std::string& trace) {
+  // Bytes, and a row of numbers for each chunk of them that is kept.
+  constexpr auto kMostOfFile = static_cast<qint64>(2 * acquisition::LineTrace::kMostBytes);
+  const qint64 free = QStorageInfo(QFileInfo(QString::fromStdString(trace)).path()).bytesAvailable();
+  if (free < 0 || free >= kMostOfFile) return {};
+  return "--trace " + trace + ": its disk has " + std::to_string(free >> 20) + " MiB free, and a trace may need " +
+         std::to_string(kMostOfFile >> 20) + "; free some space, or write it elsewhere";
+}
+
 /// What the tracker does now, on a terminal's last line.
 class LiveLine {
  public:
@@ -280,6 +290,15 @@ class Acquisition {
     }
     if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
     lines_ << std::endl;
+    tellNoRoom();
+  }
+
+  /// A disk that fills while places are taken is told once, not at the end of the day.
+  void tellNoRoom() {
+    if (options_.trace.empty() || told_no_room_) return;
+    const std::string why = noRoomFor(options_.trace);
+    told_no_room_ = !why.empty();
+    if (told_no_room_) tell(why);
   }
 
   void onTakeRefused(int place, double off_m) {
@@ -446,6 +465,7 @@ class Acquisition {
   std::string how_;
   bool told_start_ = false;
   bool enter_waits_ = false;
+  bool told_no_room_ = false;
   bool prompted_ = false;
   bool over_ = false;
 };
@@ -458,14 +478,7 @@ std::string noTraceOf(const acquisition::TrackerDevice& device, const AcquireOpt
   if (!folder.isDir()) return "--trace " + options.trace + ": its folder does not exist";
   if (!folder.isWritable()) return "--trace " + options.trace + ": its folder cannot be written to";
   if (QFileInfo(QString::fromStdString(options.trace)).isDir()) return "--trace " + options.trace + ": it is a folder";
-  // Bytes, and a row of numbers for each chunk of them that is kept.
-  constexpr auto kMostOfFile = static_cast<qint64>(2 * acquisition::LineTrace::kMostBytes);
-  const qint64 free = QStorageInfo(folder.filePath()).bytesAvailable();
-  if (free >= 0 && free < kMostOfFile)
-    return "--trace " + options.trace + ": its disk has " + std::to_string(free >> 20) +
-           " MiB free, and a trace may need " + std::to_string(kMostOfFile >> 20) +
-           "; free some space, or write it elsewhere";
-  return {};
+  return noRoomFor(options.trace);
 }
 
 Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {

@@ -56,10 +56,11 @@ void RecordedSensors::onStatus(const acquisition::AcquisitionStatus& status) {
     box->setEnabled(!status.takes_settle_sensors && !(is_recorded && status.sensors.size() == 1));
     box->setText(is_recorded && recorded->silent ? tr("Sensor %1, silent").arg(sensor) : tr("Sensor %1").arg(sensor));
   }
-  hint_->setText(status.takes_settle_sensors
-                     ? tr("The places of this session were taken by these. Another session may record others.")
-                     : tr("All of them are recorded at every place. Sensor %1 leads: by it rest and place are judged.")
-                           .arg(status.sensors.front().sensor));
+  hint_->setText(
+      status.takes_settle_sensors
+          ? tr("The places of this session were taken by these. Another session may record others.")
+          : tr("Those ticked are recorded at every place, at once. Sensor %1 leads: by it rest and place are judged.")
+                .arg(status.sensors.front().sensor));
 }
 
 void RecordedSensors::makeBoxes(const std::vector<int>& sensors) {
