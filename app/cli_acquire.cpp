@@ -4,6 +4,7 @@
 #include <QFile>
 #include <QFileInfo>
 #include <QSocketNotifier>
+#include <QStorageInfo>
 #include <QTimer>
 #include <algorithm>
 #include <array>
@@ -13,6 +14,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "acquisition/devices/registry.h"
@@ -20,11 +22,13 @@
 #include "acquisition/plan/place_state.h"
 #include "acquisition/plan/plan.h"
 #include "acquisition/session/acquisition_controller.h"
+#include "acquisition/session/recorded_sensors.h"
 #include "app/cli.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
 #include "calib/core/json_text.h"
 #include "calib/core/number_text.h"
+#include "calib/tables/table_sensors.h"
 #include "widgets/report/numbers.h"
 
 /// acquire: records a plan with a tracker, place by place, into a session file.
@@ -41,7 +45,7 @@ struct AcquireOptions {
   int samples_per_node = 60;
   std::string until;  ///< When a take is complete, where not by that.
   bool automatic = false;
-  std::optional<int> sensor;   ///< The one recorded.
+  std::string sensors;         ///< Those recorded, as readSensors reads them.
   double reconnect_s = 300.0;  ///< For so long a tracker that was lost is waited for.
   std::string trace;           ///< Where the bytes of the tracker's line are written; empty = nowhere.
   std::vector<std::string> setup;
@@ -61,6 +65,16 @@ bool holdsNothing(const QString& session_path) {
   const auto table = session->nodeTable();
   const auto newest_s = session->newestSample_s();
   return table && table->nodes.empty() && newest_s && !*newest_s;
+}
+
+/// Why a trace would not fit onto its disk; empty where it would.
+std::string noRoomFor(const std::string& trace) {
+  // Bytes, and a row of numbers for each chunk of them that is kept.
+  constexpr auto kMostOfFile = static_cast<qint64>(2 * acquisition::LineTrace::kMostBytes);
+  const qint64 free = QStorageInfo(QFileInfo(QString::fromStdString(trace)).path()).bytesAvailable();
+  if (free < 0 || free >= kMostOfFile) return {};
+  return "--trace " + trace + ": its disk has " + std::to_string(free >> 20) + " MiB free, and a trace may need " +
+         std::to_string(kMostOfFile >> 20) + "; free some space, or write it elsewhere";
 }
 
 /// What the tracker does now, on a terminal's last line.
@@ -101,7 +115,8 @@ class Acquisition {
     connectSignals();
   }
 
-  Outcome run(const QString& plan_json, const Setup& setup, const acquisition::TakeLength& length) {
+  Outcome run(const QString& plan_json, const Setup& setup, const acquisition::TakeLength& length,
+              const std::vector<int>& sensors) {
     const EndRequest end_request([this] { end("stopped"); });
     controller_.setSetup(setup);
     controller_.openSession(QString::fromStdString(options_.session), plan_json);
@@ -112,11 +127,8 @@ class Acquisition {
     if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
     controller_.setTakeLength(length);
     controller_.setAutomatic(options_.automatic);
-    if (options_.sensor) controller_.setSensor(*options_.sensor);
-    if (const auto sensor = controller_.status().sensor; options_.sensor && sensor != options_.sensor)
-      return notPossible(options_.session + ": its places were taken by sensor " + std::to_string(*sensor) +
-                         ", not by " + std::to_string(*options_.sensor) +
-                         "; leave --sensor out, or name a new session file");
+    if (!options_.sensors.empty()) controller_.setSensors(sensors);
+    if (const auto others = otherSensors(sensors); !others.empty()) return notPossible(others);
     controller_.setReconnects(options_.reconnect_s > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
@@ -153,7 +165,7 @@ class Acquisition {
       QObject::connect(&controller_, signal, &context_, [this, slot](auto&&... values) { (this->*slot)(values...); });
     };
     connect(&acquisition::AcquisitionController::statusChanged, &Acquisition::onStatus);
-    connect(&acquisition::AcquisitionController::nodeStored, &Acquisition::onStored);
+    connect(&acquisition::AcquisitionController::nodesStored, &Acquisition::onStored);
     connect(&acquisition::AcquisitionController::takeFailed, &Acquisition::onTakeFailed);
     connect(&acquisition::AcquisitionController::takeRefused, &Acquisition::onTakeRefused);
     connect(&acquisition::AcquisitionController::deviceFailed, &Acquisition::onDeviceFailed);
@@ -173,12 +185,52 @@ class Acquisition {
            " was recorded with another plan; leave --plan out to resume it, or name a new session file";
   }
 
-  /// Which of several sensors is recorded, once.
-  void tellSensor() {
-    if (told_sensor_ || !status_.sensor || status_.n_sensors < 2) return;
-    told_sensor_ = true;
-    tell("Recording sensor " + std::to_string(*status_.sensor) + " of " + std::to_string(status_.n_sensors) +
-         " (--sensor chooses another)");
+  static std::vector<int> recordedSensors(const acquisition::AcquisitionStatus& status) {
+    std::vector<int> sensors;
+    for (const acquisition::SensorProgress& one : status.sensors) sensors.push_back(one.sensor);
+    return sensors;
+  }
+
+  /// Why the sensors that were asked for cannot go on with the session; empty when they can.
+  std::string otherSensors(const std::vector<int>& asked) const {
+    const std::vector<int> recorded = recordedSensors(controller_.status());
+    if (asked.empty() || std::is_permutation(asked.begin(), asked.end(), recorded.begin(), recorded.end())) return {};
+    return options_.session + ": its places were taken by " + sensorsText(recorded) + ", not by " + sensorsText(asked) +
+           "; leave --sensor out, or name a new session file";
+  }
+
+  /// Which of several sensors are recorded, whenever that changes.
+  void tellSensors() {
+    const std::vector<int> recorded = recordedSensors(status_);
+    const auto reports = [this](int sensor) {
+      return std::find(status_.reporting.begin(), status_.reporting.end(), sensor) != status_.reporting.end();
+    };
+    const bool is_news = recorded != told_sensors_ && !recorded.empty() && status_.reporting.size() > 1;
+    if (!is_news || !std::all_of(recorded.begin(), recorded.end(), reports)) return;
+    told_sensors_ = recorded;
+    std::string text = "Recording " + sensorsText(recorded);
+    if (recorded.size() > 1) text += ", led by sensor " + std::to_string(recorded.front());
+    tell(text + " of " + std::to_string(status_.reporting.size()) + " that report (--sensor chooses)");
+  }
+
+  /// One of several that is silent is waited for as a tracker that is lost.
+  void tellSilent() {
+    std::vector<int> silent;
+    for (const acquisition::SensorProgress& one : status_.sensors)
+      if (one.silent) silent.push_back(one.sensor);
+    if (silent == silent_) return;
+    silent_ = silent;
+    patience_.reset();
+    if (silent.empty()) return tell("Every recorded sensor reports again");
+    const std::string what = acquisition::silentText(silent);
+    tell(what + "; nothing is taken without");
+    beginPatience(what + "; nothing came");
+  }
+
+  /// Who asked for a sensor that is not there is not left to wait for it.
+  void endWhereOneIsMissing() {
+    if (options_.sensors.empty() || status_.missing.empty() || status_.takes_settle_sensors) return;
+    fail("--sensor " + options_.sensors + ": the tracker sends only " + sensorsText(status_.reporting));
   }
 
   void onStatus(const acquisition::AcquisitionStatus& status) {
@@ -197,7 +249,9 @@ class Acquisition {
     }
     if (status.device != acquisition::DeviceState::kRunning) return;
     if (!told_start_) tellStart();
-    tellSensor();
+    tellSensors();
+    endWhereOneIsMissing();
+    tellSilent();
     live_line_.show(status);
     if (options_.automatic || !status.current || status.take == acquisition::TakeState::kCollecting) return;
     if (before != status.current || !prompted_) prompt();
@@ -211,6 +265,7 @@ class Acquisition {
              << status_.recorded->n_skipped << " skipped" << std::endl;
     }
     if (!status_.current) onFinished();
+    if (enter_waits_) controller_.take();
   }
 
   void prompt() {
@@ -220,17 +275,30 @@ class Acquisition {
            << "   Enter takes, s skips, u takes back, q quits" << std::endl;
   }
 
-  void onStored(int place, const Node& node, const QString& suspicious) {
+  void onStored(int place, const std::vector<Node>& nodes, const QString& suspicious) {
     const auto index = static_cast<std::size_t>(place);
     const acquisition::AcquisitionStatus now = controller_.status();
     failed_takes_.erase(index);
     live_line_.clear();
     lines_ << placeText(now.session->places.at(index)) << "  done " << now.recorded->n_done << " of "
-           << now.session->places.size() << ", SD " << widgets::errorFigure(sd_mm(node)) << " mm, " << node.n_used
-           << " samples worth " << fixedText(node.n_effective, 0);
-    if (node.n_rejected > 0) lines_ << ", " << node.n_rejected << " rejected";
+           << now.session->places.size();
+    for (const Node& node : nodes) {
+      if (nodes.size() > 1) lines_ << ", sensor " << node.sensor;
+      lines_ << ", SD " << widgets::errorFigure(sd_mm(node)) << " mm, " << node.n_used << " samples worth "
+             << fixedText(node.n_effective, 0);
+      if (node.n_rejected > 0) lines_ << ", " << node.n_rejected << " rejected";
+    }
     if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
     lines_ << std::endl;
+    tellNoRoom();
+  }
+
+  /// A disk that fills while places are taken is told once, not at the end of the day.
+  void tellNoRoom() {
+    if (options_.trace.empty() || told_no_room_) return;
+    const std::string why = noRoomFor(options_.trace);
+    told_no_room_ = !why.empty();
+    if (told_no_room_) tell(why);
   }
 
   void onTakeRefused(int place, double off_m) {
@@ -278,10 +346,13 @@ class Acquisition {
     if (!controller_.status().reconnecting) return onFailed(message);
     live_line_.clear();
     std::cerr << "Tracker lost - reconnecting: " << message.toStdString() << std::endl;
+    beginPatience(message.toStdString() + "; it did not come back");
+  }
+
+  void beginPatience(const std::string& what) {
     patience_ = std::make_unique<QTimer>();
     patience_->setSingleShot(true);
-    const std::string why = message.toStdString() + "; it did not come back within " +
-                            fixedText(options_.reconnect_s, 0) + " s (--reconnect)";
+    const std::string why = what + " within " + fixedText(options_.reconnect_s, 0) + " s (--reconnect)";
     QObject::connect(patience_.get(), &QTimer::timeout, &context_, [this, why] { fail(why); });
     patience_->start(static_cast<int>(1000.0 * options_.reconnect_s));
   }
@@ -327,9 +398,15 @@ class Acquisition {
     }
   }
 
+  /// Pressed before the tracker runs.
+  void keepEnter() {
+    if (!std::exchange(enter_waits_, true))
+      lines_ << "Kept: the place is taken as soon as the tracker runs" << std::endl;
+  }
+
   void obey(const std::string& command) {
     prompted_ = false;
-    if (command.empty()) return controller_.take();
+    if (command.empty()) return told_start_ ? controller_.take() : keepEnter();
     if (command == "s") return controller_.skip();
     if (command == "u") return controller_.undo();
     if (command == "q") return end("stopped");
@@ -348,6 +425,8 @@ class Acquisition {
     if (!session) return notPossible(session.error());
     const auto states = session->states();
     if (!states) return notPossible(states.error());
+    const auto table = session->nodeTable();
+    if (!table) return notPossible(table.error());
     const auto count = [&states](acquisition::PlaceState state) {
       return std::count(states->begin(), states->end(), state);
     };
@@ -357,7 +436,8 @@ class Acquisition {
     Answer answer;
     answer.json = {{"session", options_.session}, {"ended", how_},
                    {"places", states->size()},    {"done", n_done},
-                   {"skipped", n_skipped},        {"suspicious", n_suspicious}};
+                   {"skipped", n_skipped},        {"suspicious", n_suspicious},
+                   {"sensors", sensorsOf(*table)}};
     answer.text = (how_ == "finished" ? "Finished: " : "Stopped: ") + std::to_string(n_done) + " of " +
                   std::to_string(states->size()) + " places done, " + std::to_string(n_skipped) + " skipped, all in " +
                   options_.session + "\n";
@@ -371,9 +451,10 @@ class Acquisition {
   acquisition::AcquisitionController controller_;
   acquisition::AcquisitionStatus status_;
   std::unique_ptr<QSocketNotifier> input_;
-  std::unique_ptr<QTimer> patience_;  ///< While a tracker that was lost is waited for.
+  std::unique_ptr<QTimer> patience_;  ///< While a tracker that was lost, or a silent sensor, is waited for.
+  std::vector<int> silent_;           ///< Sensors that were told of.
   std::string typed_;
-  bool told_sensor_ = false;
+  std::vector<int> told_sensors_;
   std::string session_plan_;
   std::vector<std::string> remarks_;  ///< On how the session was opened, and on what it is recorded with.
   bool is_open_ = false;
@@ -383,6 +464,8 @@ class Acquisition {
   std::optional<Failure> failure_;
   std::string how_;
   bool told_start_ = false;
+  bool enter_waits_ = false;
+  bool told_no_room_ = false;
   bool prompted_ = false;
   bool over_ = false;
 };
@@ -394,8 +477,8 @@ std::string noTraceOf(const acquisition::TrackerDevice& device, const AcquireOpt
   const QFileInfo folder(QFileInfo(QString::fromStdString(options.trace)).path());
   if (!folder.isDir()) return "--trace " + options.trace + ": its folder does not exist";
   if (!folder.isWritable()) return "--trace " + options.trace + ": its folder cannot be written to";
-  return QFileInfo(QString::fromStdString(options.trace)).isDir() ? "--trace " + options.trace + ": it is a folder"
-                                                                  : "";
+  if (QFileInfo(QString::fromStdString(options.trace)).isDir()) return "--trace " + options.trace + ": it is a folder";
+  return noRoomFor(options.trace);
 }
 
 Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
@@ -410,6 +493,8 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   const auto length =
       acquisition::readTakeLength(options.until.empty() ? std::to_string(options.samples_per_node) : options.until);
   if (!length) return wrongUsage("--until: " + length.error().message);
+  const auto sensors = acquisition::readSensors(options.sensors);
+  if (!sensors) return wrongUsage("--sensor: " + sensors.error().message);
   const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
   if (!resumes && options.plan.empty()) {
     return wrongUsage(options.session + " does not exist yet; a new session needs --plan");
@@ -424,7 +509,7 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   }
   Acquisition acquisition(options, common);
   if (resumes && plan_json) acquisition.expectPlan(*plan_json);
-  return acquisition.run(create_plan_json, *setup, *length);
+  return acquisition.run(create_plan_json, *setup, *length, *sensors);
 }
 
 }  // namespace
@@ -444,9 +529,10 @@ void addAcquireCommand(CommandLine& line) {
       ->type_name("LENGTH")
       ->excludes(samples);
   addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
-  command->add_option("--sensor", options->sensor, "Record this sensor of several; default the lowest that reports")
-      ->type_name("N")
-      ->check(CLI::Range(0, 1000));
+  command
+      ->add_option("--sensor", options->sensors,
+                   "Record these of several sensors: 0, or 0+2 of which the first leads; default all that report")
+      ->type_name("N[+N]|all");
   command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
   command
       ->add_option("--reconnect", options->reconnect_s,

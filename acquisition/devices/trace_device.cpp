@@ -40,6 +40,9 @@ class TracePlayback : public Playback {
 
   std::size_t pieces() const override { return pieces_.size(); }
   double due_s(std::size_t piece) const override { return trace_.chunks[pieces_[piece]].t_s; }
+  bool breaksBefore(std::size_t piece) const override {
+    return std::find(breaks_.begin(), breaks_.end(), piece) != breaks_.end();
+  }
   double round_s() const override { return due_s(pieces_.size() - 1) - due_s(0) + 1.0 / trace_.streams[0].rate_hz; }
   QString summary() const override { return QString::fromStdString(trace_.streams[0].summary); }
   TableMetadata describe() const override { return trace_.streams[0].metadata; }
@@ -61,6 +64,7 @@ class TracePlayback : public Playback {
   TracePlayback(Trace trace, const DeviceKind& kind) : trace_(std::move(trace)), kind_(kind) {
     std::size_t from = 0;
     for (const TraceStream& stream : trace_.streams) {
+      if (!pieces_.empty()) breaks_.push_back(pieces_.size());
       for (from = std::max(from, stream.first_chunk); from < stream.end_chunk; ++from) {
         if (!trace_.chunks[from].sent) pieces_.push_back(from);
       }
@@ -76,6 +80,7 @@ class TracePlayback : public Playback {
   Trace trace_;
   const DeviceKind& kind_;
   std::vector<std::size_t> pieces_;  ///< Chunks.
+  std::vector<std::size_t> breaks_;  ///< Pieces with which another stream begins.
   std::size_t next_stream_ = 0;
   std::unique_ptr<StreamReader> reader_;
 };
@@ -157,6 +162,7 @@ TraceDevice::TraceDevice(TraceSetup setup, QObject* parent) : TrackerDevice(pare
 }
 
 void TraceDevice::start() {
+  if (broken_) return goOn();
   if (playback_) return;
   const QString file = QString::fromStdString(setup_.file.string());
   emit stateChanged(DeviceState::kConnecting, "Opening " + file);
@@ -181,6 +187,7 @@ void TraceDevice::playDue() {
   slice.start();
   while (playback_ && slice.elapsed() < kSlice_ms) {
     if (next_ == playback_->pieces()) return end();
+    if (found_again_ != next_ && playback_->breaksBefore(next_)) return breakOff();
     const double now_s = 1e-9 * static_cast<double>(clock_.nsecsElapsed()) * setup_.rate;
     const double wait_s = (playback_->due_s(next_) - from_s_ + round_s_ - now_s) / setup_.rate;
     if (wait_s > 0.0) return timer_.start(static_cast<int>(std::min(1e6, std::ceil(1e3 * wait_s))));
@@ -189,7 +196,24 @@ void TraceDevice::playDue() {
   if (playback_) timer_.start(0);
 }
 
+void TraceDevice::breakOff() {
+  broken_ = true;
+  emit stateChanged(DeviceState::kFailed, "Here the tracker was lost when this was recorded");
+}
+
+void TraceDevice::goOn() {
+  broken_ = false;
+  found_again_ = next_;
+  // Who asked late misses nothing: what is due already is due now, and the rest so much later.
+  const double now_s = 1e-9 * static_cast<double>(clock_.nsecsElapsed()) * setup_.rate;
+  from_s_ = std::min(from_s_, playback_->due_s(next_) + round_s_ - now_s);
+  emit stateChanged(DeviceState::kConnecting, "Waiting for the recording to go on");
+  timer_.start(0);
+}
+
 void TraceDevice::play() {
+  if (found_again_ == next_) emit stateChanged(DeviceState::kRunning, playback_->summary());
+  if (!playback_) return;
   Playback::Piece piece = playback_->play(next_++);
   for (Sample& sample : piece.samples) sample.time_s += round_s_;
   for (const QString& remark : piece.remarks) emit stateChanged(DeviceState::kRunning, remark);
@@ -200,6 +224,7 @@ void TraceDevice::end() {
   if (setup_.loop) {
     round_s_ += playback_->round_s();
     next_ = 0;
+    found_again_.reset();
     playback_->rewind();
     return timer_.start(0);
   }
@@ -208,6 +233,8 @@ void TraceDevice::end() {
 
 void TraceDevice::stop() {
   const bool is_at_end = playback_ && next_ == playback_->pieces();
+  broken_ = false;
+  found_again_.reset();
   timer_.stop();
   playback_.reset();
   const QString file = QString::fromStdString(setup_.file.string());

@@ -25,6 +25,8 @@ class Playback {
   virtual std::size_t pieces() const = 0;
   /// By the recording's clock, never less than of the piece before.
   virtual double due_s(std::size_t piece) const = 0;
+  /// Whether the tracker was lost before this piece, and found again.
+  virtual bool breaksBefore(std::size_t /*piece*/) const { return false; }
   /// The samples of a piece, with their recorded times; called in order.
   virtual Piece play(std::size_t piece) = 0;
   /// From its first piece to that of its next round.
@@ -46,7 +48,8 @@ struct TraceSetup {
 Result<std::unique_ptr<Playback>> openPlayback(const std::filesystem::path& file);
 
 /// Plays a recording at its own times: the bytes of a line through the parser of their tracker, or a table's samples.
-/// Samples have the times they were recorded with, whatever the rate.
+/// Samples have the times they were recorded with, whatever the rate. Where the tracker was lost it fails as the
+/// tracker did, and started again it goes on.
 class TraceDevice : public TrackerDevice {
   Q_OBJECT
  public:
@@ -58,6 +61,8 @@ class TraceDevice : public TrackerDevice {
 
  private:
   void playDue();
+  void breakOff();
+  void goOn();
   void play();
   void end();
 
@@ -66,6 +71,8 @@ class TraceDevice : public TrackerDevice {
   std::size_t next_ = 0;
   double from_s_ = 0.0;   ///< Due of the first piece.
   double round_s_ = 0.0;  ///< What rounds before this one have taken.
+  bool broken_ = false;   ///< The tracker was lost before the next piece, and is not asked for again yet.
+  std::optional<std::size_t> found_again_;  ///< The piece that was gone on with.
   QElapsedTimer clock_;
   QTimer timer_;
 };

@@ -88,6 +88,7 @@ void NodeSampler::cancel() {
   last_status_.clear();
   last_motion_.clear();
   first_time_s_.reset();
+  newest_s_.reset();
   message_.clear();
   samples_.clear();
   abandoned_.clear();
@@ -97,6 +98,7 @@ void NodeSampler::cancel() {
 TakeState NodeSampler::add(const Sample& sample) {
   if (state_ != TakeState::kCollecting) return state_;
   if (!first_time_s_) first_time_s_ = sample.time_s;
+  newest_s_ = sample.time_s;
   samples_.push_back(sample);
   if (isGood(sample)) {
     ++collected_;
@@ -105,7 +107,14 @@ TakeState NodeSampler::add(const Sample& sample) {
     last_status_ = sample.status;
   }
   if (isGood(sample)) look();
-  if (state_ == TakeState::kCollecting && sample.time_s - *first_time_s_ >= timeLimit_s(options_)) timeOut();
+  return passTime(sample.time_s);
+}
+
+TakeState NodeSampler::passTime(double time_s) {
+  if (state_ != TakeState::kCollecting) return state_;
+  now_s_ = time_s;
+  if (!first_time_s_) first_time_s_ = time_s;
+  if (time_s - *first_time_s_ >= timeLimit_s(options_)) timeOut();
   return state_;
 }
 
@@ -177,6 +186,8 @@ std::optional<std::string> NodeSampler::motion() const {
 }
 
 void NodeSampler::startOver(const std::string& motion) {
+  state_ = TakeState::kCollecting;
+  statistics_.reset();
   ++restarts_;
   last_motion_ = motion;
   message_ = "retaking: " + motion;
@@ -199,6 +210,10 @@ void NodeSampler::finish() {
 }
 
 std::string NodeSampler::timeLimitReason() const {
+  const double silent_s = now_s_ - newest_s_.value_or(*first_time_s_);
+  if (silent_s >= kSilent_s)
+    return format("silent for the last %.0f s: ", silent_s) + std::to_string(collected_) + " of " +
+           std::to_string(wanted_) + " good samples";
   std::string text = format("not finished within %g s: ", timeLimit_s(options_)) + std::to_string(collected_) + " of " +
                      std::to_string(wanted_) + " good samples";
   if (restarts_ > 0) text += ", started over " + times(restarts_) + " (" + last_motion_ + "); let the sensor rest";

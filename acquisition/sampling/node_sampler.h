@@ -10,6 +10,8 @@
 
 namespace fieldtrue::acquisition {
 
+inline constexpr double kSilent_s = 2.0;  ///< Without a reading for so long a sensor is silent.
+
 struct SamplerOptions {
   TakeLength length;
   double still_floor_m = 0.0005;   ///< Motion smaller than this is never called motion.
@@ -26,7 +28,7 @@ struct SamplerOptions {
 
 enum class TakeState { kIdle, kCollecting, kDone, kFailed };
 
-/// Collects the good samples of one take of one place. Pure: samples in, state out; no clock, no thread.
+/// Collects the good samples of one sensor for a take of one place. Pure: samples in, state out; no clock, no thread.
 ///
 /// A take that moved starts over by itself; the time limit counts from its very first sample, so that it never repeats
 /// without end.
@@ -36,10 +38,15 @@ class NodeSampler {
   void start();  ///< Begins a take, dropping what was collected.
   void cancel();
   TakeState add(const Sample& sample);
+  /// Time goes on, also for a sensor that says nothing. @param time_s of the clock of the samples
+  TakeState passTime(double time_s);
+  /// What is collected counts no more, even where that was enough. @param motion what was seen: "moved 3 mm"
+  void startOver(const std::string& motion);
   TakeState state() const { return state_; }
   int collected() const { return collected_; }  ///< Good samples so far.
   int wanted() const { return wanted_; }        ///< Good samples; so far estimated where they are not counted.
   int restarts() const { return restarts_; }    ///< Times motion made it start over.
+  const std::string& lastMotion() const { return last_motion_; }
   /// Why it restarted or failed, what it waits for; in what it fell short where it is done all the same.
   const std::string& message() const { return message_; }
   const std::vector<Sample>& samples() const {
@@ -57,7 +64,6 @@ class NodeSampler {
   bool isCompleteByError();
   void timeOut();
   std::optional<std::string> motion() const;
-  void startOver(const std::string& motion);
   void finish();
   std::string timeLimitReason() const;
 
@@ -70,7 +76,9 @@ class NodeSampler {
   int bad_ = 0;  ///< Samples with an error status since start(), over all restarts.
   std::string last_status_;
   std::string last_motion_;
-  std::optional<double> first_time_s_;
+  std::optional<double> first_time_s_;  ///< When the take began.
+  std::optional<double> newest_s_;      ///< Of its own samples.
+  double now_s_ = 0.0;
   std::string message_;
   std::vector<Sample> samples_;
   std::vector<Sample> abandoned_;

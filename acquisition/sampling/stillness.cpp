@@ -12,6 +12,7 @@ namespace fieldtrue::acquisition {
 namespace {
 
 constexpr std::size_t kMinSamples = 6;
+constexpr double kLongestStep_s = 1.0;  ///< From reading to reading: of a slower tracker rest is not seen.
 constexpr double kStillSigmas = 4.0;
 /// A window counts as full when its samples span this share of it.
 constexpr double kFullWindow = 0.8;
@@ -65,8 +66,22 @@ void StillnessDetector::add(const Sample& sample) {
   judgement_.reset();
   if (!samples_.empty() && sample.time_s < samples_.back().time_s) samples_.clear();
   samples_.push_back(sample);
-  const auto expired = [&](const Sample& old) { return old.time_s < sample.time_s - window_s_; };
-  samples_.erase(samples_.begin(), std::find_if_not(samples_.begin(), samples_.end(), expired));
+  samples_.erase(samples_.begin(), samples_.end() - static_cast<std::ptrdiff_t>(judgedSamples()));
+}
+
+std::size_t StillnessDetector::judgedSamples() const {
+  const auto step_s = [this](std::size_t n) {
+    return samples_[samples_.size() - n].time_s - samples_[samples_.size() - n - 1].time_s;
+  };
+  const auto in_window = std::find_if(samples_.begin(), samples_.end(), [this](const Sample& sample) {
+    return sample.time_s >= samples_.back().time_s - window_s_;
+  });
+  auto n = static_cast<std::size_t>(samples_.end() - in_window);
+  // A slow tracker fills no window; a fast one that was interrupted is none.
+  const double slow_step_s = window_s_ / kMinSamples;
+  const auto is_slow = [&](double step) { return step >= slow_step_s && step <= kLongestStep_s; };
+  while (n < std::min(kMinSamples, samples_.size()) && is_slow(step_s(1)) && is_slow(step_s(n))) ++n;
+  return n;
 }
 
 void StillnessDetector::clear() {

@@ -14,7 +14,7 @@ bool isGood(const Sample& sample);
 /// Watches the stream of one sensor and says whether it stands still, with the reason in words.
 class StillnessDetector {
  public:
-  /// @param window_s how much of the stream is judged, in the samples' own time
+  /// @param window_s how much of the stream is judged, in the samples' own time; more of a tracker of less than 10 Hz
   /// @param floor_m drift over the window up to this is never motion
   explicit StillnessDetector(double window_s = 0.5, double floor_m = 0.0005);
   void add(const Sample& sample);
@@ -33,6 +33,7 @@ class StillnessDetector {
   };
   const Judgement& judgement() const;
   Judgement judge() const;
+  std::size_t judgedSamples() const;  ///< Of the newest: those of the window, of a slow tracker at least a few.
 
   double window_s_;
   double floor_m_;

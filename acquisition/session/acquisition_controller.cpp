@@ -83,11 +83,13 @@ void AcquisitionController::take() {
     emit takeFailed(QStringLiteral("The tracker is not connected; connect it and take again."));
   } else if (!impl_->places.current) {
     emit takeFailed(QStringLiteral("All places are done; choose one to retake it."));
+  } else if (const auto silent = impl_->tracker.silentSensors(); !silent.empty()) {
+    impl_->failTake(silentText(silent));
   } else if (const auto off_m = impl_->places.tooFar_m(impl_->tracker.live);
              off_m && !impl_->take.isRefusedAt(impl_->places.current)) {
     impl_->refuse(*off_m);
   } else {
-    impl_->take.start(off_m.has_value());
+    impl_->take.start(impl_->tracker.sensors, off_m.has_value());
     impl_->views.tellSoon();
   }
 }
@@ -131,10 +133,7 @@ void AcquisitionController::setAutomatic(bool automatic) {
   impl_->views.tellSoon();
 }
 
-void AcquisitionController::setSensor(int sensor) {
-  impl_->tracker.asked_sensor = sensor;
-  impl_->settleSensor();
-}
+void AcquisitionController::setSensors(const std::vector<int>& sensors) { impl_->chooseSensors(sensors); }
 
 void AcquisitionController::setReconnects(bool reconnects) { impl_->tracker.reconnects = reconnects; }
 
@@ -143,7 +142,7 @@ void AcquisitionController::setSetup(const Setup& stated) { impl_->correctSetup(
 void AcquisitionController::setTakeLength(const TakeLength& length) {
   if (!impl_->told(checked(length))) return;
   impl_->take.options.length = length;
-  if (!impl_->take.collecting()) impl_->take.sampler = NodeSampler(impl_->take.options);
+  if (!impl_->take.collecting()) impl_->take.sampler = TakeSampler(impl_->take.options);
   impl_->views.tellSoon();
 }
 

@@ -41,6 +41,17 @@ struct RecordedPlaces {
   bool can_undo = false, can_redo = false;
 };
 
+/// How one of the sensors that are recorded is doing.
+struct SensorProgress {
+  int sensor = 0;
+  int collected = 0, wanted = 0;  ///< In the take that runs; 0 without one.
+  bool silent = false;            ///< It sends nothing, though others do.
+  bool operator==(const SensorProgress&) const = default;
+};
+
+/// What is wrong, and what to do. @param sensors that are silent, at least one
+std::string silentText(const std::vector<int>& sensors);
+
 /// Everything a view needs to know of a running acquisition. What changes seldom is shared: a copy, made 30 times a
 /// second, costs the same however many places there are.
 struct AcquisitionStatus {
@@ -49,7 +60,7 @@ struct AcquisitionStatus {
   std::optional<std::size_t> current;  ///< Where the sensor is to be put now; none when all is done.
   bool current_is_retake = false;
   TakeState take = TakeState::kIdle;
-  int collected = 0;
+  int collected = 0;  ///< By the sensor that is farthest behind.
   int wanted = 60;
   bool automatic = false;  ///< Takes by itself when the sensor stands still near the place.
   bool still = false;
@@ -59,7 +70,7 @@ struct AcquisitionStatus {
   QString device_text;
   bool reconnecting = false;   ///< It ran and was lost; it is started again and again by itself.
   bool just_returned = false;  ///< It was lost, and is back since a few seconds.
-  std::optional<Sample> live;  ///< Newest reading.
+  std::optional<Sample> live;  ///< Newest reading of the leading sensor.
   double rate_hz = 0.0;
   double sd_m = 0.0;  ///< 3-D SD of the last half second.
   /// Best rigid guess so far: fitted from the places done, before that the scene's or identity.
@@ -70,11 +81,16 @@ struct AcquisitionStatus {
   bool away = false;                 ///< The sensor stands too far from the current place to be taken without asking.
   bool refused = false;              ///< A take was refused for that; asked for once more, it is taken.
   bool has_trace = false;            ///< There are bytes of a line to be saved.
-  std::optional<int> sensor;         ///< The one recorded.
-  std::size_t n_sensors = 0;         ///< That report.
+  std::vector<SensorProgress> sensors;  ///< Those recorded, the leading one first; empty until it is known.
+  std::vector<int> reporting;           ///< Every sensor that the tracker sends.
+  std::vector<int> missing;             ///< Recorded ones that it has not sent since its stream began.
+  bool takes_settle_sensors = false;    ///< Takes of the session say which are recorded: they go on.
 };
 
-/// Runs an acquisition: device, sampler and store.
+/// Runs an acquisition: device, samplers and store.
+///
+/// A take is of every sensor that is recorded, at once. One of them leads: by it rest and motion, the place where the
+/// jig stands and taking by itself are judged.
 ///
 /// Automatic mode takes when the sensor stands still near the current place (frame relation known), or has stood still
 /// for 0.7 s after having moved since the last take (not known yet; 3 s when it was found standing at the very start).
@@ -117,9 +133,9 @@ class AcquisitionController : public QObject {
   void redo();
   void goTo(int place);  ///< Makes any place current: retake it. -1 goes back to the first one not done.
   void setAutomatic(bool automatic);
-  /// Which sensor of several is recorded; otherwise the lowest that reports. The one that took a session's places goes
-  /// on.
-  void setSensor(int sensor);
+  /// Which sensors of several are recorded, kept with the session; the first leads. Empty = every one that reports
+  /// before the first take, led by the lowest. Those that took a session's places go on.
+  void setSensors(const std::vector<int>& sensors);
   void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
   void setTakeLength(const fieldtrue::acquisition::TakeLength& length);  ///< Answers with failed where it is none.
   /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said
@@ -133,16 +149,18 @@ class AcquisitionController : public QObject {
   void requestTables();
 
  signals:
-  void statusChanged(const fieldtrue::acquisition::AcquisitionStatus& status);         ///< At most about 30 a second.
-  void nodeStored(int place, const fieldtrue::Node& node, const QString& suspicious);  ///< It is on disk.
+  void statusChanged(const fieldtrue::acquisition::AcquisitionStatus& status);  ///< At most about 30 a second.
+  /// The take is on disk: a row a sensor, the leading one first.
+  void nodesStored(int place, const std::vector<fieldtrue::Node>& nodes, const QString& suspicious);
   void takeFailed(const QString& reason, int place = -1);  ///< The place, where there is one.
   void takeRefused(int place, double off_m);               ///< The sensor stands so far from it.
   void deviceFailed(const QString& text);                  ///< The tracker was lost, or cannot be connected.
   void deviceBack();                                       ///< The tracker that was lost runs again.
   void finished();                                         ///< No place is left.
   void tablesReady(const fieldtrue::CalibrationTable& table, const fieldtrue::SampleTable& samples);
-  /// A take, a skip, undo or redo changed what is stored of a place: its live take, if it has one, and the samples.
-  void placeChanged(int place, const std::optional<fieldtrue::Node>& node,
+  /// A take, a skip, undo or redo changed what is stored of a place: the rows of its live take, if it has one, and the
+  /// samples.
+  void placeChanged(int place, const std::vector<fieldtrue::Node>& nodes,
                     const std::vector<fieldtrue::Sample>& samples);
   /// Readings of no stored take were kept: rows of node -1.
   void looseKept(const std::vector<fieldtrue::SampleRow>& rows);

@@ -32,9 +32,11 @@ struct AcquisitionController::Impl {
   /// Sets other_tracker where the session was begun with another one; before the first take that one is forgotten.
   void compareTrackers(TableMetadata& known, const TableMetadata& said);
   void remarkOnTracker();
-  /// The sensor that took the places done goes on; before the first, the one asked for.
-  void settleSensor();
-  void remarkOnSensor(int other);
+  /// Those that took the places done go on; before the first take those that a person chose, else all that report.
+  void settleSensors();
+  std::vector<int> sensorsOfState();  ///< Chosen by a person for this session; empty = none were.
+  void chooseSensors(const std::vector<int>& sensors);
+  void remarkOnMissing();
   /// Tells in the table, as soon as it is true, that another tracker has recorded too.
   Result<void> markOtherTracker();
 
@@ -62,13 +64,18 @@ struct AcquisitionController::Impl {
   // Takes.
   void stopTake();  ///< What was collected is kept as a cancelled take.
   void addSample(const Sample& sample);
+  /// The leading sensor's reading. @return whether stillness is to be judged anew
+  bool follow(const Sample& sample);
+  void endTake(TakeState state);  ///< Where that is an end.
   void considerAutomaticTake();
+  std::string suspicionOfTake(std::size_t place) const;
   void finishTake();
   void failTake(const std::string& reason);
   void refuse(double off_m);
 
   // Words and numbers for the views.
   AcquisitionStatus status() const;
+  std::vector<SensorProgress> progress() const;
   QString reason(bool* attention) const;
   QString waitingReason() const;
 
@@ -83,7 +90,9 @@ struct AcquisitionController::Impl {
   Setup stated_setup;  ///< By a person.
 
   TrackerLink tracker;
-  SignalWindow heard;  ///< Of every sensor, by the device's clock.
+  bool sensors_are_settled = false;   ///< One that begins to report does not join those that are recorded.
+  bool takes_settle_sensors = false;  ///< The session's takes say which ones are recorded.
+  SignalWindow heard;                 ///< Of every sensor, by the device's clock.
   KnownPlaces places;
   RunningTake take;
   ViewUpdates views;

@@ -14,6 +14,8 @@ namespace {
 constexpr std::size_t kMostAround = 64;
 constexpr std::size_t kMostForGuess = 250;
 constexpr std::size_t kNeighbours = 6;
+constexpr double kCarried_m = 0.05;   ///< From place to place the jig is carried so far at least.
+constexpr double kShareBehind = 0.2;  ///< A sensor that moved no more of it was not carried along.
 const Eigen::Vector3d kNoTake_m = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
 }  // namespace
@@ -31,27 +33,27 @@ Result<KnownPlaces::Content> KnownPlaces::read(const SessionStore& store) {
   if (!can_undo) return tl::unexpected(can_undo.error());
   if (!can_redo) return tl::unexpected(can_redo.error());
   Content content{*states, {}, *can_undo, *can_redo, *page, fits->empty() ? std::string() : fits->front().second};
-  content.nodes.resize(states->size());
+  content.rows.resize(states->size());
   std::map<std::pair<int, int>, std::size_t> index;
   for (std::size_t place = 0; place < states->size(); ++place) {
     index[{store.places()[place].node, store.places()[place].visit}] = place;
   }
-  for (const Node& node : table->nodes) content.nodes[index.at({node.node, node.visit})] = node;
+  for (const Node& node : table->nodes) content.rows[index.at({node.node, node.visit})].push_back(node);
   return content;
 }
 
 void KnownPlaces::fill(const Content& content) {
   states = content.states;
-  nodes.resize(states.size());
+  rows.resize(states.size());
   takes_m.assign(states.size(), kNoTake_m);
-  for (std::size_t place = 0; place < states.size(); ++place) setNode(place, content.nodes[place]);
+  for (std::size_t place = 0; place < states.size(); ++place) setRows(place, content.rows[place]);
   can_undo = content.can_undo;
   can_redo = content.can_redo;
 }
 
 void KnownPlaces::clear() {
   states.clear();
-  nodes.clear();
+  rows.clear();
   done_nodes.clear();
   takes_m.clear();
   current.reset();
@@ -62,34 +64,45 @@ void KnownPlaces::clear() {
 
 Result<std::vector<Sample>> KnownPlaces::reload(std::size_t place) {
   const auto state = store->state(place);
-  const auto node = store->node(place);
+  const auto stored = store->nodes(place);
   auto samples = store->samples(place);
   const auto undoable = store->canUndo(), redoable = store->canRedo();
   if (!state) return tl::unexpected(state.error());
-  if (!node) return tl::unexpected(node.error());
+  if (!stored) return tl::unexpected(stored.error());
   if (!samples) return samples;
   if (!undoable) return tl::unexpected(undoable.error());
   if (!redoable) return tl::unexpected(redoable.error());
   states[place] = *state;
-  setNode(place, *node);
+  setRows(place, *stored);
   can_undo = *undoable;
   can_redo = *redoable;
   return samples;
 }
 
-void KnownPlaces::setNode(std::size_t place, const std::optional<Node>& node) {
-  const auto counts = [](const std::optional<Node>& row) { return row && row->role != NodeRole::kSkipped; };
-  const bool replaces = counts(nodes[place]);
-  nodes[place] = node;
-  takes_m[place] = counts(node) ? node->reference_from_sensor.position_m : kNoTake_m;
+void KnownPlaces::setRows(std::size_t place, const std::vector<Node>& rows_now) {
+  const auto counted = [this](std::size_t at) {
+    const Node* node = leading(at);
+    return node && node->role != NodeRole::kSkipped ? node : nullptr;
+  };
+  const bool replaces = counted(place);
+  rows[place] = rows_now;
+  const Node* now = counted(place);
+  takes_m[place] = now ? now->reference_from_sensor.position_m : kNoTake_m;
   if (!replaces) {
-    if (counts(node)) done_nodes.push_back(*node);
+    if (now) done_nodes.push_back(*now);
     return;
   }
   done_nodes.clear();
-  for (const auto& row : nodes) {
-    if (counts(row)) done_nodes.push_back(*row);
-  }
+  for (std::size_t at = 0; at < rows.size(); ++at)
+    if (const Node* node = counted(at)) done_nodes.push_back(*node);
+}
+
+std::vector<int> KnownPlaces::sensors() const {
+  std::vector<int> found;
+  for (const auto& of_place : rows)
+    for (const Node& node : of_place)
+      if (std::find(found.begin(), found.end(), node.sensor) == found.end()) found.push_back(node.sensor);
+  return found;
 }
 
 std::optional<std::size_t> KnownPlaces::next() const {
@@ -113,21 +126,40 @@ std::vector<std::size_t> KnownPlaces::nearestTakes(std::size_t place, std::size_
   return takes;
 }
 
-std::vector<NeighbourTake> KnownPlaces::neighbours(std::size_t place) const {
+std::vector<NeighbourTake> KnownPlaces::neighbours(std::size_t place, int sensor) const {
   std::vector<NeighbourTake> takes;
   for (const std::size_t other : nearestTakes(place, kNeighbours + 1)) {
     if (other == place || takes.size() == kNeighbours) continue;
-    const Node& node = *nodes[other];
-    takes.push_back({std::sqrt(node.covariance_m2->trace()), node.tracker_from_sensor.position_m.norm()});
+    const Node* node = rowOf(other, sensor);
+    if (node && node->covariance_m2)
+      takes.push_back({std::sqrt(node->covariance_m2->trace()), node->tracker_from_sensor.position_m.norm()});
   }
   return takes;
 }
 
+const Node* KnownPlaces::rowOf(std::size_t place, int sensor) const {
+  for (const Node& node : rows[place])
+    if (node.sensor == sensor) return &node;
+  return nullptr;
+}
+
+bool KnownPlaces::staysBehind(std::size_t place, const std::map<int, Eigen::Vector3d>& means_m, int leading,
+                              int sensor) const {
+  for (const std::size_t other : nearestTakes(place, kNeighbours + 1)) {
+    const Node *lead = rowOf(other, leading), *same = rowOf(other, sensor);
+    if (other == place || !lead || !same) continue;
+    const double carried_m = (means_m.at(leading) - lead->tracker_from_sensor.position_m).norm();
+    if (carried_m < kCarried_m) continue;
+    return (means_m.at(sensor) - same->tracker_from_sensor.position_m).norm() < kShareBehind * carried_m;
+  }
+  return false;
+}
+
 RigFit KnownPlaces::fitOf(const std::vector<std::size_t>& takes) const {
-  std::vector<Node> rows;
-  for (const std::size_t place : takes) rows.push_back(*nodes[place]);
+  std::vector<Node> done;
+  for (const std::size_t place : takes) done.push_back(*leading(place));
   const bool is_known = store->metadata().alignment_known;
-  return {rows, spacing, is_known ? std::optional(believed_reference) : std::nullopt};
+  return {done, spacing, is_known ? std::optional(believed_reference) : std::nullopt};
 }
 
 void KnownPlaces::judgeAround(std::size_t place, std::vector<bool>* is_judged) {
@@ -147,9 +179,9 @@ void KnownPlaces::judgeAround(std::size_t place, std::vector<bool>* is_judged) {
 void KnownPlaces::judgeAll() {
   if (!states.empty()) spacing = spacing_m(store->places(), 0);
   misfits.clear();
-  std::vector<bool> is_judged(nodes.size(), false);
-  for (std::size_t place = 0; place < nodes.size(); ++place) {
-    if (!is_judged[place] && nodes[place]) judgeAround(place, &is_judged);
+  std::vector<bool> is_judged(rows.size(), false);
+  for (std::size_t place = 0; place < rows.size(); ++place) {
+    if (!is_judged[place] && leading(place)) judgeAround(place, &is_judged);
   }
 }
 
@@ -167,7 +199,7 @@ void KnownPlaces::updateGuess() {
   // One wrong take must not turn the room for all the others.
   if (rig.usable()) guess.reference_from_tracker = rig.reference_from_tracker();
   std::vector<Node> near_nodes;
-  for (const std::size_t place : around) near_nodes.push_back(*nodes[place]);
+  for (const std::size_t place : around) near_nodes.push_back(*leading(place));
   near_m = nearDistance_m(here(), spacing, near_nodes, guess.reference_from_tracker);
 }
 

@@ -16,7 +16,7 @@ struct KnownPlaces {
   /// What is read of a session when it is opened.
   struct Content {
     std::vector<PlaceState> states;
-    std::vector<std::optional<Node>> nodes;
+    std::vector<std::vector<Node>> rows;
     bool can_undo = false, can_redo = false;
     std::string page;
     std::string newest_fit;  ///< Empty when there is none.
@@ -26,13 +26,21 @@ struct KnownPlaces {
   void clear();
   /// Reads again what is stored of one place. @return the samples of its live take
   Result<std::vector<Sample>> reload(std::size_t place);
-  void setNode(std::size_t place, const std::optional<Node>& node);
+  void setRows(std::size_t place, const std::vector<Node>& rows_now);
+  const Node* rowOf(std::size_t place, int sensor) const;  ///< Null where it has none.
+  /// The row of the sensor that leads there; null without a take.
+  const Node* leading(std::size_t place) const { return rows[place].empty() ? nullptr : &rows[place].front(); }
+  /// The sensors that took the places, the leading one first; empty before the first take.
+  std::vector<int> sensors() const;
   std::optional<std::size_t> next() const;
   const PlannedPlace& here() const { return store->places()[*current]; }  ///< Only where one is current.
 
   /// Takes that count, nearest to a place first, its own among them.
   std::vector<std::size_t> nearestTakes(std::size_t place, std::size_t most) const;
-  std::vector<NeighbourTake> neighbours(std::size_t place) const;
+  std::vector<NeighbourTake> neighbours(std::size_t place, int sensor) const;
+  /// Whether a sensor is where it was though the leading one has been carried there from another place: it does not
+  /// ride on the jig. @param means_m of the take at the place, by sensor
+  bool staysBehind(std::size_t place, const std::map<int, Eigen::Vector3d>& means_m, int leading, int sensor) const;
   RigFit fitOf(const std::vector<std::size_t>& takes) const;
   /// @param is_judged when given, marks the places that were judged
   void judgeAround(std::size_t place, std::vector<bool>* is_judged = nullptr);
@@ -47,10 +55,11 @@ struct KnownPlaces {
 
   const std::optional<SessionStore>& store;  ///< None while no session is open.
   std::vector<PlaceState> states;
-  std::vector<std::optional<Node>> nodes;
+  std::vector<std::vector<Node>> rows;  ///< Of each place: one a sensor, the leading one first.
   /// Where each place's take belongs [m], NaN without one that counts: small, for each new take looks through all.
   std::vector<Eigen::Vector3d> takes_m;
-  std::vector<Node> done_nodes;  ///< Those not skipped, in any order: kept up, for gathering them costs each take more.
+  std::vector<Node>
+      done_nodes;  ///< The leading rows not skipped, in any order: kept up, for gathering them costs each take more.
   bool can_undo = false, can_redo = false;
   std::map<std::size_t, double> misfits;  ///< Places whose takes do not fit the others, and how far they are off [m].
 

@@ -50,7 +50,7 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   store.emplace(*std::move(opened));
   places.fill(*content);
   ++views.revision;
-  settleSensor();
+  settleSensors();
   mergeMetadata();
   views.told_recorded.reset();
   places.judgeAll();
@@ -89,6 +89,7 @@ void AcquisitionController::Impl::close() {
   views.told_session.reset();
   views.told_recorded.reset();
   places.clear();
+  settleSensors();
   views.tellSoon();
 }
 
@@ -97,8 +98,7 @@ Result<void> AcquisitionController::Impl::reloadPlace(std::size_t place) {
   ++views.revision;
   views.told_recorded.reset();
   places.judgeAround(place);
-  const std::optional<Node> node = places.nodes[place];
-  emit owner->placeChanged(static_cast<int>(place), node, samples);
+  emit owner->placeChanged(static_cast<int>(place), places.rows[place], samples);
   return {};
 }
 
@@ -108,6 +108,7 @@ std::optional<std::size_t> AcquisitionController::Impl::step(Result<std::optiona
   stopTake();
   const auto place = (*store.*go)();
   if (!told(place) || !*place || !told(reloadPlace(**place))) return std::nullopt;
+  settleSensors();
   return *place;
 }
 

@@ -3,9 +3,15 @@
 #include <algorithm>
 
 #include "acquisition/session/acquisition_impl.h"
+#include "calib/tables/table_sensors.h"
 
 /// What the views are told, and when.
 namespace fieldtrue::acquisition {
+
+std::string silentText(const std::vector<int>& sensors) {
+  return fieldtrue::sensorsText(sensors) + (sensors.size() == 1 ? " does" : " do") + " not report: plug " +
+         (sensors.size() == 1 ? "it" : "them") + " in again";
+}
 
 void ViewUpdates::tellSoon() {
   constexpr qint64 kStatusInterval_ms = 34;
@@ -65,9 +71,22 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.away = places.tooFar_m(tracker.live).has_value();
   result.refused = take.isRefusedAt(places.current);
   result.has_trace = tracker.device ? tracker.device->hasTrace() : tracker.last_trace.has_value();
-  result.sensor = tracker.sensor;
-  result.n_sensors = tracker.heard.size();
+  result.sensors = progress();
+  result.reporting = tracker.reporting();
+  result.missing = tracker.missingSensors();
+  result.takes_settle_sensors = takes_settle_sensors;
   return result;
+}
+
+std::vector<SensorProgress> AcquisitionController::Impl::progress() const {
+  std::vector<SensorProgress> sensors;
+  for (const int sensor : tracker.sensors) {
+    const NodeSampler* sampler = take.sampler.of(sensor);
+    sensors.push_back({sensor, sampler ? sampler->collected() : 0, sampler ? sampler->wanted() : 0});
+  }
+  for (const int silent : tracker.running() ? tracker.silentSensors() : std::vector<int>())
+    for (SensorProgress& one : sensors) one.silent = one.silent || one.sensor == silent;
+  return sensors;
 }
 
 QString AcquisitionController::Impl::reason(bool* attention) const {
@@ -83,8 +102,11 @@ QString AcquisitionController::Impl::reason(bool* attention) const {
   *attention = !tracker.live && tracker.since_sample.isValid() && tracker.since_sample.elapsed() >= 2000;
   if (*attention) return QStringLiteral("the tracker stopped sending: check its line and its switch");
   if (!places.current) return QStringLiteral("all places are done");
+  const std::vector<int> silent = tracker.silentSensors();
+  *attention = !silent.empty();
+  if (*attention) return QString::fromStdString(silentText(silent));
   if (take.collecting()) {
-    const NodeSampler& sampler = take.sampler;
+    const TakeSampler& sampler = take.sampler;
     *attention = sampler.restarts() > 0 || !take.stillness.still();
     const bool just_restarted = sampler.restarts() > 0 && sampler.collected() < sampler.wanted() / 2;
     if (just_restarted) return QString::fromStdString(sampler.message());

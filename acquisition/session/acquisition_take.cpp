@@ -1,6 +1,7 @@
 #include "acquisition/session/acquisition_take.h"
 
 #include <cmath>
+#include <map>
 
 #include "acquisition/session/acquisition_impl.h"
 
@@ -17,11 +18,11 @@ constexpr double kFailureShown_s = 8.0;
 
 }  // namespace
 
-void RunningTake::start(bool is_away) {
+void RunningTake::start(const std::vector<int>& sensors, bool is_away) {
   forgetFailure();
   taken_away = is_away;
-  sampler = NodeSampler(options);
-  sampler.start();
+  sampler = TakeSampler(options);
+  sampler.start(sensors);
 }
 
 void RunningTake::forgetFailure() {
@@ -53,32 +54,41 @@ bool RunningTake::waitedInVain(const Sample& live) {
 }
 
 void AcquisitionController::Impl::addSample(const Sample& sample) {
+  const bool look = tracker.leads(sample) && follow(sample);
+  if (take.collecting()) return endTake(take.sampler.add(sample));
+  keepLoose(loose.between(sample));
+  if (take.automatic && look) considerAutomaticTake();
+}
+
+bool AcquisitionController::Impl::follow(const Sample& sample) {
   tracker.add(sample);
   const bool look = take.watch(sample, store.has_value());
   const bool over =
       sample.time_s - take.failure_time_s > kFailureShown_s || (take.refused_at && !places.tooFar_m(tracker.live));
   if (!take.failure.isEmpty() && over) take.forgetFailure();
-  if (take.collecting()) {
-    const TakeState after = take.sampler.add(sample);
-    if (after == TakeState::kDone) finishTake();
-    if (after == TakeState::kFailed) failTake(take.sampler.message());
-  } else {
-    keepLoose(loose.between(sample));
-    if (take.automatic && look) considerAutomaticTake();
-  }
+  return look;
+}
+
+void AcquisitionController::Impl::endTake(TakeState state) {
+  if (state == TakeState::kDone) finishTake();
+  if (state == TakeState::kFailed) failTake(take.sampler.message());
 }
 
 void AcquisitionController::Impl::considerAutomaticTake() {
   if (!store || store->isReadOnly() || !places.current || !tracker.running()) return;
   if (take.waitedInVain(*tracker.live)) failTake(take.stillness.reason());
-  if (places.current && take.hasRested(places.guess.known) && !places.isElsewhere(tracker.live)) take.start(false);
+  if (!tracker.silentSensors().empty()) return;
+  if (places.current && take.hasRested(places.guess.known) && !places.isElsewhere(tracker.live))
+    take.start(tracker.sensors, false);
 }
 
 void AcquisitionController::Impl::stopTake() {
-  if (store && places.current && take.sampler.state() != TakeState::kIdle) {
+  if (store && places.current) {
     const int node = places.here().node;
-    keepLoose(loose.cancelled(node, take.sampler.abandoned()));
-    keepLoose(loose.cancelled(node, take.sampler.samples()));
+    for (const TakeSampler::OfSensor& one : take.sampler.ofSensors()) {
+      keepLoose(loose.cancelled(node, one.sampler.abandoned()));
+      keepLoose(loose.cancelled(node, one.sampler.samples()));
+    }
   }
   take.sampler.cancel();
   take.waiting_since_s.reset();
@@ -104,27 +114,48 @@ void AcquisitionController::Impl::refuse(double off_m) {
   emit owner->takeRefused(static_cast<int>(*places.current), off_m);
 }
 
+std::string AcquisitionController::Impl::suspicionOfTake(std::size_t place) const {
+  std::vector<std::string> reasons;
+  const auto& of_sensors = take.sampler.ofSensors();
+  const int leading = of_sensors.front().sensor;
+  std::map<int, Eigen::Vector3d> means_m;
+  for (const TakeSampler::OfSensor& one : of_sensors) means_m[one.sensor] = one.sampler.statistics()->mean.position_m;
+  for (const TakeSampler::OfSensor& one : of_sensors) {
+    // All started over together: that is said once.
+    const int restarts = one.sensor == leading ? one.sampler.restarts() : 0;
+    const bool is_behind = one.sensor != leading && places.staysBehind(place, means_m, leading, one.sensor);
+    for (const std::string& reason :
+         {std::string(is_behind ? "was not carried with the jig; leave it out of a new session" : ""),
+          suspicionOf(*one.sampler.statistics(), restarts, places.neighbours(place, one.sensor)),
+          one.sampler.message()})
+      if (!reason.empty()) reasons.push_back(take.sampler.told(one, reason));
+  }
+  if (take.taken_away) reasons.emplace_back("taken away from its place, as asked");
+  std::string text;
+  for (const std::string& reason : reasons) text += (text.empty() ? "" : "; ") + reason;
+  return text;
+}
+
 void AcquisitionController::Impl::finishTake() {
   const std::size_t place = *places.current;
-  const NodeStatistics statistics = *take.sampler.statistics();
-  std::string suspicious = suspicionOf(statistics, take.sampler.restarts(), places.neighbours(place));
-  if (const std::string& short_of = take.sampler.message(); !short_of.empty())
-    suspicious += (suspicious.empty() ? "" : "; ") + short_of;
-  if (take.taken_away) {
-    suspicious += (suspicious.empty() ? "" : "; ") + std::string("taken away from its place, as asked");
-  }
-  const auto stored = store->storeTake(place, take.sampler.samples(), statistics, suspicious);
+  const std::string suspicious = suspicionOfTake(place);
+  std::vector<SensorTake> sensors;
+  for (const TakeSampler::OfSensor& one : take.sampler.ofSensors())
+    sensors.push_back({one.sampler.samples(), *one.sampler.statistics()});
+  const auto stored = store->storeTake(place, sensors, suspicious);
   if (!stored) return failTake("not stored: " + stored.error().message);
   told(markOtherTracker());
-  keepLoose(loose.cancelled(store->places()[place].node, take.sampler.abandoned()));
+  for (const TakeSampler::OfSensor& one : take.sampler.ofSensors())
+    keepLoose(loose.cancelled(store->places()[place].node, one.sampler.abandoned()));
   take.sampler.cancel();
   stopTake();
-  take.stand.setTaken(statistics.mean);
+  take.stand.setTaken(sensors.front().statistics.mean);
   const auto reread = reloadPlace(place);
   if (!reread) return failTake("stored, but it cannot be read back: " + reread.error().message);
-  const Node node = places.nodes[place].value();
+  if (!takes_settle_sensors) settleSensors();
+  const std::vector<Node> nodes = places.rows[place];
   setCurrent(places.next());
-  emit owner->nodeStored(static_cast<int>(place), node, QString::fromStdString(suspicious));
+  emit owner->nodesStored(static_cast<int>(place), nodes, QString::fromStdString(suspicious));
   if (!places.current) emit owner->finished();
 }
 

@@ -2,21 +2,22 @@
 
 #include <QString>
 
-#include "acquisition/sampling/node_sampler.h"
 #include "acquisition/sampling/stand_watch.h"
 #include "acquisition/sampling/stillness.h"
+#include "acquisition/sampling/take_sampler.h"
 
 namespace fieldtrue::acquisition {
 
-/// The take that runs or is waited for: how the sensor stands, what is collected, and why the last one failed.
+/// The take that runs or is waited for: how the leading sensor stands, what is collected, and why the last one failed.
 struct RunningTake {
   explicit RunningTake(const SamplerOptions& sampler_options) : options(sampler_options), sampler(sampler_options) {}
 
   bool collecting() const { return sampler.state() == TakeState::kCollecting; }
   bool isRefusedAt(std::optional<std::size_t> place) const { return refused_at && refused_at == place; }
   bool isWhereTaken() const { return stand.hasTaken() && !stand.left(); }
+  /// @param sensors the leading one first
   /// @param is_away the sensor stands elsewhere, and the take was asked for all the same
-  void start(bool is_away);
+  void start(const std::vector<int>& sensors, bool is_away);
   void forgetFailure();
   /// Follows how the sensor stands. @return whether stillness is to be judged anew with this sample
   bool watch(const Sample& sample, bool has_session);
@@ -25,7 +26,7 @@ struct RunningTake {
   bool waitedInVain(const Sample& live);  ///< For a usable signal, as long as a take may last.
 
   SamplerOptions options;
-  NodeSampler sampler;
+  TakeSampler sampler;
   StillnessDetector stillness;
   StandWatch stand;
   std::optional<std::size_t> refused_at;  ///< The place whose take was refused because the sensor stood elsewhere.

@@ -5,9 +5,11 @@
 
 #include "acquisition/session/acquisition_impl.h"
 #include "acquisition/session/guarded_call.h"
+#include "acquisition/session/recorded_sensors.h"
 #include "calib/tables/metadata_keys.h"
 #include "calib/tables/table_json.h"
 #include "calib/tables/table_metadata.h"
+#include "calib/tables/table_sensors.h"
 
 /// The tracker and its stream, and what the session tells of it.
 namespace fieldtrue::acquisition {
@@ -49,6 +51,9 @@ void TrackerLink::retryLater() {
 
 void TrackerLink::beginStream() {
   heard.clear();
+  newest_s.clear();
+  began_s.reset();
+  now_s.reset();
   told_missing = false;
   unsorted.clear();
   time_offset_s.reset();
@@ -57,22 +62,48 @@ void TrackerLink::beginStream() {
   silence_timer.start();
 }
 
-std::vector<Sample> TrackerLink::recorded(const Sample& sample) {
+std::vector<Sample> TrackerLink::recorded(const Sample& sample, bool takes_newcomers) {
   int& times = heard[sample.sensor];
   times = std::min(times + 1, kMissedAfter);
-  if (sensor) return sample.sensor == *sensor ? std::vector{sample} : std::vector<Sample>();
-  unsorted.push_back(sample);
-  // Sensors report in turn: by then each has, even if a line lost its first reading.
-  if (times < kTimesHeard) return {};
-  sensor = heard.begin()->first;
-  std::erase_if(unsorted, [this](const Sample& one) { return one.sensor != *sensor; });
-  return std::exchange(unsorted, {});
+  newest_s[sample.sensor] = sample.time_s;
+  now_s = sample.time_s;
+  if (!began_s) began_s = now_s;
+  if (sensors.empty()) {
+    unsorted.push_back(sample);
+    // Sensors report in turn: by then each has, even if a line lost its first reading.
+    if (times < kTimesHeard) return {};
+    sensors = reporting();
+    return std::exchange(unsorted, {});
+  }
+  const auto is_recorded = [&] { return std::find(sensors.begin(), sensors.end(), sample.sensor) != sensors.end(); };
+  // Behind the others: which one leads does not change under the operator's hands.
+  if (takes_newcomers && times == kTimesHeard && !is_recorded()) sensors.push_back(sample.sensor);
+  return is_recorded() ? std::vector{sample} : std::vector<Sample>();
 }
 
-bool TrackerLink::findsItMissing() {
-  if (told_missing || !sensor || heard.contains(*sensor)) return false;
-  told_missing = std::any_of(heard.begin(), heard.end(), [](const auto& one) { return one.second == kMissedAfter; });
-  return told_missing;
+std::vector<int> TrackerLink::reporting() const {
+  std::vector<int> sensors_heard;
+  for (const auto& [sensor, times] : heard) sensors_heard.push_back(sensor);
+  return sensors_heard;
+}
+
+std::vector<int> TrackerLink::silentSensors() const {
+  std::vector<int> silent;
+  for (const int sensor : sensors) {
+    const auto newest = newest_s.find(sensor);
+    const auto since_s = newest == newest_s.end() ? began_s : newest->second;
+    if (since_s && *now_s - *since_s >= kSilent_s) silent.push_back(sensor);
+  }
+  return silent;
+}
+
+std::vector<int> TrackerLink::missingSensors() const {
+  const bool is_sure =
+      std::any_of(heard.begin(), heard.end(), [](const auto& one) { return one.second == kMissedAfter; });
+  std::vector<int> missing;
+  for (const int sensor : is_sure ? sensors : std::vector<int>())
+    if (!heard.contains(sensor)) missing.push_back(sensor);
+  return missing;
 }
 
 void TrackerLink::add(const Sample& sample) {
@@ -118,7 +149,7 @@ void AcquisitionController::Impl::dropDevice() {
   tracker.retry_timer.stop();
   tracker.lost = false;
   tracker.since_return.invalidate();
-  tracker.sensor.reset();
+  tracker.sensors.clear();
   if (!tracker.device) return;
   if (take.collecting()) failTake("the tracker was disconnected; this take counts for no place");
   tracker.drop();
@@ -162,7 +193,7 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
 
 void AcquisitionController::Impl::beginStream() {
   tracker.beginStream();
-  settleSensor();
+  settleSensors();
   take.stillness.clear();
   take.failure.clear();
   mergeMetadata();
@@ -201,30 +232,62 @@ void AcquisitionController::Impl::onSamples(const std::vector<Sample>& samples) 
   tracker.since_sample.start();
   for (const Sample& sample : samples) {
     heard.add(sample);
-    for (Sample& of_sensor : tracker.recorded(sample)) {
+    const std::vector<Sample> recorded = tracker.recorded(sample, !sensors_are_settled && !take.collecting());
+    if (take.collecting() && take.sampler.ofSensors().empty()) take.sampler.start(tracker.sensors);
+    for (Sample of_sensor : recorded) {
       of_sensor.time_s = sessionTime_s(of_sensor.time_s);
       addSample(of_sensor);
     }
-    if (tracker.findsItMissing()) remarkOnSensor(sample.sensor);
+    if (recorded.empty() && !tracker.sensors.empty() && take.collecting())
+      endTake(take.sampler.passTime(sessionTime_s(sample.time_s)));
+    if (takes_settle_sensors && !tracker.told_missing) remarkOnMissing();
   }
   views.tellSoon();
 }
 
-void AcquisitionController::Impl::settleSensor() {
-  for (const std::optional<Node>& node : places.nodes) {
-    if (!node) continue;
-    tracker.sensor = node->sensor;
-    return;
-  }
-  if (tracker.asked_sensor) tracker.sensor = tracker.asked_sensor;
+void AcquisitionController::Impl::settleSensors() {
+  std::vector<int> settled = places.sensors();
+  takes_settle_sensors = !settled.empty();
+  if (settled.empty() && store) settled = sensorsOfState();
+  if (settled.empty()) settled = tracker.asked_sensors;
+  sensors_are_settled = !settled.empty();
+  // Before a stream is heard, and where it is not heard any more, it stays as it was.
+  if (settled.empty())
+    settled = tracker.sensors.empty() || tracker.heard.empty() ? tracker.sensors : tracker.reporting();
+  if (settled == tracker.sensors) return;
+  stopTake();
+  tracker.sensors = settled;
+  tracker.live.reset();
+  tracker.recent_times_s.clear();
+  take.stillness.clear();
+  // Another sensor stands elsewhere on the jig: that is no motion.
+  take.stand.forget();
 }
 
-void AcquisitionController::Impl::remarkOnSensor(int other) {
-  emit owner->remarked(
-      QStringLiteral("Sensor %1 is recorded in this session, and the tracker does not send it, only sensor %2: plug it "
-                     "in again, or begin a new session.")
-          .arg(*tracker.sensor)
-          .arg(other));
+std::vector<int> AcquisitionController::Impl::sensorsOfState() {
+  const auto text = store->state(kSensorsState);
+  const auto sensors = text ? readSensors(*text) : tl::unexpected(text.error());
+  return told(sensors) ? *sensors : std::vector<int>();
+}
+
+void AcquisitionController::Impl::chooseSensors(const std::vector<int>& sensors) {
+  tracker.asked_sensors = sensors;
+  if (store && !takes_settle_sensors) told(store->setState(kSensorsState, textOf(sensors)));
+  settleSensors();
+  views.tellSoon();
+}
+
+void AcquisitionController::Impl::remarkOnMissing() {
+  const std::vector<int> missing = tracker.missingSensors();
+  if (missing.empty()) return;
+  tracker.told_missing = true;
+  const bool is_one = missing.size() == 1;
+  std::string text = fieldtrue::sensorsText(missing) + (is_one ? " is" : " are") +
+                     " recorded in this session, and the tracker does not send " + (is_one ? "it" : "them") +
+                     ", only " + fieldtrue::sensorsText(tracker.reporting()) + ": plug " + (is_one ? "it" : "them") +
+                     " in again, or begin a new session.";
+  text[0] = 'S';
+  emit owner->remarked(QString::fromStdString(text));
 }
 
 void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {
@@ -232,8 +295,7 @@ void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const Ta
   const bool is_other = known.tracker && said.tracker && *known.tracker != *said.tracker;
   const std::string change = differenceText(known.setup, said.setup);
   if (!is_other && change.empty()) return;
-  const auto has_take = [](const std::optional<Node>& node) { return node.has_value(); };
-  if (std::none_of(places.nodes.begin(), places.nodes.end(), has_take)) {
+  if (std::all_of(places.rows.begin(), places.rows.end(), [](const auto& rows) { return rows.empty(); })) {
     if (is_other) known.tracker = said.tracker;
     for (const auto& [key, value] : said.setup) known.setup[key] = value;
     return;

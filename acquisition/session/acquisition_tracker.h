@@ -19,10 +19,15 @@ struct TrackerLink {
   double rate_hz() const;
   void retryLater();
   void beginStream();
-  /// Of a reading and those before it, what is of the sensor that is recorded: nothing until it is known which one is.
-  std::vector<Sample> recorded(const Sample& sample);
-  /// Whether the recorded sensor is not among those that report; true once a stream.
-  bool findsItMissing();
+  /// Of a reading and those before it, what is of the sensors that are recorded: nothing until it is known which ones
+  /// are. @param takes_newcomers a sensor that begins to report is recorded too
+  std::vector<Sample> recorded(const Sample& sample, bool takes_newcomers = true);
+  std::vector<int> reporting() const;  ///< Every sensor heard in this stream, in order.
+  bool leads(const Sample& sample) const { return !sensors.empty() && sample.sensor == sensors.front(); }
+  /// Recorded ones that have sent nothing for a while though others do.
+  std::vector<int> silentSensors() const;
+  /// Recorded ones that have sent nothing since the stream began, once it is sure that others do.
+  std::vector<int> missingSensors() const;
   void add(const Sample& sample);
   std::optional<Trace> trace() const { return device ? device->trace() : last_trace; }
   void cut();   ///< Stops the device, and hears no more of it.
@@ -33,12 +38,15 @@ struct TrackerLink {
   std::optional<Trace> last_trace;  ///< Of the device that was given away last.
   DeviceState state = DeviceState::kClosed;
   QString text;
-  std::optional<int> sensor;            ///< The one recorded: the lowest that reports, unless another is asked for.
-  std::optional<int> asked_sensor;      ///< By a person.
-  std::map<int, int> heard;             ///< Readings of each sensor of this stream; of a long one no longer counted.
-  bool told_missing = false;            ///< That the recorded one is not among them.
-  std::vector<Sample> unsorted;         ///< Before it was known which one is recorded.
-  std::optional<double> time_offset_s;  ///< Session time minus the device's.
+  /// Those recorded, the leading one first: all that report, unless others are asked for. Empty until it is known.
+  std::vector<int> sensors;
+  std::vector<int> asked_sensors;        ///< By a person, the leading one first; empty = all that report.
+  std::map<int, int> heard;              ///< Readings of each sensor of this stream; of a long one no longer counted.
+  std::map<int, double> newest_s;        ///< When each was heard last, by the device's clock.
+  std::optional<double> began_s, now_s;  ///< The first and the last reading of any, by the same clock.
+  bool told_missing = false;             ///< That some that are recorded are not among those heard.
+  std::vector<Sample> unsorted;          ///< Before it was known which one is recorded.
+  std::optional<double> time_offset_s;   ///< Session time minus the device's.
   std::optional<Sample> live;
   std::deque<double> recent_times_s;
   QElapsedTimer since_sample;

@@ -2,9 +2,9 @@
 
 #include <QFile>
 #include <QFileInfo>
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -28,25 +28,51 @@ PlannedPlace placeOf(const Node& row, int visit) {
   return place;
 }
 
+bool belongTogether(const Node& a, const Node& b) {
+  return a.sensor != b.sensor && a.role == b.role && a.index == b.index &&
+         a.reference_from_sensor.position_m == b.reference_from_sensor.position_m &&
+         a.reference_from_sensor.orientation.coeffs() == b.reference_from_sensor.orientation.coeffs();
+}
+
+/// The rows of one place: those of one node and visit that differ in their sensors alone.
+struct PlaceRows {
+  PlannedPlace place;
+  std::vector<Node> rows;
+
+  bool takes(const Node& row) const {
+    return std::all_of(rows.begin(), rows.end(), [&](const Node& other) { return belongTogether(row, other); });
+  }
+};
+
 /// Visits as they are, those that are taken already moved behind the last.
-Plan planOf(const CalibrationTable& table) {
+std::vector<PlaceRows> placesOf(const CalibrationTable& table) {
   std::map<int, int> last_visit;
   for (const Node& row : table.nodes) {
     int& last = last_visit.try_emplace(row.node, row.visit).first->second;
     last = std::max(last, row.visit);
   }
-  std::set<std::pair<int, int>> taken;
-  Plan plan;
+  std::map<std::pair<int, int>, std::size_t> taken;
+  std::vector<PlaceRows> places;
   for (const Node& row : table.nodes) {
-    const bool is_free = taken.emplace(row.node, row.visit).second;
-    plan.explicit_places.push_back(placeOf(row, is_free ? row.visit : ++last_visit[row.node]));
+    const auto [at, is_free] = taken.try_emplace({row.node, row.visit}, places.size());
+    if (!is_free && places[at->second].takes(row)) {
+      places[at->second].rows.push_back(row);
+    } else {
+      places.push_back({placeOf(row, is_free ? row.visit : ++last_visit[row.node]), {row}});
+    }
   }
+  return places;
+}
+
+Plan planOf(const std::vector<PlaceRows>& places) {
+  Plan plan;
+  for (const PlaceRows& one : places) plan.explicit_places.push_back(one.place);
   return plan;
 }
 
-std::vector<ForeignTake> takesOf(const CalibrationTable& table) {
+std::vector<ForeignTake> takesOf(const std::vector<PlaceRows>& places) {
   std::vector<ForeignTake> takes;
-  for (const Node& row : table.nodes) takes.push_back({takes.size(), row, {}});
+  for (const PlaceRows& one : places) takes.push_back({takes.size(), one.rows, {}});
   return takes;
 }
 
@@ -54,7 +80,7 @@ std::vector<ForeignTake> takesOf(const CalibrationTable& table) {
 std::vector<LooseSample> giveSamples(const SampleTable& samples, std::vector<ForeignTake>& takes) {
   std::map<RowKey, std::size_t> take_of;
   for (const ForeignTake& take : takes)
-    take_of.emplace(RowKey{take.mean.node, take.mean.sensor, take.mean.visit}, take.place);
+    for (const Node& mean : take.means) take_of.emplace(RowKey{mean.node, mean.sensor, mean.visit}, take.place);
   std::vector<LooseSample> loose;
   for (const SampleRow& row : samples.rows) {
     const auto take = take_of.find({row.node, row.sample.sensor, row.visit});
@@ -66,9 +92,8 @@ std::vector<LooseSample> giveSamples(const SampleTable& samples, std::vector<For
   return loose;
 }
 
-Result<void> fill(SessionStore& store, const CalibrationTable& table, const std::optional<SampleTable>& samples,
+Result<void> fill(SessionStore& store, std::vector<ForeignTake> takes, const std::optional<SampleTable>& samples,
                   const std::string& source) {
-  std::vector<ForeignTake> takes = takesOf(table);
   std::vector<LooseSample> loose;
   if (samples) loose = giveSamples(*samples, takes);
   FT_TRY_VOID(store.keepLoose(loose));
@@ -82,14 +107,15 @@ Result<void> fill(SessionStore& store, const CalibrationTable& table, const std:
 Result<void> makeSession(const QString& path, const CalibrationTable& table, const std::optional<SampleTable>& samples,
                          const std::string& source) {
   // Read as it will be when the session is opened: what a plan cannot hold is told now.
-  FT_TRY(const Plan plan, planFromJson(toJson(planOf(table)), source));
+  const std::vector<PlaceRows> places = placesOf(table);
+  FT_TRY(const Plan plan, planFromJson(toJson(planOf(places)), source));
   if (QFileInfo::exists(path))
     return fail(ErrorCode::kIo, path.toStdString() + ": exists already; choose another name or open it");
   return replaceFileAtomically(path.toStdString(), [&](const std::filesystem::path& beside) -> Result<void> {
     // An empty file stands there, and a session is never made over one.
     QFile::remove(QString::fromStdString(beside.string()));
     FT_TRY(SessionStore store, SessionStore::create(QString::fromStdString(beside.string()), plan, table.metadata));
-    return fill(store, table, samples, source);
+    return fill(store, takesOf(places), samples, source);
   });
 }
 

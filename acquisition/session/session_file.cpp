@@ -16,6 +16,15 @@ namespace {
 constexpr int kFormatVersion = 1;
 constexpr int kApplicationId = 0x46545255;  // "FTRU"
 
+/// Of the tables of takes, after the key. A macro, for SQL is joined of literals.
+#define FIELDTRUE_TAKE_COLUMNS                                                                                   \
+  "sensor INTEGER NOT NULL, x_m REAL NOT NULL, y_m REAL NOT NULL, z_m REAL NOT NULL,"                            \
+  " qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL,"                                     \
+  " cov_xx_m2 REAL NOT NULL, cov_yy_m2 REAL NOT NULL, cov_zz_m2 REAL NOT NULL,"                                  \
+  " cov_xy_m2 REAL NOT NULL, cov_xz_m2 REAL NOT NULL, cov_yz_m2 REAL NOT NULL, sd_rot_rad REAL NOT NULL,"        \
+  " autocorrelation REAL NOT NULL, n_effective REAL NOT NULL, quantum_m REAL NOT NULL, n_used INTEGER NOT NULL," \
+  " n_rejected INTEGER NOT NULL, t_start_s REAL NOT NULL, t_end_s REAL NOT NULL"
+
 constexpr std::array kTables{
     "CREATE TABLE meta(key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
     "CREATE TABLE places(place INTEGER PRIMARY KEY, node INTEGER NOT NULL, visit INTEGER NOT NULL,"
@@ -26,13 +35,8 @@ constexpr std::array kTables{
     " kind TEXT NOT NULL CHECK(kind IN ('take', 'skip')), reason TEXT NOT NULL, time_utc TEXT NOT NULL,"
     " undone INTEGER NOT NULL DEFAULT 0)",
     "CREATE INDEX actions_by_place ON actions(place, id)",
-    "CREATE TABLE takes(action INTEGER PRIMARY KEY REFERENCES actions(id), sensor INTEGER NOT NULL,"
-    " x_m REAL NOT NULL, y_m REAL NOT NULL, z_m REAL NOT NULL,"
-    " qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL,"
-    " cov_xx_m2 REAL NOT NULL, cov_yy_m2 REAL NOT NULL, cov_zz_m2 REAL NOT NULL,"
-    " cov_xy_m2 REAL NOT NULL, cov_xz_m2 REAL NOT NULL, cov_yz_m2 REAL NOT NULL, sd_rot_rad REAL NOT NULL,"
-    " autocorrelation REAL NOT NULL, n_effective REAL NOT NULL, quantum_m REAL NOT NULL, n_used INTEGER NOT NULL,"
-    " n_rejected INTEGER NOT NULL, t_start_s REAL NOT NULL, t_end_s REAL NOT NULL)",
+    // Of the leading sensor.
+    "CREATE TABLE takes(action INTEGER PRIMARY KEY REFERENCES actions(id), " FIELDTRUE_TAKE_COLUMNS ")",
     "CREATE TABLE samples(action INTEGER NOT NULL REFERENCES takes(action), seq INTEGER NOT NULL, sensor INTEGER NOT "
     "NULL,"
     " t_s REAL NOT NULL, x_m REAL, y_m REAL, z_m REAL, qw REAL, qx REAL, qy REAL, qz REAL, status TEXT NOT NULL,"
@@ -47,6 +51,9 @@ constexpr std::array kLaterTables{
     // Readings of no stored take: between places (cancelled_node NULL), or of a take that failed or was cancelled.
     "CREATE TABLE IF NOT EXISTS loose_samples(id INTEGER PRIMARY KEY, cancelled_node INTEGER, sensor INTEGER NOT NULL,"
     " t_s REAL NOT NULL, x_m REAL, y_m REAL, z_m REAL, qw REAL, qx REAL, qy REAL, qz REAL, status TEXT NOT NULL)",
+    // Of the sensors beside the leading one; sample numbers go on from one sensor to the next.
+    "CREATE TABLE IF NOT EXISTS takes_of_others(action INTEGER NOT NULL REFERENCES actions(id), " FIELDTRUE_TAKE_COLUMNS
+    ", PRIMARY KEY(action, sensor)) WITHOUT ROWID",
     // Few rows ever: without it every take would look through all actions for those taken back.
     "CREATE INDEX IF NOT EXISTS actions_taken_back ON actions(id) WHERE undone = 1",
 };

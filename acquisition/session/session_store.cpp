@@ -41,6 +41,9 @@ constexpr const char* kOnePlace = " AND place = ?";
 constexpr const char* kTakesOfEveryPlace = " AND kind = 'take'";
 constexpr const char* kTakesOfOnePlace = " AND kind = 'take' AND place = ?";
 
+constexpr const char* kTakesOfLeading = "takes";
+constexpr const char* kTakesOfOthers = "takes_of_others";
+
 constexpr std::size_t kMostLoose = 512;           ///< Readings kept back before they are written.
 constexpr double kLongestLoose_s = 5.0;           ///< Time of readings kept back before they are written.
 constexpr std::size_t kMostLooseWaiting = 20000;  ///< When none can be written the oldest go.
@@ -148,19 +151,19 @@ struct SessionStore::Impl {
     return added.lastInsertId().toLongLong();
   }
 
-  Result<qlonglong> addTake(std::size_t place, const std::string& suspicious, QVariantList values) const {
+  /// @param sensors the values of each one's row, the leading one first
+  Result<qlonglong> addTake(std::size_t place, const std::string& suspicious, std::vector<QVariantList> sensors) const {
     FT_TRY(const auto action, addAction(place, "take", suspicious));
-    values.prepend(action);
-    FT_TRY_VOID(file->run(
-        QStringLiteral("INSERT INTO takes(action, %1) VALUES(%2)").arg(kTakeColumns, placeholders(values.size())),
-        values));
+    for (QVariantList& values : sensors) values.prepend(action);
+    const auto into = [](const char* table) { return QStringLiteral("%1(action, %2)").arg(table, kTakeColumns); };
+    FT_TRY_VOID(insert(into(kTakesOfLeading), {sensors.front()}));
+    FT_TRY_VOID(insert(into(kTakesOfOthers), {sensors.begin() + 1, sensors.end()}));
     return action;
   }
 
+  /// @param rejected why some of them, by their number, are not in the mean
   Result<void> addSamples(qlonglong action, const std::vector<Sample>& samples,
-                          const NodeStatistics& statistics) const {
-    std::map<std::size_t, QString> rejected;
-    for (const Rejection& rejection : statistics.rejections) rejected[rejection.sample] = text(rejection.text);
+                          std::map<std::size_t, QString> rejected = {}) const {
     std::vector<QVariantList> rows;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       QVariantList values{action, static_cast<qlonglong>(i)};
@@ -211,19 +214,31 @@ struct SessionStore::Impl {
     return found.has_value();
   }
 
-  /// Live takes of every place, or of one.
+  using PlaceNode = std::pair<std::size_t, Node>;
+
+  /// Live takes of every place, or of one: place by place, the leading sensor first.
   Result<std::vector<Node>> nodes(std::optional<std::size_t> only = {}) const {
+    std::vector<PlaceNode> by_place;
+    for (const char* table : {kTakesOfLeading, kTakesOfOthers}) FT_TRY_VOID(readNodes(table, only, by_place));
+    std::stable_sort(by_place.begin(), by_place.end(),
+                     [](const PlaceNode& a, const PlaceNode& b) { return a.first < b.first; });
+    std::vector<Node> result;
+    result.reserve(by_place.size());
+    for (PlaceNode& one : by_place) result.push_back(std::move(one.second));
+    return result;
+  }
+
+  Result<void> readNodes(const char* table, std::optional<std::size_t> only, std::vector<PlaceNode>& result) const {
     QVariantList values;
     if (only) values = {static_cast<qlonglong>(*only), static_cast<qlonglong>(*only)};
     const QString sql = QStringLiteral(
                             "SELECT live.place, last.kind, %1 FROM %2 live"
-                            " JOIN takes ON takes.action = live.id"
+                            " JOIN %4 ON action = live.id"
                             " JOIN %3 newest ON newest.place = live.place"
-                            " JOIN actions last ON last.id = newest.id ORDER BY live.place")
+                            " JOIN actions last ON last.id = newest.id ORDER BY live.place, sensor")
                             .arg(kTakeColumns, liveActions(only ? kTakesOfOnePlace : kTakesOfEveryPlace),
-                                 liveActions(only ? kOnePlace : kEveryPlace));
-    std::vector<Node> result;
-    const auto done = file->read(sql, values, [&](const QSqlQuery& row) {
+                                 liveActions(only ? kOnePlace : kEveryPlace), table);
+    return file->read(sql, values, [&](const QSqlQuery& row) {
       const auto place = static_cast<std::size_t>(row.value(0).toLongLong());
       if (place >= places.size()) return;
       const PlannedPlace& planned = places[place];
@@ -234,10 +249,8 @@ struct SessionStore::Impl {
       node.reference_from_sensor = planned.reference_from_sensor;
       node.role = row.value(1).toString() == QLatin1String("skip") ? NodeRole::kSkipped : planned.role;
       readTake(row, 2, node);
-      result.push_back(node);
+      result.emplace_back(place, std::move(node));
     });
-    if (!done) return tl::unexpected(done.error());
-    return result;
   }
 
   /// Raw samples of the live takes of every place, or of one.
@@ -358,22 +371,33 @@ Result<PlaceState> SessionStore::state(std::size_t place) const {
   return result.back();
 }
 
-Result<void> SessionStore::storeTake(std::size_t place, const std::vector<Sample>& samples,
-                                     const NodeStatistics& statistics, const std::string& suspicious) {
-  FT_CHECK(place < places().size());
+Result<void> SessionStore::storeTake(std::size_t place, const std::vector<SensorTake>& sensors,
+                                     const std::string& suspicious) {
+  FT_CHECK(place < places().size() && !sensors.empty());
+  std::vector<QVariantList> values;
+  std::vector<Sample> samples;
+  std::map<std::size_t, QString> rejected;
+  for (const SensorTake& take : sensors) {
+    values.push_back(takeValues(take.samples, take.statistics));
+    for (const Rejection& rejection : take.statistics.rejections)
+      rejected[samples.size() + rejection.sample] = text(rejection.text);
+    samples.insert(samples.end(), take.samples.begin(), take.samples.end());
+  }
   return impl_->store([&]() -> Result<void> {
-    FT_TRY(const auto action, impl_->addTake(place, suspicious, takeValues(samples, statistics)));
-    return impl_->addSamples(action, samples, statistics);
+    FT_TRY(const auto action, impl_->addTake(place, suspicious, values));
+    return impl_->addSamples(action, samples, rejected);
   });
 }
 
 Result<void> SessionStore::storeForeign(const std::vector<ForeignTake>& takes) {
   return impl_->store([&]() -> Result<void> {
     for (const ForeignTake& take : takes) {
-      FT_CHECK(take.place < places().size());
-      FT_TRY(const auto action, impl_->addTake(take.place, {}, takeValues(take.mean)));
-      FT_TRY_VOID(impl_->addSamples(action, take.samples, {}));
-      if (take.mean.role == NodeRole::kSkipped)
+      FT_CHECK(take.place < places().size() && !take.means.empty());
+      std::vector<QVariantList> values;
+      for (const Node& mean : take.means) values.push_back(takeValues(mean));
+      FT_TRY(const auto action, impl_->addTake(take.place, {}, values));
+      FT_TRY_VOID(impl_->addSamples(action, take.samples));
+      if (take.means.front().role == NodeRole::kSkipped)
         FT_TRY_VOID(impl_->addAction(take.place, "skip", "skipped in the imported recording"));
     }
     return {};
@@ -458,10 +482,7 @@ Result<SampleTable> SessionStore::sampleTable() const {
   return SampleTable{metadata(), std::move(rows)};
 }
 
-Result<std::optional<Node>> SessionStore::node(std::size_t place) const {
-  FT_TRY(auto found, impl_->nodes(place));
-  return found.empty() ? std::optional<Node>() : std::optional(found.front());
-}
+Result<std::vector<Node>> SessionStore::nodes(std::size_t place) const { return impl_->nodes(place); }
 
 Result<std::vector<Sample>> SessionStore::samples(std::size_t place) const {
   FT_TRY(auto rows, impl_->sampleRows(place));
@@ -472,7 +493,8 @@ Result<std::vector<Sample>> SessionStore::samples(std::size_t place) const {
 
 Result<std::optional<double>> SessionStore::newestSample_s() const {
   std::optional<double> newest_s;
-  for (const char* sql : {"SELECT MAX(t_end_s) FROM takes", "SELECT t_s FROM loose_samples ORDER BY id DESC LIMIT 1"}) {
+  for (const char* sql : {"SELECT MAX(t_end_s) FROM takes", "SELECT MAX(t_end_s) FROM takes_of_others",
+                          "SELECT t_s FROM loose_samples ORDER BY id DESC LIMIT 1"}) {
     FT_TRY(const auto found, impl_->value(QLatin1String(sql)));
     if (found) newest_s = std::max(newest_s.value_or(found->toDouble()), found->toDouble());
   }

@@ -23,11 +23,17 @@ struct LooseSample {
   std::optional<int> cancelled_node;  ///< Where it was to be taken; none between the places.
 };
 
+/// What one sensor recorded at a place.
+struct SensorTake {
+  std::vector<Sample> samples;  ///< Of this sensor alone, not empty.
+  NodeStatistics statistics;
+};
+
 /// What another program recorded at a place.
 struct ForeignTake {
   std::size_t place = 0;
-  Node mean;
-  std::vector<Sample> samples;  ///< Empty where only the mean is known.
+  std::vector<Node> means;      ///< One a sensor, at least one.
+  std::vector<Sample> samples;  ///< Empty where only the means are known.
 };
 
 /// Its row of a sample table: node -1, and `cancelled:<node>` as status when it is of a take.
@@ -62,12 +68,12 @@ class SessionStore {
   Result<std::vector<PlaceState>> states() const;
   Result<PlaceState> state(std::size_t place) const;
 
-  /// Stores a finished take with its raw samples in one transaction; an earlier take of the place is kept but
-  /// superseded.
+  /// Stores a finished take of every sensor with its raw samples in one transaction; an earlier take of the place is
+  /// kept but superseded, whichever sensors it was of.
+  /// @param sensors at least one, the leading one first
   /// @param suspicious reason, empty when the take is fine
   /// @error kIo with the reason (disk full): nothing of the take is stored
-  Result<void> storeTake(std::size_t place, const std::vector<Sample>& samples, const NodeStatistics& statistics,
-                         const std::string& suspicious);
+  Result<void> storeTake(std::size_t place, const std::vector<SensorTake>& sensors, const std::string& suspicious);
   /// Stores takes that another program made, all of them or none.
   Result<void> storeForeign(const std::vector<ForeignTake>& takes);
   Result<void> skip(std::size_t place, const std::string& reason);
@@ -94,13 +100,14 @@ class SessionStore {
   Result<void> setState(const std::string& key, const std::string& value);
   Result<std::string> state(const std::string& key) const;
 
-  /// Live takes as a node table, with skipped places as rows of role skipped only when they have a take.
+  /// Live takes as a node table, a row a sensor, with skipped places as rows of role skipped only when they have a
+  /// take.
   Result<CalibrationTable> nodeTable() const;
   /// Raw samples of the live takes, then the loose ones with node -1.
   Result<SampleTable> sampleTable() const;
-  /// The live take of a place, none when there is none.
-  Result<std::optional<Node>> node(std::size_t place) const;
-  /// Raw samples of the live take of a place.
+  /// The live take of a place: a row a sensor, the leading one first; empty when there is none.
+  Result<std::vector<Node>> nodes(std::size_t place) const;
+  /// Raw samples of the live take of a place, sensor by sensor.
   Result<std::vector<Sample>> samples(std::size_t place) const;
 
   QDateTime created() const;  ///< When the session began, UTC.

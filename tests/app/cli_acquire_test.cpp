@@ -122,6 +122,15 @@ class CliAcquireTest : public QObject {
     QVERIFY2(run.out.contains("1 of 3 places done, 1 skipped"), run.out.constData());
   }
 
+  void enterBeforeTheTrackerRunsIsKept() {
+    QProcess process;
+    process.start(cliPath(), {"acquire", "--device", "simulated:speed=20", "--plan", "grid:1x1x1@0.2",
+                              "--samples-per-node", "10", "--session", at("early.fieldtrue")});
+    process.write("\n");
+    QVERIFY(waitForLine(process, "^A1.*done 1 of 1").hasMatch());
+    FT_VERIFY_STATUS(finished(process, 20000), 0);
+  }
+
   void anEmulatedTrackerOverTcp() {
     QProcess emulator;
     emulator.start(cliPath(), {"emulate", "fastrak", "--listen", "0", "--duration", "120"});

@@ -35,6 +35,7 @@ constexpr int kSmallestReason = 12;                ///< Pixels; of a place's nam
 // How much of the way to a new guess of the transmitter's place is gone with each status, some thirty a second.
 constexpr double kEase = 0.15;
 constexpr int kInspectorWidth = 320;
+constexpr std::size_t kMostLines = 4;  ///< Of sensors; more stand side by side.
 // Nearer than this the tracker's own error decides what it says of the distance, and the marks on the floor know
 // better.
 constexpr double kWorthTelling_m = 0.15;
@@ -65,6 +66,25 @@ QString bannerState(const acquisition::AcquisitionStatus& status) {
   if (status.attention || status.take == acquisition::TakeState::kFailed) return QStringLiteral("attention");
   if (!status.current) return QStringLiteral("done");
   return status.take == acquisition::TakeState::kCollecting ? QStringLiteral("collecting") : QStringLiteral("next");
+}
+
+/// More sensors than there is room for below each other.
+bool standSideBySide(const acquisition::AcquisitionStatus& status) { return status.sensors.size() > kMostLines; }
+
+/// Its cells in the table of sensors.
+QString sensorCells(const acquisition::SensorProgress& one, const acquisition::AcquisitionStatus& status) {
+  const bool leads = one.sensor == status.sensors.front().sensor;
+  const QString name =
+      leads ? AcquirePage::tr("Sensor %1, leads").arg(one.sensor) : AcquirePage::tr("Sensor %1").arg(one.sensor);
+  QString doing = AcquirePage::tr("ready");
+  if (status.take == acquisition::TakeState::kCollecting)
+    doing = (standSideBySide(status) ? QStringLiteral("%1/%2") : AcquirePage::tr("%1 of %2"))
+                .arg(one.collected)
+                .arg(one.wanted);
+  if (status.device != acquisition::DeviceState::kRunning) doing = QStringLiteral("-");
+  if (one.silent) doing = AcquirePage::tr("silent");
+  const QString color = one.silent ? QStringLiteral(" style='color:%1'").arg(theme().attention.name()) : QString();
+  return QStringLiteral("<td%1>%2</td><td%1 align='right'>%3</td>").arg(color, name, doing);
 }
 
 Pose eased(const Pose& from, const Pose& to) {
@@ -185,6 +205,11 @@ QWidget* AcquirePage::makeInspector() {
   progress_->setAccessibleName(tr("Places done"));
   layout->addWidget(counts_);
   layout->addWidget(progress_);
+  sensors_ = new QLabel(inspector);
+  sensors_->setObjectName(QStringLiteral("sensorLines"));
+  sensors_->setAccessibleName(tr("Sensors recorded"));
+  sensors_->hide();
+  layout->addWidget(sensors_);
 
   take_ = new QPushButton(icon(QStringLiteral("take"), theme().on_accent), tr("Take  (Space or Page Down)"), inspector);
   take_->setObjectName(QStringLiteral("take"));
@@ -272,6 +297,7 @@ void AcquirePage::onStatus(const acquisition::AcquisitionStatus& status) {
   room_->setLive(live ? std::optional<Pose>(*shown_reference_ * status.live->tracker_from_sensor) : std::nullopt);
   showPlace(status);
   showRing(status);
+  showSensors(status);
   showButtons(status);
 }
 
@@ -343,6 +369,19 @@ void AcquirePage::fitReason() {
 
 void AcquirePage::showRing(const acquisition::AcquisitionStatus& status) {
   ring_->setProgress(status.collected, status.wanted, ringState(status.take));
+}
+
+void AcquirePage::showSensors(const acquisition::AcquisitionStatus& status) {
+  sensors_->setVisible(status.sensors.size() > 1);
+  if (status.sensors.size() < 2) return;
+  const std::size_t in_a_row = standSideBySide(status) ? 2 : 1;
+  QString cells;
+  for (std::size_t i = 0; i < status.sensors.size(); ++i) {
+    if (i % in_a_row > 0) cells += QStringLiteral("<td width='16'></td>");
+    if (i > 0 && i % in_a_row == 0) cells += QStringLiteral("</tr><tr>");
+    cells += sensorCells(status.sensors[i], status);
+  }
+  sensors_->setText(QStringLiteral("<table width='100%'><tr>%1</tr></table>").arg(cells));
 }
 
 void AcquirePage::showButtons(const acquisition::AcquisitionStatus& status) {

@@ -44,6 +44,7 @@ class AcquirePage : public QWidget {
   /// The same for a reason, which may have lines.
   void fitReason();
   void showRing(const acquisition::AcquisitionStatus& status);
+  void showSensors(const acquisition::AcquisitionStatus& status);
   void showButtons(const acquisition::AcquisitionStatus& status);
   void fitText();
 
@@ -59,6 +60,7 @@ class AcquirePage : public QWidget {
   RoomView* room_;
   QProgressBar* progress_;
   QLabel* counts_;
+  QLabel* sensors_;  ///< How each is doing; to be seen only where several are recorded.
   QTableView* list_;
   PlaceListModel* model_;
   QPushButton* take_;

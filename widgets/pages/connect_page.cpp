@@ -16,6 +16,7 @@
 
 #include "acquisition/devices/registry.h"
 #include "calib/core/setup.h"
+#include "widgets/forms/recorded_sensors.h"
 #include "widgets/forms/settings_form.h"
 #include "widgets/style/unit_texts.h"
 
@@ -129,6 +130,7 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
   layout->addLayout(buttons);
   layout->addWidget(state_);
   layout->addWidget(numbers_);
+  layout->addWidget(new RecordedSensors(workbench_, column));
   layout->addStretch(2);
   outer->addStretch();
   outer->addWidget(column, 1);

@@ -2,6 +2,7 @@
 
 #include <QColor>
 #include <QFont>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -37,7 +38,7 @@ void PlaceListModel::setPlaces(const std::vector<PlannedPlace>& places) {
   beginResetModel();
   places_ = places;
   states_.assign(places.size(), acquisition::PlaceState::kPlanned);
-  nodes_.assign(places.size(), std::nullopt);
+  takes_.assign(places.size(), std::nullopt);
   misfits_.clear();
   current_.reset();
   endResetModel();
@@ -64,11 +65,11 @@ QString PlaceListModel::stateText(std::size_t row) const {
 }
 
 void PlaceListModel::setTable(const CalibrationTable& table) {
-  std::map<std::pair<int, int>, const Node*> rows;
-  for (const Node& node : table.nodes) rows[{node.node, node.visit}] = &node;
+  std::map<std::pair<int, int>, std::vector<const Node*>> rows;
+  for (const Node& node : table.nodes) rows[{node.node, node.visit}].push_back(&node);
   for (std::size_t i = 0; i < places_.size(); ++i) {
-    const auto row = rows.find({places_[i].node, places_[i].visit});
-    nodes_[i] = row == rows.end() ? std::nullopt : std::optional<Node>(*row->second);
+    const auto of_place = rows.find({places_[i].node, places_[i].visit});
+    takes_[i] = of_place == rows.end() ? std::nullopt : std::optional(worstOf(of_place->second));
   }
   if (!places_.empty()) emit dataChanged(index(0, 0), index(rowCount() - 1, columnCount() - 1));
 }
@@ -78,19 +79,30 @@ int PlaceListModel::rowCount(const QModelIndex& parent) const {
 }
 int PlaceListModel::columnCount(const QModelIndex&) const { return static_cast<int>(kColumns.size()); }
 
+PlaceListModel::Take PlaceListModel::worstOf(const std::vector<const Node*>& sensors) {
+  Take worst{sensors.front()->n_used, sensors.front()->n_rejected, {}};
+  for (const Node* node : sensors) {
+    worst.n_used = std::min(worst.n_used, node->n_used);
+    worst.n_rejected = std::max(worst.n_rejected, node->n_rejected);
+    if (node->covariance_m2)
+      worst.variance_m2 = std::max(worst.variance_m2.value_or(0.0), node->covariance_m2->trace());
+  }
+  return worst;
+}
+
 QString PlaceListModel::text(std::size_t row, int column) const {
-  const std::optional<Node>& node = nodes_[row];
+  const std::optional<Take>& take = takes_[row];
   switch (column) {
     case 0:
       return QString::fromStdString(placeName(places_[row]));
     case 1:
       return stateText(row);
     case 2:
-      return node ? QString::number(node->n_used) : QString();
+      return take ? QString::number(take->n_used) : QString();
     case 3:
-      return node && node->covariance_m2 ? threeFigures(1000.0 * std::sqrt(node->covariance_m2->trace())) : QString();
+      return take && take->variance_m2 ? threeFigures(1000.0 * std::sqrt(*take->variance_m2)) : QString();
     default:
-      return node ? QString::number(node->n_rejected) : QString();
+      return take ? QString::number(take->n_rejected) : QString();
   }
 }
 

@@ -26,11 +26,17 @@ class PlaceListModel : public QAbstractTableModel {
   QVariant headerData(int section, Qt::Orientation orientation, int role) const override;
 
  private:
+  /// Its numbers; of several sensors the worst.
+  struct Take {
+    int n_used = 0, n_rejected = 0;
+    std::optional<double> variance_m2;  ///< 3-D, of a single sample.
+  };
+  static Take worstOf(const std::vector<const Node*>& sensors);
   QString text(std::size_t row, int column) const;
   QString stateText(std::size_t row) const;
   std::vector<PlannedPlace> places_;
   std::vector<acquisition::PlaceState> states_;
-  std::vector<std::optional<Node>> nodes_;
+  std::vector<std::optional<Take>> takes_;
   std::optional<std::size_t> current_;
   std::vector<acquisition::PlaceMisfit> misfits_;
 };

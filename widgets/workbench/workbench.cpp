@@ -94,7 +94,8 @@ void Workbench::wireController() {
   });
   connect(controller_, &acquisition::AcquisitionController::sessionOpened, this, &Workbench::onSessionOpened);
   connect(controller_, &acquisition::AcquisitionController::fitOpened, this, &Workbench::onFitOpened);
-  connect(controller_, &acquisition::AcquisitionController::nodeStored, this, &Workbench::onNodeStored);
+  connect(controller_, &acquisition::AcquisitionController::nodesStored, this,
+          [this](int place, const std::vector<Node>&, const QString& suspicious) { onNodesStored(place, suspicious); });
   connect(controller_, &acquisition::AcquisitionController::takeFailed, this, &Workbench::onTakeFailed);
   connect(controller_, &acquisition::AcquisitionController::takeRefused, this, &Workbench::onTakeRefused);
   connect(controller_, &acquisition::AcquisitionController::finished, this, [this] {
@@ -124,8 +125,7 @@ QString Workbench::nameOf(int place) const {
              : QString::fromStdString(placeName(status_.session->places[index]));
 }
 
-void Workbench::onNodeStored(int place, const Node& node, const QString& suspicious) {
-  emit nodeStored(place, node, suspicious);
+void Workbench::onNodesStored(int place, const QString& suspicious) {
   for (const char* kind : {"session/take/%1", "session/look/%1"}) endCondition(QString::fromLatin1(kind).arg(place));
   endCondition(QStringLiteral("session/failed"));
   if (suspicious.isEmpty()) return;
@@ -201,13 +201,13 @@ void Workbench::onStatus(const acquisition::AcquisitionStatus& status) {
 void Workbench::onTables(const CalibrationTable& table, const SampleTable& samples) {
   std::map<std::pair<int, int>, PlaceRows*> by_key;
   for (PlaceRows& place : places_) {
-    place.row.reset();
+    place.rows.clear();
     place.samples.clear();
     by_key[{place.node, place.visit}] = &place;
   }
   loose_samples_.clear();
   for (const Node& node : table.nodes) {
-    if (const auto at = by_key.find({node.node, node.visit}); at != by_key.end()) at->second->row = node;
+    if (const auto at = by_key.find({node.node, node.visit}); at != by_key.end()) at->second->rows.push_back(node);
   }
   for (const SampleRow& row : samples.rows) {
     const auto at = by_key.find({row.node, row.visit});
@@ -221,9 +221,9 @@ void Workbench::onTables(const CalibrationTable& table, const SampleTable& sampl
   changeTable();
 }
 
-void Workbench::onPlace(int place, const std::optional<Node>& node, const std::vector<Sample>& samples) {
+void Workbench::onPlace(int place, const std::vector<Node>& nodes, const std::vector<Sample>& samples) {
   if (static_cast<std::size_t>(place) >= places_.size()) return;
-  places_[static_cast<std::size_t>(place)].row = node;
+  places_[static_cast<std::size_t>(place)].rows = nodes;
   places_[static_cast<std::size_t>(place)].samples = samples;
   changeTable();
 }
@@ -241,18 +241,15 @@ const CalibrationTable& Workbench::table() const {
   if (!table_is_stale_) return table_;
   table_is_stale_ = false;
   table_.nodes.clear();
-  for (const PlaceRows& place : places_) {
-    const bool is_meant = place.row && (!chosen_sensor_ || place.row->sensor == *chosen_sensor_);
-    if (is_meant) table_.nodes.push_back(*place.row);
-  }
+  for (const PlaceRows& place : places_)
+    for (const Node& row : place.rows)
+      if (!chosen_sensor_ || row.sensor == *chosen_sensor_) table_.nodes.push_back(row);
   return table_;
 }
 
 CalibrationTable Workbench::recordedTable() const {
   CalibrationTable all{table_.metadata, {}};
-  for (const PlaceRows& place : places_) {
-    if (place.row) all.nodes.push_back(*place.row);
-  }
+  for (const PlaceRows& place : places_) all.nodes.insert(all.nodes.end(), place.rows.begin(), place.rows.end());
   return all;
 }
 
@@ -433,6 +430,9 @@ void Workbench::undo() { post(&acquisition::AcquisitionController::undo); }
 void Workbench::redo() { post(&acquisition::AcquisitionController::redo); }
 void Workbench::goTo(int place) { post(&acquisition::AcquisitionController::goTo, place); }
 void Workbench::setAutomatic(bool automatic) { post(&acquisition::AcquisitionController::setAutomatic, automatic); }
+void Workbench::setSensors(const std::vector<int>& sensors) {
+  post(&acquisition::AcquisitionController::setSensors, sensors);
+}
 
 void Workbench::compare(const evaluation::ComparisonOptions& options, MethodCount count) {
   comparison_jobs_.stop();

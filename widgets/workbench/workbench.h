@@ -104,6 +104,7 @@ class Workbench : public QObject {
   void redo();
   void goTo(int place);
   void setAutomatic(bool automatic);
+  void setSensors(const std::vector<int>& sensors);  ///< AcquisitionController::setSensors.
 
   /// Scores the methods on the session's table in the background; an earlier run is stopped.
   /// @param count how many of the methods a person asked for take part in this run
@@ -145,7 +146,6 @@ class Workbench : public QObject {
   void messageShown(const fieldtrue::widgets::Message& message);
   void conditionEnded(const QString& condition);
   void closing();  ///< The window goes: long work of the pages must stop.
-  void nodeStored(int place, const fieldtrue::Node& node, const QString& suspicious);
 
  private:
   void wireController();
@@ -154,14 +154,14 @@ class Workbench : public QObject {
   void onStatus(const acquisition::AcquisitionStatus& status);
   void endWhatIsOver(const acquisition::AcquisitionStatus& now);
   void tellMisfits(const acquisition::AcquisitionStatus& before, const acquisition::AcquisitionStatus& now);
-  void onNodeStored(int place, const Node& node, const QString& suspicious);
+  void onNodesStored(int place, const QString& suspicious);
   void onTakeFailed(const QString& reason, int place);
   void onTakeRefused(int place, double off_m);
   QString nameOf(int place) const;
   void onTrace(const std::shared_ptr<const acquisition::Trace>& trace);
   void onFitOpened(const QString& ftcal_text);
   void onTables(const CalibrationTable& table, const SampleTable& samples);
-  void onPlace(int place, const std::optional<Node>& node, const std::vector<Sample>& samples);
+  void onPlace(int place, const std::vector<Node>& nodes, const std::vector<Sample>& samples);
   void changeTable();
   template <class... Arguments, class... Given>
   void post(void (acquisition::AcquisitionController::*slot)(Arguments...), Given&&... given);
@@ -174,7 +174,7 @@ class Workbench : public QObject {
   /// One place of the plan as the session holds it.
   struct PlaceRows {
     int node = 0, visit = 0;
-    std::optional<Node> row;
+    std::vector<Node> rows;  ///< One a sensor, the leading one first.
     std::vector<Sample> samples;
   };
   std::vector<PlaceRows> places_;

@@ -2,55 +2,17 @@
 
 #include <QTest>
 #include <cmath>
-#include <functional>
-#include <random>
+#include <optional>
 
 #include "acquisition/sampling/shift_test.h"
 #include "acquisition/sampling/stillness.h"
+#include "tests/acquisition/sampling/noisy_sensor.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::acquisition;
-
-namespace {
-
-constexpr double kRate_hz = 120.0;
-
-/// First-order autoregressive noise on all three axes about a place, with changes of the place over time.
-class NoisySensor {
- public:
-  /// @param sd_m 3-D SD of one reading
-  NoisySensor(double sd_m, double correlation, std::uint64_t seed)
-      : axis_sd_m_(sd_m / std::sqrt(3.0)), correlation_(correlation), random_(seed) {
-    for (double& x : state_) x = normal_(random_);
-  }
-  std::function<Eigen::Vector3d(int)> path_m = [](int) { return Eigen::Vector3d::Zero(); };
-  Eigen::Vector3d place_m{0.8, -0.3, 0.2};
-
-  Sample next() {
-    Sample sample;
-    sample.time_s = n_ / kRate_hz;
-    sample.tracker_from_sensor.position_m = place_m + axis_sd_m_ * state_ + path_m(n_);
-    for (double& x : state_) x = correlation_ * x + std::sqrt(1 - correlation_ * correlation_) * normal_(random_);
-    ++n_;
-    return sample;
-  }
-
- private:
-  double axis_sd_m_;
-  double correlation_;
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  Eigen::Vector3d state_ = Eigen::Vector3d::Zero();
-  int n_ = 0;
-};
-
-Eigen::Vector3d stepAt(int n, int when, double size_m) {
-  return n < when ? Eigen::Vector3d::Zero() : Eigen::Vector3d(size_m / std::sqrt(3.0) * Eigen::Vector3d::Ones());
-}
-
-}  // namespace
+using namespace fieldtrue::testing;
 
 class NodeSamplerTest : public QObject {
   Q_OBJECT
@@ -356,7 +318,7 @@ class NodeSamplerTest : public QObject {
       sampler.add(sample);
     }
     QVERIFY(sampler.state() == TakeState::kFailed);
-    QVERIFY(std::abs(elapsed_s - 30.0) < 2.0 / kRate_hz);
+    QVERIFY(std::abs(elapsed_s - 30.0) < 2.0 / kNoisySensor_hz);
     for (const QString& word : words) {
       QVERIFY2(QString::fromStdString(sampler.message()).contains(word), sampler.message().c_str());
     }
@@ -392,7 +354,7 @@ class NodeSamplerTest : public QObject {
     QVERIFY(!detector.still());
     QCOMPARE(detector.reason(), std::string("waiting for the tracker"));
     NoisySensor sensor(sd_m, 0.0, 8);
-    sensor.path_m = [speed_m_s](int n) { return Eigen::Vector3d(0, speed_m_s * n / kRate_hz, 0); };
+    sensor.path_m = [speed_m_s](int n) { return Eigen::Vector3d(0, speed_m_s * n / kNoisySensor_hz, 0); };
     for (int n = 0; n < 10; ++n) detector.add(sensor.next());
     QVERIFY2(!detector.still(), "too short to tell");
     for (int n = 0; n < 110; ++n) detector.add(sensor.next());
@@ -405,6 +367,41 @@ class NodeSamplerTest : public QObject {
       QVERIFY(std::abs(detector.speed_m_s() / speed_m_s - 1.0) < 0.1);
       const QString words = QString("hold still: moving %1 mm/s").arg(std::lround(detector.speed_m_s() * 1e3));
       QCOMPARE(QString::fromStdString(detector.reason()), words);
+    }
+  }
+
+  void slowTrackersAreSeenToRestToo_data() {
+    QTest::addColumn<double>("rate_hz");
+    for (const double rate_hz : {1.5, 2.0, 5.0, 8.0, 10.0, 25.0}) QTest::addRow("%g Hz", rate_hz) << rate_hz;
+  }
+  void slowTrackersAreSeenToRestToo() {
+    QFETCH(double, rate_hz);
+    StillnessDetector detector;
+    NoisySensor sensor(1e-4, 0.0, 8);
+    const int carried = 20, resting = 20;
+    sensor.path_m = [&](int n) { return Eigen::Vector3d(0, 0.3 * std::min(n, carried) / rate_hz, 0); };
+    std::optional<int> still_after;
+    for (int n = 0; n < carried + resting; ++n) {
+      Sample sample = sensor.next();
+      sample.time_s = n / rate_hz;
+      detector.add(sample);
+      if (n <= carried) QVERIFY2(!detector.still(), qPrintable(QString::number(n)));
+      if (detector.still() && !still_after) still_after = n - carried;
+    }
+    QVERIFY2(detector.still(), detector.reason().c_str());
+    QVERIFY2(*still_after <= std::max(6.0, std::ceil(0.5 * rate_hz) + 1.0), qPrintable(QString::number(*still_after)));
+  }
+
+  void aGapIsNoSlowTracker() {
+    StillnessDetector detector;
+    NoisySensor sensor(1e-4, 0.0, 8);
+    for (int n = 0; n < 120; ++n) detector.add(sensor.next());
+    QVERIFY(detector.still());
+    for (int n = 0; n < 40; ++n) {
+      Sample sample = sensor.next();
+      sample.time_s += 0.7;
+      detector.add(sample);
+      QVERIFY2(!detector.still(), "what was before the gap says nothing of now");
     }
   }
 

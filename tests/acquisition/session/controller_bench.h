@@ -3,6 +3,7 @@
 #include <QDateTime>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -19,6 +20,14 @@ class FakeTracker : public acquisition::TrackerDevice {
   Pose true_pose{{-1.0, -1.0, -1.0}, Eigen::Quaterniond::Identity()};
   std::vector<Pose> guided;
   QString tracker_name = QStringLiteral("fake");
+  /// A sensor on the jig.
+  struct OnJig {
+    Pose jig_from_sensor;
+    double noise_m = 1e-4;  ///< Bounded: nothing of it is ever an outlier.
+    bool is_plugged = true;
+    bool lies_in_room = false;  ///< Where it was taken off the jig, and not carried along.
+  };
+  std::map<int, OnJig> on_jig{{0, {}}};
 
   void start() override { emit stateChanged(acquisition::DeviceState::kRunning, "running"); }
   void stop() override {}
@@ -32,13 +41,16 @@ class FakeTracker : public acquisition::TrackerDevice {
 
   void restartClock() { n_ = 0; }
   void send(const Pose& pose, const std::string& status = {}) {
-    Sample sample;
-    sample.time_s = static_cast<double>(n_++) / kRate_hz;
-    sample.tracker_from_sensor = inverse(reference_from_tracker) * pose;
-    // Bounded noise: nothing of it is ever an outlier.
-    for (double& x : sample.tracker_from_sensor.position_m) x += uniform_(random_);
-    sample.status = status;
-    emit samplesReceived({sample});
+    const double time_s = static_cast<double>(n_++) / kRate_hz;
+    std::vector<Sample> samples;
+    for (const auto& [number, sensor] : on_jig) {
+      if (!sensor.is_plugged) continue;
+      const Pose at = sensor.lies_in_room ? sensor.jig_from_sensor : pose * sensor.jig_from_sensor;
+      Sample sample{time_s, number, inverse(reference_from_tracker) * at, status};
+      for (double& x : sample.tracker_from_sensor.position_m) x += sensor.noise_m * uniform_(random_);
+      samples.push_back(sample);
+    }
+    emit samplesReceived(samples);
   }
   void stand(double seconds, const std::string& status = {}) {
     for (int n = 0; n < seconds * kRate_hz; ++n) send(true_pose, status);
@@ -61,7 +73,7 @@ class FakeTracker : public acquisition::TrackerDevice {
  private:
   std::uint64_t n_ = 0;
   std::mt19937_64 random_{5};
-  std::uniform_real_distribution<double> uniform_{-1e-4, 1e-4};
+  std::uniform_real_distribution<double> uniform_{-1.0, 1.0};
 };
 
 inline acquisition::Plan planOf(std::array<int, 3> counts) {
@@ -77,10 +89,10 @@ struct Bench {
                  double after_s = 0.0)
       : now(QDateTime({2024, 2, 29}, {12, 0}).toUTC().addMSecs(std::llround(1000.0 * after_s))) {
     controller.setWallClock([this] { return now; });
-    QObject::connect(&controller, &acquisition::AcquisitionController::nodeStored,
-                     [this](int place, const Node& node, const QString& suspicious) {
+    QObject::connect(&controller, &acquisition::AcquisitionController::nodesStored,
+                     [this](int place, const std::vector<Node>& rows, const QString& suspicious) {
                        stored.push_back(place);
-                       nodes.push_back(node);
+                       nodes.insert(nodes.end(), rows.begin(), rows.end());
                        suspicions << suspicious;
                      });
     QObject::connect(&controller, &acquisition::AcquisitionController::takeFailed,
@@ -91,6 +103,8 @@ struct Bench {
                      [this](const QString& text) { failures << text; });
     QObject::connect(&controller, &acquisition::AcquisitionController::deviceFailed,
                      [this](const QString& text) { device_failures << text; });
+    QObject::connect(&controller, &acquisition::AcquisitionController::remarked,
+                     [this](const QString& text) { remarks << text; });
     QObject::connect(&controller, &acquisition::AcquisitionController::deviceBack, [this] { ++n_back; });
     QObject::connect(&controller, &acquisition::AcquisitionController::finished, [this] { ++n_finished; });
     QObject::connect(&controller, &acquisition::AcquisitionController::sessionOpened,
@@ -129,7 +143,7 @@ struct Bench {
   FakeTracker* tracker = nullptr;
   std::vector<int> stored, refused;
   std::vector<Node> nodes;
-  QStringList suspicions, take_failures, failures, device_failures;
+  QStringList suspicions, take_failures, failures, device_failures, remarks;
   int n_finished = 0, n_back = 0;
   QString opened_page, opened_plan;
   CalibrationTable table;

@@ -66,16 +66,30 @@ class ImportedSessionTest : public QObject {
     QVERIFY((*store.states())[0] == PlaceState::kDone && (*store.states())[1] == PlaceState::kSkipped);
   }
 
-  void sensorsAtOnePlaceGetVisitsOfTheirOwn() {
+  void sensorsAtOnePlaceAreOneTake() {
     const CalibrationTable table{{}, {node(5, 0, 0), node(5, 0, 1), node(5, 1, 0), node(5, 1, 1)}};
-    const CalibrationTable back = through(table, {}).nodeTable().value();
+    const SessionStore store = through(table, {});
+    QCOMPARE(store.places().size(), std::size_t{2});
+    const CalibrationTable back = store.nodeTable().value();
     QCOMPARE(back.nodes.size(), std::size_t{4});
-    std::set<int> visits;
     for (std::size_t i = 0; i < 4; ++i) {
+      QCOMPARE(back.nodes[i].sensor, table.nodes[i].sensor);
+      QCOMPARE(back.nodes[i].visit, table.nodes[i].visit);
+    }
+  }
+
+  void whereTheyDifferInMoreTheyGetVisitsOfTheirOwn() {
+    Node elsewhere = node(5, 0, 1);
+    elsewhere.reference_from_sensor.position_m.x() += 0.04;
+    const CalibrationTable table{{}, {node(5, 0, 0), elsewhere, node(5, 0, 0)}};
+    const CalibrationTable back = through(table, {}).nodeTable().value();
+    QCOMPARE(back.nodes.size(), std::size_t{3});
+    std::set<int> visits;
+    for (std::size_t i = 0; i < 3; ++i) {
       QCOMPARE(back.nodes[i].sensor, table.nodes[i].sensor);
       visits.insert(back.nodes[i].visit);
     }
-    QCOMPARE(visits.size(), std::size_t{4});
+    QCOMPARE(visits.size(), std::size_t{3});
   }
 
   void samplesGoToTheirTakes() {

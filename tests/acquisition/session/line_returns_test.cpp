@@ -7,6 +7,7 @@
 
 #include "acquisition/devices/fastrak_device.h"
 #include "acquisition/devices/registry.h"
+#include "acquisition/devices/trace_file.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/session/acquisition_controller.h"
 #include "tests/acquisition/devices/line_bench.h"
@@ -76,8 +77,8 @@ struct Operator {
   explicit Operator(const QString& session) {
     QObject::connect(&controller, &AcquisitionController::deviceBack, [this] { ++n_back; });
     QObject::connect(&controller, &AcquisitionController::takeFailed, [this](const QString& text) { failed << text; });
-    QObject::connect(&controller, &AcquisitionController::nodeStored,
-                     [this](int, const Node& node, const QString&) { nodes.push_back(node); });
+    QObject::connect(&controller, &AcquisitionController::nodesStored,
+                     [this](int, const std::vector<Node>& rows, const QString&) { nodes.push_back(rows.front()); });
     QObject::connect(&controller, &AcquisitionController::tablesReady,
                      [this](const CalibrationTable&, const SampleTable& all) { samples = all; });
     Plan plan;
@@ -134,6 +135,7 @@ class LineReturnsTest : public QObject {
   void silentForAWhile();
   void atAnotherSpeed();
   void nothingIsTriedAfterDisconnecting();
+  void aTraceBreaksWhereTheTrackerWasLost();
 
  private:
   QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(++n_paths_)); }
@@ -253,6 +255,39 @@ void LineReturnsTest::nothingIsTriedAfterDisconnecting() {
   QVERIFY(person.controller.status().device == DeviceState::kClosed);
   QCOMPARE(person.n_back, 0);
   QVERIFY2(heard.isEmpty(), "the line is left alone");
+}
+
+void LineReturnsTest::aTraceBreaksWhereTheTrackerWasLost() {
+  const std::string file = folder_.filePath("lost.trace.zip").toStdString();
+  {
+    Operator person(newPath());
+    PoweredUnit* unit = nullptr;
+    behindAPty(person, unit);
+    person.loseIt([unit] { unit->restart(); });
+    if (QTest::currentTestFailed()) return;
+    person.takeAgain();
+    if (QTest::currentTestFailed()) return;
+    const auto trace = person.controller.trace();
+    QVERIFY(trace && trace->streams.size() == 2);
+    FT_VERIFY_OK(writeTrace(file, *trace));
+  }
+  Operator person(newPath());
+  person.controller.connectDevice(QString::fromStdString("trace:" + file), {});
+  QTRY_VERIFY_WITH_TIMEOUT(person.runs(), kBackWithin_ms);
+  // A take longer than what came before the loss does not reach beyond it.
+  person.controller.setTakeLength({TakeLength::Until::kSamples, 100000});
+  person.controller.take();
+  QTRY_COMPARE_WITH_TIMEOUT(person.failed.size(), 1, kBackWithin_ms);
+  QVERIFY2(person.failed[0].contains("Here the tracker was lost"), qPrintable(person.failed[0]));
+  QVERIFY(person.controller.status().reconnecting);
+  QTRY_COMPARE_WITH_TIMEOUT(person.n_back, 1, kBackWithin_ms);
+  QTRY_VERIFY_WITH_TIMEOUT(person.controller.status().device == DeviceState::kClosed, kBackWithin_ms);
+  person.controller.requestTables();
+  const auto& rows = person.samples.rows;
+  const auto cancelled = [](const SampleRow& row) { return row.sample.status.starts_with("cancelled"); };
+  const auto after = std::find_if_not(std::find_if(rows.begin(), rows.end(), cancelled), rows.end(), cancelled);
+  QVERIFY(after != rows.begin() && after != rows.end());
+  QVERIFY2(after->sample.time_s - std::prev(after)->sample.time_s >= 1.0, "the clock goes on behind what was read");
 }
 
 FIELDTRUE_TEST(LineReturnsTest)

@@ -67,8 +67,8 @@ class SessionGrowthTest : public QObject {
     std::size_t n_samples = 0;
     connect(&late.controller, &AcquisitionController::tablesReady, this, [&] { ++n_tables; });
     connect(&late.controller, &AcquisitionController::placeChanged, this,
-            [&](int, const std::optional<Node>& node, const std::vector<Sample>& samples) {
-              n_places += node.has_value();
+            [&](int, const std::vector<Node>& nodes, const std::vector<Sample>& samples) {
+              n_places += !nodes.empty();
               n_samples += samples.size();
             });
     // The reading that completes a take: what it costs is the storing, and all that follows from it. Taken in turn, so

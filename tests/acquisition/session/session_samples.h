@@ -56,7 +56,7 @@ inline std::vector<Sample> samplesOf(int take) {
 inline Result<void> storeTake(acquisition::SessionStore& store, std::size_t place, int take,
                               const std::string& suspicious = {}) {
   const std::vector<Sample> samples = samplesOf(take);
-  return store.storeTake(place, samples, averageSamples(samples).value(), suspicious);
+  return store.storeTake(place, {{samples, averageSamples(samples).value()}}, suspicious);
 }
 
 inline bool sameSamples(const std::vector<Sample>& a, const std::vector<Sample>& b) {

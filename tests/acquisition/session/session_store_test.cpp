@@ -145,7 +145,7 @@ class SessionStoreTest : public QObject {
     SessionStore store = newStore(newPath());
     FT_VERIFY_OK(storeTake(store, 4, 3));
     const NodeStatistics expected = averageSamples(samplesOf(3)).value();
-    const Node node = store.node(4).value().value();
+    const Node node = store.nodes(4).value().at(0);
     QCOMPARE(node.node, store.places()[4].node);
     QCOMPARE(node.index, store.places()[4].index);
     QCOMPARE(node.sensor, 1);
@@ -159,7 +159,7 @@ class SessionStoreTest : public QObject {
     QVERIFY(node.n_rejected >= 6);
     QCOMPARE(*node.t_start_s, 3.0);
     QCOMPARE(*node.t_end_s, 3.0 + 59 / 120.0);
-    QVERIFY(!store.node(5).value());
+    QVERIFY(store.nodes(5).value().empty());
   }
 
   void retakeSupersedesAndUndoBringsBack() {

@@ -31,8 +31,8 @@ class SimulatedSessionTest : public QObject {
     QStringList troubles;
     bool finished = false;
     SampleTable samples;
-    connect(controller, &AcquisitionController::nodeStored, this,
-            [&](int, const Node& node) { nodes.push_back(node); });
+    connect(controller, &AcquisitionController::nodesStored, this,
+            [&](int, const std::vector<Node>& rows) { nodes.insert(nodes.end(), rows.begin(), rows.end()); });
     connect(controller, &AcquisitionController::failed, this, [&](const QString& text) { troubles << text; });
     connect(controller, &AcquisitionController::takeFailed, this, [&](const QString& text) { troubles << text; });
     connect(controller, &AcquisitionController::finished, this, [&] { finished = true; });

@@ -1,10 +1,14 @@
+#include <QCheckBox>
 #include <QComboBox>
+#include <QFile>
 #include <QLabel>
 #include <QLineEdit>
+#include <QListWidget>
 #include <QPushButton>
 #include <QSpinBox>
 #include <QTableWidget>
 #include <QTest>
+#include <algorithm>
 #include <map>
 #include <memory>
 
@@ -20,7 +24,7 @@
 #include "tests/widgets/pages/window_driver.h"
 
 /// From the cable to a calibration with every tracker that has an emulator, two sensors on each, in the window by keys
-/// and clicks: connect, look at the signals, plan, take every place, fit.
+/// and clicks: connect, see that both are recorded, look at the signals, plan, take every place, compare, fit, export.
 using namespace fieldtrue;
 using namespace fieldtrue::widgets;
 using namespace fieldtrue::testing;
@@ -33,6 +37,7 @@ using Unit = std::unique_ptr<acquisition::EmulatedTracker>;
 const Pose kReferenceFromTracker{{0.1, 0.05, -0.02}, rotationFromVector({0.0, 0.0, 0.2})};
 const Eigen::Vector3d kToSecond_m{0.0, 0.04, 0.0};
 constexpr int kConnectMs = 30000;
+constexpr std::size_t kPlaces = 8;
 
 template <class Emulator, class Options>
 Unit made(Source source) {
@@ -102,19 +107,27 @@ class EveryTrackerTest : public WindowDriver {
     picture(QStringLiteral("signal-") + kind);
     makePlan();
     if (QTest::currentTestFailed()) return;
-    for (std::size_t place = 0; place < 8; ++place) {
+    bothAreRecorded();
+    if (QTest::currentTestFailed()) return;
+    click("step_acquire");
+    for (std::size_t place = 0; place < kPlaces; ++place) {
       take(place);
       if (QTest::currentTestFailed()) return;
+      if (place == 3) picture(QStringLiteral("acquire-") + kind);
     }
-    // A calibration of what was recorded puts the sensor where the rig says it was.
-    click("step_compare");
+    rowsAreOfBoth();
+    if (QTest::currentTestFailed()) return;
+    comparisonIsOfBoth();
+    if (QTest::currentTestFailed()) return;
+    // A calibration of what was recorded puts each sensor where the rig says it was.
     calibration::CorrectorChoice choice;
     choice.position_id = "affine";
     window_->workbench().fit(choice, calibration::AlignMode::kRigid);
     QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().corrector().has_value(), kWaitMs);
     const Pose truth = status().session->places[5].reference_from_sensor;
-    const Pose found = window_->workbench().corrector()->correct(inverse(kReferenceFromTracker) * truth);
-    FT_VERIFY_MATCH(near(found, truth, 5e-4, 2e-3));
+    correctsBoth(*window_->workbench().corrector(), truth);
+    if (QTest::currentTestFailed()) return;
+    exportedIsOfBoth(truth);
   }
 
  private:
@@ -130,10 +143,79 @@ class EveryTrackerTest : public WindowDriver {
     FT_VERIFY_OK(emulator_->start());
   }
 
+  static Eigen::Vector3d jigToSensor_m(std::size_t sensor) {
+    return sensor == 0 ? Eigen::Vector3d::Zero() : kToSecond_m;
+  }
+
   void put(const Pose& reference_from_sensor) {
-    source_->put(0, inverse(kReferenceFromTracker) * reference_from_sensor);
-    source_->put(1, inverse(kReferenceFromTracker) *
-                        Pose{reference_from_sensor.position_m + kToSecond_m, reference_from_sensor.orientation});
+    for (std::size_t i = 0; i < 2; ++i)
+      source_->put(i, inverse(kReferenceFromTracker) *
+                          Pose{reference_from_sensor.position_m + jigToSensor_m(i), reference_from_sensor.orientation});
+  }
+
+  /// Connect offers both; one can be left out by the keyboard, and put back.
+  void bothAreRecorded() {
+    click("step_connect");
+    QTRY_COMPARE_WITH_TIMEOUT(status().sensors.size(), std::size_t{2}, kConnectMs);
+    sensors_ = {status().sensors[0].sensor, status().sensors[1].sensor};
+    QVERIFY(sensors_[0] < sensors_[1]);
+    auto* second = find<QCheckBox>(qPrintable(QStringLiteral("recordSensor%1").arg(sensors_[1])));
+    QTRY_VERIFY(second->isVisible() && second->isChecked());
+    for (const std::size_t recorded : {1, 2}) {
+      second->setFocus();
+      QTest::keyClick(second, Qt::Key_Space);
+      QTRY_COMPARE(status().sensors.size(), recorded);
+    }
+    picture(QStringLiteral("connect-both"));
+  }
+
+  /// Each of them its mean, and its samples.
+  void rowsAreOfBoth() {
+    const auto& workbench = window_->workbench();
+    QTRY_COMPARE(workbench.table().nodes.size(), 2 * kPlaces);
+    const CalibrationTable table = workbench.table();
+    const SampleTable samples = workbench.samples();
+    for (std::size_t row = 0; row < table.nodes.size(); ++row) {
+      const Node& node = table.nodes[row];
+      QCOMPARE(node.sensor, sensors_[row % 2]);
+      const Pose stood = inverse(kReferenceFromTracker) * node.reference_from_sensor;
+      const Eigen::Vector3d seen_m = stood * jigToSensor_m(row % 2);
+      FT_VERIFY_MATCH(near(node.tracker_from_sensor.position_m, seen_m, 1e-3));
+      const auto is_of_it = [&](const SampleRow& sample) {
+        return sample.node == node.node && sample.visit == node.visit && sample.sample.sensor == node.sensor;
+      };
+      QCOMPARE(std::count_if(samples.rows.begin(), samples.rows.end(), is_of_it), node.n_used + node.n_rejected);
+    }
+  }
+
+  void correctsBoth(const calibration::Corrector& corrector, const Pose& truth) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Pose seen = inverse(kReferenceFromTracker) * truth * Pose{jigToSensor_m(i), Eigen::Quaterniond::Identity()};
+      FT_VERIFY_MATCH(near(corrector.correct(seen, sensors_[i]), truth, 5e-4, 2e-3));
+    }
+  }
+
+  void exportedIsOfBoth(const Pose& truth) {
+    click("step_export");
+    auto* formats = find<QListWidget>("exportList");
+    const QList<QListWidgetItem*> rows = formats->findItems(QStringLiteral(".ftcal.json"), Qt::MatchContains);
+    QVERIFY(!rows.isEmpty());
+    formats->setCurrentItem(rows.front());
+    const QString path = find<QLineEdit>("exportPath")->text();
+    click("exportWrite");
+    QTRY_VERIFY_WITH_TIMEOUT(QFile::exists(path), kWaitMs);
+    const auto written = calibration::Corrector::load(path.toStdString());
+    FT_VERIFY_OK(written);
+    QCOMPARE(written->table().nodes.size(), 2 * kPlaces);
+    correctsBoth(*written, truth);
+  }
+
+  void comparisonIsOfBoth() {
+    click("step_compare");
+    auto& workbench = window_->workbench();
+    QTRY_VERIFY_WITH_TIMEOUT(workbench.comparison().has_value() && workbench.comparisonIsCurrent(), kWaitMs);
+    QCOMPARE(workbench.comparison()->before_sensors.size(), std::size_t{2});
+    QVERIFY(find<QComboBox>("compareSensor")->isVisible());
   }
 
   void connectTracker(const QString& kind) {
@@ -171,10 +253,14 @@ class EveryTrackerTest : public WindowDriver {
     QTRY_VERIFY2_WITH_TIMEOUT(is_there(), qPrintable(status().reason), kConnectMs);
     QTest::keyClick(window_.get(), Qt::Key_Space);
     QTRY_COMPARE_WITH_TIMEOUT(status().recorded->n_done, place + 1, kConnectMs);
+    const auto* lines = find<QLabel>("sensorLines");
+    QVERIFY(lines->isVisible());
+    for (const int sensor : sensors_) QVERIFY(lines->text().contains(QStringLiteral("Sensor %1").arg(sensor)));
   }
 
   std::unique_ptr<acquisition::EmulatorRunner> emulator_;
   acquisition::StandingSource* source_ = nullptr;
+  std::vector<int> sensors_;  ///< As the tracker numbers them.
 };
 
 FIELDTRUE_WINDOW_TEST(EveryTrackerTest)

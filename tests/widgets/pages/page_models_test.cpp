@@ -143,6 +143,34 @@ class PageModelsTest : public QObject {
     QVERIFY(std::abs(*reversed.arrows[1].better_mm + 15.0) < 1e-9);
   }
 
+  /// Of several sensors at a place the list shows the fewest samples, the largest SD, the most left out.
+  void aPlaceShowsTheWorstOfItsSensors() {
+    PlannedPlace place;
+    place.node = 4;
+    PlaceListModel model;
+    model.setPlaces({place});
+    Node first, second;
+    first.node = second.node = 4;
+    second.sensor = 1;
+    first.n_used = 60;
+    first.covariance_m2 = 3e-8 * Eigen::Matrix3d::Identity();  // 0.3 mm, 3-D.
+    second.n_used = 57;
+    second.n_rejected = 3;
+    second.covariance_m2 = 12e-8 * Eigen::Matrix3d::Identity();  // 0.6 mm.
+    const auto shown = [&model](int column) { return model.data(model.index(0, column), Qt::DisplayRole).toString(); };
+    for (const auto& rows : {std::vector{first, second}, {second, first}}) {
+      model.setTable({{}, rows});
+      QCOMPARE(shown(2), QString("57"));
+      QCOMPARE(shown(3), QString("0.600"));
+      QCOMPARE(shown(4), QString("3"));
+    }
+    model.setTable({{}, {first}});
+    QCOMPARE(shown(2), QString("60"));
+    QCOMPARE(shown(3), QString("0.300"));
+    model.setTable({});
+    QCOMPARE(shown(2), QString());
+  }
+
   void differencesToTheBestAreMarked() {
     evaluation::Comparison comparison = smallComparison();
     evaluation::MethodScore close = comparison.position[1];

@@ -52,7 +52,7 @@ void record(const QString& path, const Recorded& recorded) {
                         Eigen::Vector3d(0.5, 0.1, 1e-5 * static_cast<double>(i % 3));
       if (samples[i].sensor == 1) pose.orientation = rotationFromVector(Eigen::Vector3d(0.0, 0.0, 1.57));
     }
-    FT_VERIFY_OK(store->storeTake(place, samples, averageSamples(samples).value(), {}));
+    FT_VERIFY_OK(store->storeTake(place, {{samples, averageSamples(samples).value()}}, {}));
   }
 }
 

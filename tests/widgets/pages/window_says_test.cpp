@@ -146,7 +146,7 @@ QString WindowSaysTest::makeSession(const QString& name, const acquisition::Plan
   for (std::size_t place = 0; place < store->places().size(); ++place) {
     const Eigen::Vector3d p_true_m = store->places()[place].reference_from_sensor.position_m;
     const auto samples = readingsAt(bend(p_true_m), static_cast<double>(place));
-    const auto stored = store->storeTake(place, samples, averageSamples(samples).value(), "");
+    const auto stored = store->storeTake(place, {{samples, averageSamples(samples).value()}}, "");
     if (!stored) qFatal("%s", stored.error().message.c_str());
   }
   if (!fit.isEmpty() && !store->storeFit("kept", fit.toStdString())) qFatal("the fit was not stored");

@@ -73,7 +73,7 @@ class WindowSurvivesTest : public QObject {
       statistics.n_effective = 2.0;
       std::vector<Sample> samples(2);
       for (Sample& sample : samples) sample.tracker_from_sensor = statistics.mean;
-      if (!store->storeTake(place, samples, statistics, {})) qFatal("not stored");
+      if (!store->storeTake(place, {{samples, statistics}}, {})) qFatal("not stored");
     }
     return path;
   }

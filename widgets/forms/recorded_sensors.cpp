@@ -1,0 +1,91 @@
+#include "widgets/forms/recorded_sensors.h"
+
+#include <QCheckBox>
+#include <QGridLayout>
+#include <QLabel>
+#include <QVBoxLayout>
+#include <algorithm>
+#include <set>
+
+#include "widgets/workbench/workbench.h"
+
+namespace fieldtrue::widgets {
+namespace {
+
+constexpr int kBoxesInARow = 6;
+
+/// Those that report, and those that are recorded whether they do or not.
+std::vector<int> knownSensors(const acquisition::AcquisitionStatus& status) {
+  std::set<int> sensors(status.reporting.begin(), status.reporting.end());
+  for (const acquisition::SensorProgress& one : status.sensors) sensors.insert(one.sensor);
+  return {sensors.begin(), sensors.end()};
+}
+
+}  // namespace
+
+RecordedSensors::RecordedSensors(Workbench& workbench, QWidget* parent) : QWidget(parent), workbench_(workbench) {
+  setObjectName(QStringLiteral("recordedSensors"));
+  auto* rows = new QVBoxLayout(this);
+  rows->setContentsMargins(0, 0, 0, 0);
+  rows->addWidget(new QLabel(tr("Recorded sensors"), this));
+  grid_ = new QGridLayout;
+  rows->addLayout(grid_);
+  hint_ = new QLabel(this);
+  hint_->setObjectName(QStringLiteral("recordedSensorsHint"));
+  hint_->setProperty("role", "muted");
+  hint_->setWordWrap(true);
+  rows->addWidget(hint_);
+  hide();
+  connect(&workbench_, &Workbench::statusChanged, this, &RecordedSensors::onStatus);
+}
+
+void RecordedSensors::onStatus(const acquisition::AcquisitionStatus& status) {
+  const std::vector<int> sensors = knownSensors(status);
+  const bool shown =
+      status.device == acquisition::DeviceState::kRunning && sensors.size() > 1 && !status.sensors.empty();
+  setVisible(shown);
+  if (!shown) return;
+  const bool same = std::equal(boxes_.begin(), boxes_.end(), sensors.begin(), sensors.end(),
+                               [](const auto& box, int sensor) { return box.first == sensor; });
+  if (!same) makeBoxes(sensors);
+  for (const auto& [sensor, box] : boxes_) {
+    const auto is_it = [of = sensor](const acquisition::SensorProgress& one) { return one.sensor == of; };
+    const auto recorded = std::find_if(status.sensors.begin(), status.sensors.end(), is_it);
+    const bool is_recorded = recorded != status.sensors.end();
+    box->setChecked(is_recorded);
+    box->setEnabled(!status.takes_settle_sensors && !(is_recorded && status.sensors.size() == 1));
+    box->setText(is_recorded && recorded->silent ? tr("Sensor %1, silent").arg(sensor) : tr("Sensor %1").arg(sensor));
+  }
+  hint_->setText(
+      status.takes_settle_sensors
+          ? tr("The places of this session were taken by these. Another session may record others.")
+          : tr("Those ticked are recorded at every place, at once. Sensor %1 leads: by it rest and place are judged.")
+                .arg(status.sensors.front().sensor));
+}
+
+void RecordedSensors::makeBoxes(const std::vector<int>& sensors) {
+  for (const auto& [sensor, box] : boxes_) box->deleteLater();
+  boxes_.clear();
+  for (const int sensor : sensors) {
+    auto* box = new QCheckBox(this);
+    box->setObjectName(QStringLiteral("recordSensor%1").arg(sensor));
+    const int n = static_cast<int>(boxes_.size());
+    grid_->addWidget(box, n / kBoxesInARow, n % kBoxesInARow);
+    connect(box, &QCheckBox::clicked, this, [this, sensor](bool recorded) { choose(sensor, recorded); });
+    boxes_[sensor] = box;
+  }
+}
+
+void RecordedSensors::choose(int sensor, bool recorded) {
+  std::set<int> sensors;
+  for (const acquisition::SensorProgress& one : workbench_.status().sensors) sensors.insert(one.sensor);
+  if (recorded)
+    sensors.insert(sensor);
+  else
+    sensors.erase(sensor);
+  // All that there are: one that is plugged in later is recorded too.
+  const bool all = sensors.size() == boxes_.size();
+  workbench_.setSensors(all ? std::vector<int>() : std::vector<int>(sensors.begin(), sensors.end()));
+}
+
+}  // namespace fieldtrue::widgets
