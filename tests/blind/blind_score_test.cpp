@@ -52,14 +52,16 @@ json selected(const std::vector<std::string>& ids) {
 json report(const std::string& verdict, const std::string& first, double p, const std::vector<std::string>& chosen,
             double remaining) {
   const std::string second = first == "none" ? "coil_gain" : "none";
-  return {{"schema", "fieldtrue.gap/1"},
-          {"verdict", verdict},
-          {"candidates",
-           {{{"effect", first}, {"class", {first}}, {"probability", p}, {"parameters", json::object()}},
-            {{"effect", second}, {"class", {second}}, {"probability", 1.0 - p}, {"parameters", json::object()}}}},
-          {"selected", selected(chosen)},
-          {"findings", json::array()},
-          {"remaining", {{"fraction_of_start", remaining}}}};
+  return {
+      {"schema", "fieldtrue.gap/1"},
+      {"verdict", verdict},
+      {"candidates",
+       {{{"effect", first}, {"class", {first}}, {"probability", p}, {"parameters", json::object()}},
+        {{"effect", second}, {"class", {second}}, {"probability", 1.0 - p}, {"parameters", json::object()}}}},
+      {"selected", selected(chosen)},
+      {"findings", json::array()},
+      {"remaining",
+       {{"fraction_of_start", remaining}, {"fraction_low90", remaining - 0.1}, {"fraction_high90", remaining + 0.1}}}};
 }
 
 json metalReport() {
@@ -151,6 +153,12 @@ struct Folder {
       records.push_back({{"file", one.file}, {"seconds", 2.0}, {"exit_status", one.answer.is_null() ? 1 : 0}});
     }
     replaceFile(path / "answers.json", json{{"sessions", records}}.dump());
+    json foretold = json::array();
+    const std::vector<std::pair<const char*, double>> left = {
+        {"s04", 0.15}, {"s05", 0.75}, {"s06", 0.2}, {"s07", 1.0}, {"s08", 0.3}};
+    for (const auto& [file, after_m2] : left)
+      foretold.push_back({{"file", file}, {"inside", {{"n", 150}, {"start_m2", 1.0}, {"after_m2", after_m2}}}});
+    replaceFile(path / "foretold.json", json{{"sessions", foretold}}.dump());
   }
 };
 
@@ -290,6 +298,15 @@ void BlindScoreTest::countsByHand_data() {
   row("Negative controls", "no cause named", "all", 2.0 / 3.0, 3);
   row("Negative controls", "no cause named", "mirrored", 0.0, 1);
   row("Time", "median", "all", 2.0, 14);
+  // 0.85, 0.25 and 0.8, nothing of s07, which saw no gap, and 0.7.
+  row("At places", "excess taken away in the hull, median", "all", 0.7, 5);
+  // Stated as 0.1, 0.5, 0.2 and 0.1, each give or take 0.1.
+  row("At places", "the interval of what is left holds it", "all", 0.5, 4);
+  row("At places", "what is left is stated within 0.1", "all", 0.5, 4);
+  row("True causes refused", "compact_metal", "all", 0.5, 2);
+  row("True causes refused", "compact_metal", "rho 0.35", 0.0, 1);
+  row("True causes refused", "width of the interval of what is left, median", "all", 0.2, 4);
+  row("True causes refused", "no interval of what is left can be told", "all", 0.0, 4);
 }
 
 void BlindScoreTest::countsByHand() {

@@ -152,6 +152,25 @@ void addAbstention(std::vector<Figure>& figures, const Sessions& single, const S
   section.addShares("in the catalogue, but so called", single, isAbstention, {}, atMost(0.05, kAllowance));
 }
 
+/// What a rule that would rather say nothing costs: true causes of the catalogue that it did not let through.
+void addRefusals(std::vector<Figure>& figures, const Sessions& single) {
+  std::set<std::string> ids;
+  for (const Session* session : single) ids.insert(session->effects.front().id);
+  Section section(figures, "True causes refused: a gap is seen, and called unexplained or partly explained");
+  for (const std::string& id : ids)
+    section.addShares(id, where(single, [&](const Session& session) { return session.effects.front().id == id; }),
+                      isAbstention);
+  section.addByStrength("width of the interval of what is left, median", "", single, [](const Sessions& some) {
+    std::vector<double> widths;
+    for (const Session* session : some)
+      if (const auto width = leftWidth(*session)) widths.push_back(*width);
+    return bootstrap(widths, [](std::span<const double> values) { return quantileOf(values, 0.5); });
+  });
+  section.addShares("no interval of what is left can be told",
+                    where(single, [](const Session& session) { return !session.answer.selected.empty(); }),
+                    [](const Session& session) { return !leftWidth(session); });
+}
+
 void addLocation(std::vector<Figure>& figures, const Sessions& single) {
   static const std::array<std::string, 5> kPlaced = {"compact_metal", "closed_loop", "metal_moved", "finite_plate", ""};
   const std::array<double, 4> medians = {20.0, 9.0, 6.0, 5.0};
@@ -402,6 +421,7 @@ Scoreboard scoreboardOf(std::span<const Session> sessions) {
   addTopOneByEffect(board.figures, single);
   addDetection(board.figures, none, single);
   addAbstention(board.figures, single, off);
+  addRefusals(board.figures, single);
   addLocation(board.figures, single);
   const Sessions pairs = onShelf(answered_for, "pairs");
   addShrinkage(board.figures, single, pairs);

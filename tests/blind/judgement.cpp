@@ -142,6 +142,12 @@ std::optional<bool> leftIsCovered(const Session& session) {
   return *answer.remaining_low90 <= *answer.left_inside && *answer.left_inside <= *answer.remaining_high90;
 }
 
+std::optional<double> leftWidth(const Session& session) {
+  const Answer& answer = session.answer;
+  if (answer.selected.empty() || !answer.remaining_low90 || !answer.remaining_high90) return std::nullopt;
+  return *answer.remaining_high90 - *answer.remaining_low90;
+}
+
 std::optional<double> leftStatedOff(const Session& session) {
   const Answer& answer = session.answer;
   if (answer.selected.empty() || !answer.left_inside || !answer.remaining_fraction) return std::nullopt;

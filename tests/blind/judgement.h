@@ -54,6 +54,8 @@ std::optional<double> foretoldShrinkage(const Session& session, bool is_inside);
 /// Whether the stated interval of what is left holds what `foretell` found left inside.
 /// @return nothing unless both are there and an effect was selected
 std::optional<bool> leftIsCovered(const Session& session);
+/// Of the stated 90 % interval of what is left; nothing where none is stated.
+std::optional<double> leftWidth(const Session& session);
 /// Stated less found share of what is left inside.
 std::optional<double> leftStatedOff(const Session& session);
 
