@@ -133,8 +133,8 @@ def main():
             counts[room] = held + holds(told), of + 1
             bend_mm, verdict, named, near, left, cpu_s = told
             off = f"{near[0]:5.1f} cm {near[1]:4.1f} deg" if near else "              -"
-            print(f"{room:22} {plan:20} {seed:4} {bend_mm:6.0f} mm  {verdict:16} {100 * left:5.1f} %  {off} {cpu_s:6.1f} s  {named}",
-                  flush=True)
+            print(f"{room:22} {plan:20} {seed:4} {bend_mm:6.0f} mm  {verdict:16} {100 * left:5.1f} %  {off} {cpu_s:6.1f} s  "
+                  f"{named}", flush=True)
     print("\n| room | as a strong bend must be |\n|---|---|")
     for room, (held, of) in counts.items():
         print(f"| {room} | {held} of {of} |")
