@@ -45,6 +45,10 @@ Pose displaced(const Pose& stated, const EffectResponse& response) {
   return actual;
 }
 
+Eigen::Matrix3d totalField_per_m3(const SensorSetting& setting, const EffectResponse& response) {
+  return dipoleField(setting.tracker_from_sensor.position_m + response.shift_m, 1.0) + response.field_per_m3;
+}
+
 std::optional<Pose> reportedPose(const SensorSetting& setting, const EffectResponse& response,
                                  const Eigen::Vector3d& near_m) {
   const Pose actual = displaced(setting.tracker_from_sensor, response);

@@ -21,6 +21,10 @@ Pose displaced(const Pose& stated, const EffectResponse& response);
 std::optional<Pose> reportedPose(const SensorSetting& setting, const EffectResponse& response,
                                  const Eigen::Vector3d& near_m);
 
+/// The field matrix at the sensor of a setting whose effects respond so, in units in which the transmitter's own is
+/// G(p; C = 1).
+Eigen::Matrix3d totalField_per_m3(const SensorSetting& setting, const EffectResponse& response);
+
 /// Derivative of the solved pose (position, rotation vector in the tracker frame) by the nine field components
 /// (column-major) for a tracker that takes the unweighted least-squares dipole: (B^T B)^-1 B^T, B = [dG/dp, -[e_k]x G].
 /// @param p_m solved position, C = 1

@@ -201,7 +201,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
 
   const bool is_mirrored = identify::isMirrored(rows);
   addInputFindings(metadata, is_mirrored, report);
-  const identify::GapSearch search(rows, std::move(believed));
+  const identify::GapSearch search(rows, std::move(believed), identify::NoiseFrom::kResiduals, control);
   identify::EffectSelectionOptions selecting;
   const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
   selecting.most_effects = has_enough && !is_mirrored && known_gap.value_or(true) ? options.most_effects : 0;

@@ -36,7 +36,7 @@ class FoldFitter {
         scores_(scores),
         ways_(shortList(selection)) {
     if (selection.ways.empty()) return;
-    const identify::Linearized at(search.physics(), search.none().model, search.whitening(), blocks,
+    const identify::Linearized at(search.physics(), search.seenFrom(search.none().model), search.whitening(), blocks,
                                   identify::ResponseAt::kHalfWayIfBent);
     for (const std::size_t way : ways_) first_.push_back(scanned(at, way));
   }
@@ -67,8 +67,9 @@ class FoldFitter {
 
   /// Adds the effect that the fold's own rows like best, if they like any.
   bool addBest(int block, std::span<const char> used, std::size_t step, identify::GapModel& model) const {
-    const identify::Linearized at(search_.physics(), step == 0 ? search_.none().model : model, search_.whitening(),
-                                  blocks_, identify::ResponseAt::kHalfWayIfBent);
+    const identify::GapModel from = search_.seenFrom(step == 0 ? search_.none().model : model);
+    const identify::Linearized at(search_.physics(), from, search_.whitening(), blocks_,
+                                  identify::ResponseAt::kHalfWayIfBent);
     const auto held_out = static_cast<std::size_t>(block);
     struct Start {
       std::size_t way = 0;
@@ -93,7 +94,7 @@ class FoldFitter {
     double best = base - (step == 0 ? identify::EffectSelectionOptions{}.least_gain_first
                                     : identify::EffectSelectionOptions{}.least_gain_more) *
                              n / static_cast<double>(used.size() * static_cast<std::size_t>(channels()));
-    const identify::GapModel before = model;
+    const identify::GapModel before = search_.seenFrom(model);
     bool is_added = false;
     for (const Start& start : starts) {
       const identify::EffectWay& way = search_.ways()[start.way];

@@ -164,14 +164,25 @@ LinearPrior priorOf(const effects::EffectFit& fit) {
   return prior;
 }
 
-namespace {
-
-/// Whether poses are bent so far that what moved them must be taken half way along.
 bool isBentStrongly(std::span<const Vector6d> residuals, const Whitening& whitening, int channels) {
   constexpr double kStrongly = 5.0;  // RMS, in noise.
   double squares = 0.0;
   for (const Vector6d& left : whitened({residuals.begin(), residuals.end()}, whitening)) squares += left.squaredNorm();
   return squares > kStrongly * kStrongly * static_cast<double>(residuals.size()) * channels;
+}
+
+namespace {
+
+/// Reported minus actual poses: what effects do to them [m, rad].
+std::vector<Vector6d> movedBy(std::span<const field::SensorSetting> at, std::span<const Pose> reported, int channels) {
+  std::vector<Vector6d> moved(at.size(), Vector6d::Zero());
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const Pose& actual = at[i].tracker_from_sensor;
+    moved[i].head<3>() = reported[i].position_m - actual.position_m;
+    if (channels == 6)
+      moved[i].tail<3>() = rotationVector_rad(reported[i].orientation * actual.orientation.conjugate());
+  }
+  return moved;
 }
 
 }  // namespace
@@ -182,8 +193,8 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
   std::iota(order_.begin(), order_.end(), std::size_t{0});
   std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) { return block[a] < block[b]; });
   const std::vector<field::SensorSetting> at = physics.settings(state.alignment);
-  const std::vector<field::EffectResponse> sum = physics.responses(state, at);
-  const std::vector<Vector6d> residuals = physics.residuals(state);
+  const std::vector<Pose> reported = physics.predictions(state);
+  const std::vector<Vector6d> residuals = physics.residuals(reported);
   const auto n = static_cast<Eigen::Index>(order_.size());
   const GapRows& rows = physics.rows();
   n_prior_ = rows.alignment_known && hasFreeAlignment(rows) ? 6 : 0;
@@ -196,10 +207,7 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
     white_position_.push_back(whitening.position[i]);
     white_rotation_.push_back(whitening.rotation[i]);
     const Eigen::Vector3d from_m = rows.rows[i].tracker_from_sensor.position_m - way * residuals[i].head<3>();
-    const Eigen::Matrix<double, 6, 9> by_field = field::poseByField(from_m);
-    white_by_field_.emplace_back();
-    white_by_field_.back().topRows<3>() = white_position_.back() * by_field.topRows<3>();
-    white_by_field_.back().bottomRows<3>() = white_rotation_.back() * by_field.bottomRows<3>();
+    white_by_field_.push_back(whiteOf(k, field::poseByField(from_m)));
     const Eigen::Index row = static_cast<Eigen::Index>(k) * channels_;
     residual_.segment<3>(row) = white_position_.back() * residuals[i].head<3>();
     if (channels_ == 6) residual_.segment<3>(row + 3) = white_rotation_.back() * residuals[i].tail<3>();
@@ -207,8 +215,51 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
     if (static_cast<std::size_t>(b) >= segments_.size()) segments_.push_back({row, 0});
     segments_.back().count += channels_;
   }
+  if (isBentStrongly(movedBy(at, reported, channels_), whitening, channels_)) bend(physics, state, reported);
   addAlignment(rows, state.alignment);
   addTerms(state);
+}
+
+template <int kColumns>
+Eigen::Matrix<double, 6, kColumns> Linearized::whiteOf(std::size_t k,
+                                                       const Eigen::Matrix<double, 6, kColumns>& change) const {
+  Eigen::Matrix<double, 6, kColumns> white;
+  white.template topRows<3>() = white_position_[k] * change.template topRows<3>();
+  white.template bottomRows<3>() = white_rotation_[k] * change.template bottomRows<3>();
+  return white;
+}
+
+/// Where the state's own effects bend strongly, what moves the sensor is not reported as it is: the field that it moves
+/// in is not the one that the tracker knows, and the tracker sees it turned. With the field F at the sensor,
+/// G(reported) = Q F, Q from the actual to the reported orientation; so d reported = poseByField(reported) Q dF.
+void Linearized::bend(const GapPhysics& physics, const GapModel& state, std::span<const Pose> reported) {
+  constexpr double kStep_m = 1e-4;
+  const std::vector<field::EffectResponse> here = physics.responses(state, settings_);
+  std::vector<Eigen::Matrix<double, 6, 6>> by_placing(settings_.size(), Eigen::Matrix<double, 6, 6>::Zero());
+  std::vector<Eigen::Matrix<double, 6, 9>> by_field;
+  for (std::size_t k = 0; k < settings_.size(); ++k) {
+    const Pose& pose = reported[order_[k]];
+    const Eigen::Quaterniond actual = field::displaced(settings_[k].tracker_from_sensor, here[k]).orientation;
+    const Eigen::Matrix3d turn = (pose.orientation * actual.conjugate()).toRotationMatrix();
+    by_field.push_back(field::poseByField(pose.position_m));
+    for (int coil = 0; coil < 3; ++coil)
+      by_field[k].middleCols<3>(3 * coil) = (by_field[k].middleCols<3>(3 * coil) * turn).eval();
+    by_placing[k].bottomRightCorner<3, 3>() = turn;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<field::SensorSetting> aside = settings_;
+    for (field::SensorSetting& one : aside) one.tracker_from_sensor.position_m[axis] += kStep_m;
+    const std::vector<field::EffectResponse> there = physics.responses(state, aside);
+    for (std::size_t k = 0; k < settings_.size(); ++k) {
+      const Eigen::Matrix3d slope =
+          (field::totalField_per_m3(aside[k], there[k]) - field::totalField_per_m3(settings_[k], here[k])) / kStep_m;
+      by_placing[k].col(axis) = by_field[k] * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(slope.data());
+    }
+  }
+  for (std::size_t k = 0; k < settings_.size(); ++k) {
+    white_by_field_[k] = whiteOf(k, by_field[k]);
+    white_by_placing_.push_back(whiteOf(k, by_placing[k]));
+  }
 }
 
 void Linearized::addAlignment(const GapRows& rows, const GapAlignment& alignment) {
@@ -253,6 +304,11 @@ void Linearized::addTerms(const GapModel& state) {
 Eigen::Matrix<double, 6, 1> Linearized::whitenedChange(std::size_t k, const field::EffectResponse& response) const {
   Eigen::Matrix<double, 6, 1> change =
       white_by_field_[k] * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(response.field_per_m3.data());
+  if (!white_by_placing_.empty()) {
+    change += white_by_placing_[k].leftCols<3>() * response.shift_m;
+    change += white_by_placing_[k].rightCols<3>() * response.turn_rad;
+    return change;
+  }
   change.head<3>() += white_position_[k] * response.shift_m;
   change.tail<3>() += white_rotation_[k] * response.turn_rad;
   return change;

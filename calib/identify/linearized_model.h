@@ -38,6 +38,9 @@ struct Segment {
   Eigen::Index count = 0;
 };
 
+/// Whether poses are bent so far that what moved them must be taken half way along.
+bool isBentStrongly(std::span<const Vector6d> residuals, const Whitening& whitening, int channels);
+
 /// Where the tracker's response is taken: at the model's pose, or, where poses are bent by many times their noise, half
 /// way from there to the reported one. What is half way follows the noise: a flexible fit would explain the noise by
 /// it.
@@ -70,6 +73,9 @@ class Linearized {
  private:
   void addAlignment(const GapRows& rows, const GapAlignment& alignment);
   void addTerms(const GapModel& state);
+  void bend(const GapPhysics& physics, const GapModel& state, std::span<const Pose> reported);
+  template <int kColumns>
+  Eigen::Matrix<double, 6, kColumns> whiteOf(std::size_t k, const Eigen::Matrix<double, 6, kColumns>& change) const;
   Eigen::Matrix<double, 6, 1> whitenedChange(std::size_t k, const field::EffectResponse& response) const;
 
   int channels_ = 6;
@@ -79,6 +85,7 @@ class Linearized {
   std::vector<Eigen::Matrix3d> white_position_;
   std::vector<double> white_rotation_;
   std::vector<Eigen::Matrix<double, 6, 9>> white_by_field_;
+  std::vector<Eigen::Matrix<double, 6, 6>> white_by_placing_;  ///< Empty: what moves the sensor is reported as it is.
   std::vector<Segment> segments_;
   Eigen::Index n_prior_ = 0;
   Eigen::VectorXd residual_;

@@ -58,14 +58,13 @@ std::vector<Pose> GapPhysics::predictions(const GapModel& model) const {
   return poses;
 }
 
-std::vector<Vector6d> GapPhysics::residuals(const GapModel& model) const {
-  const std::vector<Pose> poses = predictions(model);
+std::vector<Vector6d> GapPhysics::residuals(std::span<const Pose> predicted) const {
   std::vector<Vector6d> residuals(size(), Vector6d::Zero());
   for (std::size_t i = 0; i < size(); ++i) {
     const Pose& tracked = rows_.rows[i].tracker_from_sensor;
-    residuals[i].head<3>() = tracked.position_m - poses[i].position_m;
+    residuals[i].head<3>() = tracked.position_m - predicted[i].position_m;
     if (rows_.has_orientation)
-      residuals[i].tail<3>() = rotationVector_rad(tracked.orientation * poses[i].orientation.conjugate());
+      residuals[i].tail<3>() = rotationVector_rad(tracked.orientation * predicted[i].orientation.conjugate());
   }
   return residuals;
 }

@@ -52,7 +52,8 @@ class GapPhysics {
                                                std::span<const field::SensorSetting> settings) const;
   /// Tracked minus modelled position [m] and rotation vector from modelled to tracked [rad], tracker frame, per row.
   /// Rows the model cannot solve get a residual of 1 m and 1 rad.
-  std::vector<Vector6d> residuals(const GapModel& model) const;
+  std::vector<Vector6d> residuals(const GapModel& model) const { return residuals(predictions(model)); }
+  std::vector<Vector6d> residuals(std::span<const Pose> predicted) const;
   std::vector<Pose> predictions(const GapModel& model) const;
 
  private:

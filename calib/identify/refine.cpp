@@ -273,6 +273,16 @@ class JointFit {
     }
   }
 
+  bool mayBe(const GapTerm& term) const {
+    if (options_.bounded_by_places) return term.fit->allows(term.searched);
+    const std::vector<effects::FitParameter> bounds = term.fit->searched();
+    for (std::size_t d = 0; d < bounds.size(); ++d) {
+      const double value = term.searched[static_cast<Eigen::Index>(d)];
+      if (!(value >= bounds[d].low && value <= bounds[d].high)) return false;
+    }
+    return true;
+  }
+
   Applied apply(const Eigen::VectorXd& step, const Eigen::Vector3d& center_m, int n_alignment, GapModel& model) const {
     applyAlignmentStep(step.head(n_alignment), center_m, physics_.rows(), model.alignment);
     const bool is_bounded = physics_.rows().alignment_known && n_alignment > 0;
@@ -283,7 +293,7 @@ class JointFit {
       at += term.linear.size();
       term.searched += step.segment(at, term.searched.size());
       at += term.searched.size();
-      if (term.searched.size() > 0 && !term.fit->allows(term.searched)) return Applied::kForbidden;
+      if (term.searched.size() > 0 && !mayBe(term)) return Applied::kForbidden;
       const LinearPrior prior = priorOf(*term.fit);
       if (term.linear.size() == 1) term.linear[0] = std::clamp(term.linear[0], prior.low, prior.high);
     }

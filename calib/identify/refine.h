@@ -52,6 +52,7 @@ struct RefineOptions {
   ResidualLaw law;
   std::span<const char> used = {};  ///< Per row; empty = all.
   int most_steps = 30;
+  bool bounded_by_places = true;                      ///< Else searched parameters keep to their own bounds only.
   std::optional<Eigen::Index> frozen = std::nullopt;  ///< A parameter that stays as it is, counted as in `covariance`.
 };
 

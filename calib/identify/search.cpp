@@ -30,39 +30,111 @@ double pitchOf_m(std::span<const field::SensorSetting> settings) {
 
 }  // namespace
 
-GapSearch::GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed, NoiseFrom noise)
+GapSearch::GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed, NoiseFrom noise,
+                     const RunControl& control)
     : rows_(rows), physics_(rows, std::move(believed)), space_blocks_(octantBlocks(rows)) {
   time_blocks_ = rows.has_times ? timeBlocks(rows) : space_blocks_;
   none_.model.alignment = initialAlignment(rows);
   placing_sd_m_ = rows.placing_sd_m.value_or(kGuessedPlacing_m);
   placing_sd_rad_ = rows.placing_sd_rad.value_or(kGuessedPlacing_rad);
-  if (noise == NoiseFrom::kResiduals) settleNoise();
+  if (noise == NoiseFrom::kResiduals) structure_ = settleNoise(none_);
   whitening_ = makeWhitening(rows, placing_sd_m_, placing_sd_rad_);
   none_ = refineJointly(physics_, none_.model, whitening_, {law_});
+  vantage_ = none_.model.alignment;
   settleWays();
+  const std::optional<GapModel> strong = settleVantage(control);
+  if (!strong || noise != NoiseFrom::kResiduals) return;
+  RefinedModel beside{*strong, {}, 0, 0.0};
+  settleNoise(beside);
+  whitening_ = makeWhitening(rows, placing_sd_m_, placing_sd_rad_);
+  none_ = refineJointly(physics_, none_.model, whitening_, {law_});
+}
+
+/// A model without effects follows bent readings with its alignment, and from there nothing is seen where it is. So the
+/// likeliest of the simplest effects is looked for, and again from the alignment that stands beside it, as long as that
+/// makes one likelier.
+/// @return the model with it; none where readings are not bent strongly, or nothing makes them likelier
+std::optional<GapModel> GapSearch::settleVantage(const RunControl& control) {
+  constexpr int kMostRounds = 4;
+  constexpr double kLikelier = 2.0;  // In BIC units.
+  if (!isBent(none_.model)) return std::nullopt;
+  std::optional<GapModel> strong;
+  double best = bicOf(none_.model) - kLikelier;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const std::vector<GapModel> tried = simplestBesideAlignment(control);
+    std::vector<double> bic;
+    for (const GapModel& one : tried) bic.push_back(bicOf(one));
+    const auto likeliest = std::min_element(bic.begin(), bic.end());
+    if (likeliest == bic.end() || *likeliest >= best) break;
+    best = *likeliest - kLikelier;
+    strong = tried[static_cast<std::size_t>(likeliest - bic.begin())];
+    vantage_ = strong->alignment;
+    settleWays();
+  }
+  return strong;
+}
+
+/// One of the simplest effects each, fitted together with the alignment from several starts. Where the places stand is
+/// what is looked for, so none bounds where the effect may be.
+std::vector<GapModel> GapSearch::simplestBesideAlignment(const RunControl& control) const {
+  constexpr std::size_t kStrongStarts = 8;
+  constexpr std::size_t kMostParameters = 4;  // Of a plane, or a sphere.
+  const GapModel from = seenFrom(none_.model);
+  const Linearized at(physics_, from, whitening_, space_blocks_, ResponseAt::kHalfWayIfBent);
+  std::vector<GapModel> models;
+  for (const EffectWay& way : ways_) {
+    const std::size_t searched = way.fit->searched().size();
+    if (searched == 0 || way.needs_time || searched + way.fit->linear().size() > kMostParameters) continue;
+    for (const ScanResult::Start& start : scan(at, *way.fit, way.fit->starts(), kStrongStarts, control).best) {
+      const LocalFit local = refineLocally(at, *way.fit, start.searched);
+      models.push_back(from);
+      models.back().terms.push_back({way.effect, way.fit, local.searched, local.linear});
+    }
+  }
+  RefineOptions options;
+  options.law = law_;
+  options.bounded_by_places = false;
+  control.parallel_for(models.size(), [&](std::size_t i) {
+    if (!control.stop.stop_requested()) models[i] = refineJointly(physics_, models[i], whitening_, options).model;
+  });
+  return models;
+}
+
+bool GapSearch::isBent(const GapModel& model) const {
+  return isBentStrongly(physics_.residuals(model), whitening_, rows_.channels());
+}
+
+GapModel GapSearch::seenFrom(const GapModel& model) const {
+  if (!isBent(model)) return model;
+  GapModel from = model;
+  from.alignment = vantage_;
+  return from;
 }
 
 /// Where the rig's tolerance is not stated, it is what the flexible fit leaves beyond the samples' noise; the law of
 /// the residuals is the one under which that remainder is most likely.
-void GapSearch::settleNoise() {
+Structure GapSearch::settleNoise(RefinedModel& about) {
   constexpr int kRounds = 3;
+  Structure structure;
   for (int round = 0; round < kRounds; ++round) {
     whitening_ = makeWhitening(rows_, placing_sd_m_, placing_sd_rad_);
-    none_ = refineJointly(physics_, none_.model, whitening_, {});
-    structure_ =
-        findStructure(Linearized(physics_, none_.model, whitening_, space_blocks_), rows_, round == kRounds - 1);
+    about = refineJointly(physics_, about.model, whitening_, {});
+    structure =
+        findStructure(Linearized(physics_, about.model, whitening_, space_blocks_), rows_, round == kRounds - 1);
+    noise_left_ = structure.left;
     // A stated tolerance may be wrong: position and rotation must weigh as they deserve, so both follow the remainder.
     placing_sd_m_ = placingFrom(Channel::kPosition, placing_sd_m_);
     if (rows_.has_orientation) placing_sd_rad_ = placingFrom(Channel::kRotation, placing_sd_rad_);
   }
   double best = std::numeric_limits<double>::infinity();
   for (const double nu : {4.0, 8.0, 100.0}) {
-    const double deviance = devianceOf(structure_.left, rows_.has_orientation, {nu}).value;
+    const double deviance = devianceOf(noise_left_, rows_.has_orientation, {nu}).value;
     if (deviance < best) {
       best = deviance;
       law_.degrees_of_freedom = nu;
     }
   }
+  return structure;
 }
 
 /// The placing SD under which the whitened remainder of the flexible fit has unit scale, the samples' noise taken as
@@ -76,10 +148,10 @@ double GapSearch::placingFrom(Channel channel, double present) const {
     return own + placing * placing + kLeast * kLeast;
   };
   const auto scaleAt = [&](double placing) {
-    std::vector<Vector6d> left(structure_.left.size(), Vector6d::Zero());
+    std::vector<Vector6d> left(noise_left_.size(), Vector6d::Zero());
     for (std::size_t i = 0; i < left.size(); ++i) {
       const double factor = std::sqrt(varianceAt(rows_.rows[i], present) / varianceAt(rows_.rows[i], placing));
-      left[i].head<3>() = factor * (is_position ? structure_.left[i].head<3>() : structure_.left[i].tail<3>());
+      left[i].head<3>() = factor * (is_position ? noise_left_[i].head<3>() : noise_left_[i].tail<3>());
     }
     return normalScaleOf(left);
   };
@@ -104,7 +176,9 @@ double GapSearch::floorPlacingSd_m() const { return std::min(placing_sd_m_, wors
 double GapSearch::floorPlacingSd_rad() const { return std::min(placing_sd_rad_, worstPlacing_rad(rows_)); }
 
 void GapSearch::settleWays() {
-  settings_ = physics_.settings(none_.model.alignment);
+  ways_.clear();
+  design_ = {};
+  settings_ = physics_.settings(vantage_);
   design_.settings = settings_;
   for (const field::SensorSetting& setting : settings_) design_.places_m.extend(setting.tracker_from_sensor.position_m);
   design_.pitch_m = pitchOf_m(settings_);
@@ -153,7 +227,7 @@ RefinedModel GapSearch::refinedWithout(const GapModel& start, Eigen::Index froze
 }
 
 std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
-                                             const RefinedModel& base, const RunControl& control) const {
+                                             const GapModel& base, const RunControl& control) const {
   constexpr std::size_t kStarts = 5;
   const EffectWay& chosen = ways_[way];
   const Linearized& at = chosen.needs_time ? in_time : in_space;
@@ -167,7 +241,7 @@ std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& 
   return tried;
 }
 
-void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const RefinedModel& base,
+void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const GapModel& base,
                            TriedEffect& tried) const {
   const EffectWay& chosen = ways_[tried.way];
   constexpr double kHopeful = 0.4;  // Of the best start's gain.
@@ -185,12 +259,12 @@ void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Line
   const double gain = count * std::log(sum / left) - static_cast<double>(parametersOf({{}, {term}})) * std::log(count);
   if (gain <= tried.bic_gain) return;
   tried.bic_gain = gain;
-  tried.model = base.model;
+  tried.model = base;
   tried.model.terms.push_back(std::move(term));
 }
 
 void GapSearch::shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                             const RefinedModel& base, const RunControl& control) const {
+                             const GapModel& base, const RunControl& control) const {
   constexpr std::size_t kCenters = 4;
   constexpr std::size_t kStarts = 2;
   constexpr double kApart_m = 0.1;
@@ -246,16 +320,17 @@ void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& 
 }
 
 std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunControl& control) const {
-  const Linearized in_space(physics_, base.model, whitening_, space_blocks_, ResponseAt::kHalfWayIfBent);
-  const Linearized in_time(physics_, base.model, whitening_, time_blocks_, ResponseAt::kHalfWayIfBent);
+  const GapModel from = seenFrom(base.model);
+  const Linearized in_space(physics_, from, whitening_, space_blocks_, ResponseAt::kHalfWayIfBent);
+  const Linearized in_time(physics_, from, whitening_, time_blocks_, ResponseAt::kHalfWayIfBent);
   std::vector<TriedEffect> tried;
   for (std::size_t way = 0; way < ways_.size(); ++way) {
     if (control.stop.stop_requested()) return {};
-    if (auto one = tryWay(way, in_space, in_time, base, control)) tried.push_back(std::move(*one));
+    if (auto one = tryWay(way, in_space, in_time, from, control)) tried.push_back(std::move(*one));
   }
   const auto better = [](const TriedEffect& a, const TriedEffect& b) { return a.bic_gain > b.bic_gain; };
   std::stable_sort(tried.begin(), tried.end(), better);
-  shareCenters(tried, in_space, in_time, base, control);
+  shareCenters(tried, in_space, in_time, from, control);
   std::stable_sort(tried.begin(), tried.end(), better);
   finishBest(tried, base, control);
   for (TriedEffect& one : tried) {

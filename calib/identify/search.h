@@ -40,7 +40,7 @@ class GapSearch {
  public:
   /// @param rows outlives the search
   GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed,
-            NoiseFrom noise = NoiseFrom::kResiduals);
+            NoiseFrom noise = NoiseFrom::kResiduals, const RunControl& control = {});
   GapSearch(const GapSearch&) = delete;
   GapSearch& operator=(const GapSearch&) = delete;
 
@@ -48,10 +48,16 @@ class GapSearch {
   const Whitening& whitening() const { return whitening_; }
   const ResidualLaw& law() const { return law_; }
   std::span<const EffectWay> ways() const { return ways_; }
+  /// Where a model without the effect that bends the readings most is looked at from when effects are added to it: its
+  /// own alignment follows the bent readings; what stands in its place is that of the likeliest single effect.
+  GapModel seenFrom(const GapModel& model) const;
   std::span<const int> spaceBlocks() const { return space_blocks_; }
   std::span<const int> timeBlocksOfRows() const { return time_blocks_; }
   const RefinedModel& none() const { return none_; }
   const Structure& structureOfNone() const { return structure_; }
+  /// Whitened residuals that a flexible fit leaves, by row: beside the likeliest single effect where readings are bent
+  /// strongly, for a flexible fit alone does not follow such an effect.
+  std::span<const Vector6d> noiseLeft() const { return noise_left_; }
   const effects::FitDesign& design() const { return design_; }
   double placingSd_m() const { return placing_sd_m_; }
   double placingSd_rad() const { return placing_sd_rad_; }
@@ -74,17 +80,20 @@ class GapSearch {
  private:
   enum class Channel { kPosition, kRotation };
 
-  void settleNoise();
+  Structure settleNoise(RefinedModel& about);
   double placingFrom(Channel channel, double present) const;
   void settleWays();
+  std::optional<GapModel> settleVantage(const RunControl& control);
+  bool isBent(const GapModel& model) const;
+  std::vector<GapModel> simplestBesideAlignment(const RunControl& control) const;
   std::optional<TriedEffect> tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
-                                    const RefinedModel& base, const RunControl& control) const;
+                                    const GapModel& base, const RunControl& control) const;
   /// Keeps the best of what local refinement makes of the starts, where it beats what `tried` has.
-  void refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const RefinedModel& base,
+  void refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const GapModel& base,
                   TriedEffect& tried) const;
   /// Where one thing in the room fits well, others may fit too: each is tried at the places of the best.
   void shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                    const RefinedModel& base, const RunControl& control) const;
+                    const GapModel& base, const RunControl& control) const;
   void finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const;
   void finish(TriedEffect& tried, double base_bic) const;
 
@@ -97,7 +106,9 @@ class GapSearch {
   Whitening whitening_;
   ResidualLaw law_;
   RefinedModel none_;
+  GapAlignment vantage_;  ///< Of the likeliest single effect where readings are bent strongly, else of no effect.
   Structure structure_;
+  std::vector<Vector6d> noise_left_;
   std::vector<field::SensorSetting> settings_;
   effects::FitDesign design_;
   std::vector<EffectWay> ways_;

@@ -35,7 +35,7 @@ std::vector<FieldPoint> fieldPoints(const GapSearch& search, const GapAlignment&
 
 Eigen::VectorXd noiseVariances(const GapSearch& search, bool rotation) {
   const GapRows& rows = search.physics().rows();
-  const std::vector<Vector6d>& left = search.structureOfNone().left;
+  const std::span<const Vector6d> left = search.noiseLeft();
   const int first = rotation ? 3 : 0;
   Eigen::VectorXd variances(static_cast<Eigen::Index>(rows.rows.size()));
   for (Eigen::Index i = 0; i < variances.size(); ++i) {

@@ -45,6 +45,9 @@ Match isNearly(const Eigen::VectorXd& seen, const Eigen::VectorXd& expected, dou
           QByteArray::number(off) + " off a column of length " + QByteArray::number(expected.norm())};
 }
 
+/// What no dipole makes of the field is left out of the columns.
+constexpr double kInABentField = 0.2;
+
 /// The middle one of the starts that are allowed.
 Eigen::VectorXd middleStart(const effects::EffectFit& fit) {
   std::vector<Eigen::VectorXd> starts = fit.starts();
@@ -123,6 +126,41 @@ class LinearizedModelTest : public QObject {
           differenceBy(search, state, at.order(), 0.05 / column.norm(),
                        [&](GapModel& model, double step) { model.terms[0].searched[d] += step; });
       FT_VERIFY_MATCH(isNearly(column, seen, 0.05));
+    }
+  }
+
+  /// Where the model's own floor bends poses by decimetres, a shift of the rig is not reported as it is.
+  void columnsHoldOverAStrongFloor() {
+    simulation::Scene scene = gapScene();
+    scene.effects.push_back({"metal_plane", nlohmann::json::parse(R"({"distance_m": 0.9, "strength": 0.8})")});
+    const CalibrationTable table = recordedIn(scene, gapPlan({.counts = {6, 3, 3}, .pitch_m = 0.3}));
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const GapSearch search(rows, {});
+    const std::vector<TriedEffect> tried = search.rank(search.none(), {});
+    QVERIFY(!tried.empty() && !tried.front().refined.model.terms.empty());
+    const GapModel& state = tried.front().refined.model;
+    QCOMPARE(state.terms[0].effect->id, std::string("metal_plane"));
+    const Linearized at(search.physics(), state, search.whitening(), search.spaceBlocks());
+    const Linearized as_it_is(search.physics(), {state.alignment, {}}, search.whitening(), search.spaceBlocks());
+    const Eigen::Vector3d center_m = alignmentCenter_m(at.settings());
+    double off = 0.0;
+    double off_as_it_is = 0.0;
+    for (int k = 0; k < at.nAlignment(); ++k) {
+      const Eigen::VectorXd seen = differenceBy(search, state, at.order(), 1e-5, [&](GapModel& model, double step) {
+        applyAlignmentStep(step * Eigen::VectorXd::Unit(at.nAlignment(), k), center_m, rows, model.alignment);
+      });
+      FT_VERIFY_MATCH(isNearly(at.nuisance().col(k), seen, kInABentField));
+      off += (at.nuisance().col(k) - seen).norm();
+      off_as_it_is += (as_it_is.nuisance().col(k) - seen).norm();
+    }
+    QVERIFY2(off < 0.5 * off_as_it_is, qPrintable(QString::number(off / off_as_it_is)));
+    const Eigen::Index n_linear = state.terms[0].linear.size();
+    for (Eigen::Index d = 0; d < state.terms[0].searched.size(); ++d) {
+      const Eigen::VectorXd column = at.nuisance().col(at.nAlignment() + n_linear + d);
+      const Eigen::VectorXd seen =
+          differenceBy(search, state, at.order(), 0.05 / column.norm(),
+                       [&](GapModel& model, double step) { model.terms[0].searched[d] += step; });
+      FT_VERIFY_MATCH(isNearly(column, seen, kInABentField));
     }
   }
 

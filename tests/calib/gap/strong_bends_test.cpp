@@ -1,0 +1,76 @@
+#include <QTest>
+#include <cmath>
+
+#include "calib/core/units.h"
+#include "calib/gap/diagnosis.h"
+#include "tests/calib/gap/gap_fixtures.h"
+#include "tests/support/matchers.h"
+#include "tests/support/test_main.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::gap;
+using namespace fieldtrue::testing;
+
+namespace {
+
+/// A rig placed within 5 mm, its frame 0.6 m before the transmitter; one plane straight below the transmitter.
+simulation::Scene overFloor(double distance_m, const char* material, double strength) {
+  simulation::Scene scene;
+  scene.reference_from_tracker.position_m = {-0.6, 1.2192, 0.9144};
+  scene.rig.tolerance_m = 0.005;
+  scene.effects.push_back(
+      {"metal_plane",
+       {{"toward", {0.0, 0.0, -1.0}}, {"distance_m", distance_m}, {"material", material}, {"strength", strength}}});
+  return scene;
+}
+
+std::vector<PlannedPlace> movedBy(const Eigen::Vector3d& origin_m, const GapPlan& options) {
+  std::vector<PlannedPlace> plan = gapPlan(options);
+  for (PlannedPlace& place : plan) place.reference_from_sensor.position_m += origin_m;
+  return plan;
+}
+
+}  // namespace
+
+/// Readings bent by more than a decimetre draw the rig's alignment with them; what bends them is found all the same.
+class StrongBendsTest : public QObject {
+  Q_OBJECT
+ private slots:
+  void aFloorIsFound_data() {
+    QTest::addColumn<double>("distance_m");
+    QTest::addColumn<QByteArray>("material");
+    QTest::addColumn<double>("strength");
+    QTest::addColumn<bool>("is_scattered");
+    QTest::newRow("conducting, the lowest places 14 cm above it") << 1.5 << QByteArray("conductive") << 0.6 << false;
+    QTest::newRow("ferromagnetic, the lowest places 44 cm above it")
+        << 1.8 << QByteArray("ferromagnetic") << 1.0 << false;
+    QTest::newRow("conducting, scattered places") << 1.5 << QByteArray("conductive") << 0.6 << true;
+  }
+  void aFloorIsFound() {
+    QFETCH(double, distance_m);
+    QFETCH(QByteArray, material);
+    QFETCH(double, strength);
+    QFETCH(bool, is_scattered);
+    GapPlan options;
+    options.counts = is_scattered ? std::array{3, 5, 4} : std::array{5, 5, 4};
+    options.pitch_m = is_scattered ? 0.6 : 0.3;
+    options.is_scattered = is_scattered;
+    const Eigen::Vector3d origin_m =
+        is_scattered ? Eigen::Vector3d(0.0, 0.0, -0.1) : Eigen::Vector3d(0.45, -0.6, -0.45);
+    const simulation::Scene scene = overFloor(distance_m, material.constData(), strength);
+    const auto report = diagnose(recordedIn(scene, movedBy(origin_m, options)), nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY2(report->position_rms_mm > 120.0, qPrintable(QString::number(report->position_rms_mm)));
+    QVERIFY2(report->verdict == GapVerdict::kExplained, report->text.c_str());
+    const SelectedEffect& floor = report->selected.front();
+    QCOMPARE(floor.effect, std::string("metal_plane"));
+    QCOMPARE(floor.material.value_or(""), material.toStdString());
+    QVERIFY(std::abs(floor.location_m->norm() - distance_m) < 0.1);
+    const double leaning_rad = std::acos(-floor.location_m->normalized().z());
+    QVERIFY2(leaning_rad < 5.0 / kDegPerRad, qPrintable(QString::number(leaning_rad * kDegPerRad)));
+    QVERIFY2(report->remaining.fraction < 0.02, qPrintable(QString::number(report->remaining.fraction)));
+  }
+};
+
+FIELDTRUE_TEST(StrongBendsTest)
+#include "strong_bends_test.moc"
