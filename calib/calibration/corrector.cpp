@@ -5,6 +5,7 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/coincident_places.h"
+#include "calib/calibration/placed_sensors.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/baked/baked_position.h"
 #include "calib/correctors/base/fit_checks.h"
@@ -136,13 +137,15 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   FT_TRY(const auto position_method, correctors::findPositionMethod(choice.position_id));
   FT_TRY(const auto orientation_method, correctors::findOrientationMethod(choice.orientation_id));
 
+  const PlacedSensors placed = placedSensors(nodes, align);
+  nodes = placed.nodes;
   Parts parts;
   if (align == AlignMode::kRigid) {
     FT_TRY(auto alignment, fitAlignment(nodes));
     parts.alignment = alignment;
   }
   std::vector<Node> rows(nodes.begin(), nodes.end());
-  std::vector<std::string> notes{joinCoincidentPlaces(rows), orientationNote(nodes)};
+  std::vector<std::string> notes{joinCoincidentPlaces(rows), placed.note(), orientationNote(nodes)};
   const PartsFit fit{*position_method, *orientation_method, metadata, choice, control, parts.alignment, notes};
   const std::vector<int> sensors = sensorsOf(rows);
   const Wanted apart{choice.separate_position && sensors.size() > 1, choice.separate_orientation && sensors.size() > 1};

@@ -1,10 +1,12 @@
 #include "calib/evaluation/held_out_job.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/coincident_places.h"
+#include "calib/calibration/placed_sensors.h"
 #include "calib/evaluation/held_out.h"
 
 namespace fieldtrue::evaluation {
@@ -30,8 +32,11 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
     return fail(ErrorCode::kTooFewNodes, table.nodes.empty()
                                              ? "The table has no rows to compare methods on"
                                              : "Every row of the table is skipped; nothing is left to compare");
-  if (std::string note = calibration::joinCoincidentPlaces(job.nodes); !note.empty())
-    job.notes.push_back(std::move(note));
+  job.align = options.align.value_or(calibration::defaultAlignMode(table.metadata));
+  calibration::PlacedSensors placed = calibration::placedSensors(job.nodes, job.align);
+  job.nodes = std::move(placed.nodes);
+  for (std::string& note : std::array{calibration::joinCoincidentPlaces(job.nodes), placed.note()})
+    if (!note.empty()) job.notes.push_back(std::move(note));
   auto candidates = candidatesOf(options);
   if (!candidates) return tl::unexpected(candidates.error());
   job.candidates = *std::move(candidates);
@@ -42,7 +47,6 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
     return candidate.is_tuned || candidate.is_costly;
   });
   job.validation = options.validation.value_or(defaultValidation(table, needs_refits));
-  job.align = options.align.value_or(calibration::defaultAlignMode(table.metadata));
   job.has_orientation =
       std::all_of(job.nodes.begin(), job.nodes.end(), [](const Node& node) { return node.has_orientation; });
   auto folds = makeFolds(job.nodes, job.validation, options.seed);
