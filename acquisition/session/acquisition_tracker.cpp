@@ -1,6 +1,7 @@
 #include "acquisition/session/acquisition_tracker.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "acquisition/session/acquisition_impl.h"
@@ -290,14 +291,37 @@ void AcquisitionController::Impl::remarkOnMissing() {
   emit owner->remarked(QString::fromStdString(text));
 }
 
+namespace {
+
+/// Where a tracker names its sensors, which of its numbers stand for another one now: "sensor 0 being C, not B".
+std::string exchangedText(const TableMetadata& known, const TableMetadata& said) {
+  static const std::string kBefore = "_sensor_";
+  std::string text;
+  for (const auto& [key, name] : said.other) {
+    const std::size_t at = key.rfind(kBefore);
+    const auto before = known.other.find(key);
+    if (at == std::string::npos || before == known.other.end() || before->second == name) continue;
+    const int station = std::atoi(key.c_str() + at + kBefore.size());
+    if (station < 1) continue;
+    text += (text.empty() ? "" : ", ") + ("sensor " + std::to_string(station - 1)) + " being " + name + ", not " +
+            before->second;
+  }
+  return text;
+}
+
+}  // namespace
+
 void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {
   other_tracker.reset();
   const bool is_other = known.tracker && said.tracker && *known.tracker != *said.tracker;
-  const std::string change = differenceText(known.setup, said.setup);
+  std::string change = differenceText(known.setup, said.setup);
+  if (const std::string exchanged = exchangedText(known, said); !exchanged.empty())
+    change += (change.empty() ? "" : ", ") + exchanged;
   if (!is_other && change.empty()) return;
   if (std::all_of(places.rows.begin(), places.rows.end(), [](const auto& rows) { return rows.empty(); })) {
     if (is_other) known.tracker = said.tracker;
     for (const auto& [key, value] : said.setup) known.setup[key] = value;
+    for (const auto& [key, value] : said.other) known.other[key] = value;
     return;
   }
   other_tracker = is_other ? *said.tracker : "a set-up with " + change;

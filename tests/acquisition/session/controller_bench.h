@@ -20,6 +20,7 @@ class FakeTracker : public acquisition::TrackerDevice {
   Pose true_pose{{-1.0, -1.0, -1.0}, Eigen::Quaterniond::Identity()};
   std::vector<Pose> guided;
   QString tracker_name = QStringLiteral("fake");
+  std::map<std::string, std::string> facts;  ///< What it says of itself beside.
   /// A sensor on the jig.
   struct OnJig {
     Pose jig_from_sensor;
@@ -36,6 +37,7 @@ class FakeTracker : public acquisition::TrackerDevice {
     TableMetadata metadata;
     metadata.tracker = tracker_name.toStdString();
     metadata.rate_hz = kRate_hz;
+    metadata.other.insert(facts.begin(), facts.end());
     return metadata;
   }
 
