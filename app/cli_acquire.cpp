@@ -70,7 +70,7 @@ bool holdsNothing(const QString& session_path) {
 /// Why a trace would not fit onto its disk; empty where it would.
 std::string noRoomFor(const std::string& trace) {
   // Bytes, and a row of numbers for each chunk of them that is kept.
-  constexpr auto kMostOfFile = static_cast<qint64>(2 * acquisition::LineTrace::kMostBytes);
+  constexpr auto kMostOfFile = 2 * static_cast<qint64>(acquisition::LineTrace::kMostBytes);
   const qint64 free = QStorageInfo(QFileInfo(QString::fromStdString(trace)).path()).bytesAvailable();
   if (free < 0 || free >= kMostOfFile) return {};
   return "--trace " + trace + ": its disk has " + std::to_string(free >> 20) + " MiB free, and a trace may need " +

@@ -24,12 +24,11 @@ Result<std::vector<int>> readSensors(const std::string& text) {
   if (text.empty() || text == "all") return sensors;
   for (std::size_t from = 0; from <= text.size();) {
     const std::size_t end = std::min(text.find('+', from), text.size());
-    const std::string part = text.substr(from, end - from);
-    const int sensor = numberOf(part);
+    const int sensor = numberOf(text.substr(from, end - from));
     if (sensor < 0 || sensor > kMostNumber)
       return fail(ErrorCode::kBadInput, "'" + text + "' names no sensors: all, 0 or 0+2 (numbers up to 1000) do");
     if (std::find(sensors.begin(), sensors.end(), sensor) != sensors.end())
-      return fail(ErrorCode::kBadInput, "'" + text + "' names sensor " + part + " twice");
+      return fail(ErrorCode::kBadInput, "'" + text + "' names sensor " + std::to_string(sensor) + " twice");
     sensors.push_back(sensor);
     from = end + 1;
   }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "calib/core/number_text.h"
+#include "calib/core/file_io.h"
 
 namespace fieldtrue::calibration {
 namespace {
