@@ -26,7 +26,7 @@ CalibrationTable rideOnOneJig(int n_sensors, bool is_turned, double noise_sd_m =
   CalibrationTable table;
   for (int n = 0; n < 48; ++n) {
     const Eigen::Vector3d turn = is_turned ? Eigen::Vector3d(n % 3, n % 2, 0.3 * (n % 5)) : Eigen::Vector3d::Zero();
-    const Pose jig{0.3 * Eigen::Vector3d(n % 4, n / 4 % 4, n / 16), rotationFromVector(turn)};
+    const Pose jig{0.3 * Eigen::Vector3i(n % 4, n / 4 % 4, n / 16).cast<double>(), rotationFromVector(turn)};
     for (int sensor = 0; sensor < n_sensors; ++sensor) {
       Node node;
       node.node = n;
