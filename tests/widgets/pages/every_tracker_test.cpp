@@ -188,10 +188,11 @@ class EveryTrackerTest : public WindowDriver {
     }
   }
 
+  /// Each to where it sits on the jig.
   void correctsBoth(const calibration::Corrector& corrector, const Pose& truth) {
     for (std::size_t i = 0; i < 2; ++i) {
-      const Pose seen = inverse(kReferenceFromTracker) * truth * Pose{jigToSensor_m(i), Eigen::Quaterniond::Identity()};
-      FT_VERIFY_MATCH(near(corrector.correct(seen, sensors_[i]), truth, 5e-4, 2e-3));
+      const Pose own = truth * Pose{jigToSensor_m(i), Eigen::Quaterniond::Identity()};
+      FT_VERIFY_MATCH(near(corrector.correct(inverse(kReferenceFromTracker) * own, sensors_[i]), own, 5e-4, 2e-3));
     }
   }
 
