@@ -103,7 +103,7 @@ class EveryTrackerTest : public WindowDriver {
     if (QTest::currentTestFailed()) return;
     click("step_signal");
     QTRY_COMPARE_WITH_TIMEOUT(find<QTableWidget>("sensorTable")->rowCount(), 2, kConnectMs);
-    QTRY_VERIFY_WITH_TIMEOUT(find<QLabel>("answer_noise")->text().contains(QStringLiteral("SD")), kConnectMs);
+    QTRY_VERIFY_WITH_TIMEOUT(find<QLabel>("answer_noise")->text().contains(QStringLiteral("SD")), 2 * kConnectMs);
     picture(QStringLiteral("signal-") + kind);
     makePlan();
     if (QTest::currentTestFailed()) return;
