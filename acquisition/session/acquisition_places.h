@@ -58,8 +58,8 @@ struct KnownPlaces {
   std::vector<std::vector<Node>> rows;  ///< Of each place: one a sensor, the leading one first.
   /// Where each place's take belongs [m], NaN without one that counts: small, for each new take looks through all.
   std::vector<Eigen::Vector3d> takes_m;
-  std::vector<Node>
-      done_nodes;  ///< The leading rows not skipped, in any order: kept up, for gathering them costs each take more.
+  /// The leading rows not skipped, in any order: kept up, for gathering them costs each take more.
+  std::vector<Node> done_nodes;
   bool can_undo = false, can_redo = false;
   std::map<std::size_t, double> misfits;  ///< Places whose takes do not fit the others, and how far they are off [m].
 

@@ -240,7 +240,7 @@ std::size_t answerAll(const Request& request, const std::vector<std::string>& fi
 }  // namespace
 
 int runAnswer(std::span<const std::string> words) {
-  try {
+  return statusOf([&] {
     const Request request = requestOf(words);
     const std::vector<std::string> asked = filesOf(openSealed(request.folder), request);
     if (::access(request.cli.c_str(), X_OK) != 0)
@@ -251,14 +251,7 @@ int runAnswer(std::span<const std::string> words) {
     if (files.size() < asked.size())
       std::cout << "; " << asked.size() - files.size() << " had been answered before (--again replaces them)";
     std::cout << "\n";
-    return 0;
-  } catch (const std::invalid_argument& error) {
-    std::cerr << error.what() << "\n";
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 1;
-  }
+  });
 }
 
 }  // namespace blind

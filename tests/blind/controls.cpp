@@ -127,16 +127,7 @@ void writeFolder(const std::map<std::string, std::string>& options) {
 
 int runControls(std::span<const std::string> words) {
   static constexpr std::string_view kWithValue[] = {"--in", "--out", "--count"};
-  try {
-    writeFolder(optionsOf(words, "controls", kWithValue, {}));
-    return 0;
-  } catch (const std::invalid_argument& error) {
-    std::cerr << error.what() << "\n";
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 1;
-  }
+  return statusOf([&] { writeFolder(optionsOf(words, "controls", kWithValue, {})); });
 }
 
 }  // namespace blind

@@ -177,7 +177,7 @@ json foretellAll(const Trial& trial) {
 }  // namespace
 
 int runForetell(std::span<const std::string> words) {
-  try {
+  return statusOf([&] {
     const Trial trial = trialOf(words);
     const json all = foretellAll(trial);
     replaceFile(trial.folder / "foretold.json", all.dump(1));
@@ -185,14 +185,7 @@ int runForetell(std::span<const std::string> words) {
     const auto failed =
         std::count_if(entries.begin(), entries.end(), [](const json& entry) { return entry.contains("trouble"); });
     std::cout << entries.size() << " scenes put to the test, " << failed << " of them could not be simulated\n";
-    return 0;
-  } catch (const std::invalid_argument& error) {
-    std::cerr << error.what() << "\n";
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 1;
-  }
+  });
 }
 
 }  // namespace blind

@@ -31,20 +31,13 @@ Scoreboard boardOf(const std::map<std::string, std::string>& options) {
 
 int runScore(std::span<const std::string> words) {
   static constexpr std::string_view kWithValue[] = {"--in", "--controls", "--json", "--markdown"};
-  try {
+  return statusOf([&] {
     const auto options = optionsOf(words, "score", kWithValue, {});
     const Scoreboard board = boardOf(options);
     if (options.count("--json") > 0) replaceFile(options.at("--json"), toJson(board).dump(1) + "\n");
     if (options.count("--markdown") > 0) replaceFile(options.at("--markdown"), markdown(board));
     std::cout << plainText(board);
-    return 0;
-  } catch (const std::invalid_argument& error) {
-    std::cerr << error.what() << "\n";
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 1;
-  }
+  });
 }
 
 }  // namespace blind

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iostream>
 #include <sstream>
 #include <stdexcept>
 
@@ -198,6 +199,19 @@ std::map<std::string, std::string> optionsOf(std::span<const std::string> words,
     }
   }
   return options;
+}
+
+int statusOf(const std::function<void()>& command) {
+  try {
+    command();
+    return 0;
+  } catch (const std::invalid_argument& error) {
+    std::cerr << error.what() << "\n";
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
 }
 
 std::string textOf(const std::filesystem::path& path) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -17,6 +18,10 @@ namespace blind {
 std::map<std::string, std::string> optionsOf(std::span<const std::string> words, std::string_view command,
                                              std::span<const std::string_view> with_value,
                                              std::span<const std::string_view> flags);
+
+/// Runs a command. @return 0, or 2 for wrong usage (std::invalid_argument) and 1 for any other exception, told in a
+/// line on standard error
+int statusOf(const std::function<void()>& command);
 
 /// @error std::runtime_error when the file cannot be read
 std::string textOf(const std::filesystem::path& path);
