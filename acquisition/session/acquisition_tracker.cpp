@@ -26,6 +26,22 @@ constexpr qint64 kReturnShown_ms = 4000;
 constexpr int kTimesHeard = 3;
 constexpr int kMissedAfter = 30;  ///< Readings of another sensor.
 
+/// Where a tracker names its sensors, which of its numbers stand for another one now: "sensor 0 being C, not B".
+std::string exchangedText(const TableMetadata& known, const TableMetadata& said) {
+  static const std::string kBefore = "_sensor_";
+  std::string text;
+  for (const auto& [key, name] : said.other) {
+    const std::size_t at = key.rfind(kBefore);
+    const auto before = known.other.find(key);
+    if (at == std::string::npos || before == known.other.end() || before->second == name) continue;
+    const int station = std::atoi(key.c_str() + at + kBefore.size());
+    if (station < 1) continue;
+    text += (text.empty() ? "" : ", ") + ("sensor " + std::to_string(station - 1)) + " being " + name + ", not " +
+            before->second;
+  }
+  return text;
+}
+
 }  // namespace
 
 TrackerLink::TrackerLink(QObject* receiver) : owner(receiver), silence_timer(receiver), retry_timer(receiver) {
@@ -290,26 +306,6 @@ void AcquisitionController::Impl::remarkOnMissing() {
   text[0] = 'S';
   emit owner->remarked(QString::fromStdString(text));
 }
-
-namespace {
-
-/// Where a tracker names its sensors, which of its numbers stand for another one now: "sensor 0 being C, not B".
-std::string exchangedText(const TableMetadata& known, const TableMetadata& said) {
-  static const std::string kBefore = "_sensor_";
-  std::string text;
-  for (const auto& [key, name] : said.other) {
-    const std::size_t at = key.rfind(kBefore);
-    const auto before = known.other.find(key);
-    if (at == std::string::npos || before == known.other.end() || before->second == name) continue;
-    const int station = std::atoi(key.c_str() + at + kBefore.size());
-    if (station < 1) continue;
-    text += (text.empty() ? "" : ", ") + ("sensor " + std::to_string(station - 1)) + " being " + name + ", not " +
-            before->second;
-  }
-  return text;
-}
-
-}  // namespace
 
 void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {
   other_tracker.reset();
