@@ -16,12 +16,13 @@ render() { # render NAME TEST [VARIABLE=VALUE...]
 }
 chmod 700 "$work"
 for test in guided_session_test gap_page_test difference_page_test export_page_test export_sensors_test import_page_test \
-  signal_page_test; do
+  signal_page_test sensor_lines_test; do
   render light "$test"
   render dark "$test" FIELDTRUE_DARK=1
 done
 mkdir -p "$target"
 cp "$work/light/4-acquire.png" "$target/acquire.png"
+cp "$work/light/several-silent.png" "$target/acquire-sensors.png"
 cp "$work/light/5-compare.png" "$target/compare.png"
 cp "$work/dark/5-compare.png" "$target/compare-dark.png"
 cp "$work/light/3-plan.png" "$target/plan.png"
