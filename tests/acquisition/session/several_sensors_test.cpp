@@ -3,6 +3,7 @@
 #include <QTest>
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "acquisition/session/imported_session.h"
 #include "acquisition/session/recorded_sensors.h"

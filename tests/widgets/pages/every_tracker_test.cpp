@@ -161,7 +161,7 @@ class EveryTrackerTest : public WindowDriver {
     QVERIFY(sensors_[0] < sensors_[1]);
     auto* second = find<QCheckBox>(qPrintable(QStringLiteral("recordSensor%1").arg(sensors_[1])));
     QTRY_VERIFY(second->isVisible() && second->isChecked());
-    for (const std::size_t recorded : {1, 2}) {
+    for (const std::size_t recorded : {std::size_t{1}, std::size_t{2}}) {
       second->setFocus();
       QTest::keyClick(second, Qt::Key_Space);
       QTRY_COMPARE(status().sensors.size(), recorded);
