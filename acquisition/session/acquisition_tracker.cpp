@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "acquisition/protocols/sample_status.h"
 #include "acquisition/session/acquisition_impl.h"
 #include "acquisition/session/guarded_call.h"
 #include "acquisition/session/recorded_sensors.h"
+#include "acquisition/session/sensor_names.h"
 #include "calib/tables/metadata_keys.h"
 #include "calib/tables/table_json.h"
 #include "calib/tables/table_metadata.h"
@@ -63,6 +65,9 @@ void TrackerLink::beginStream() {
 }
 
 std::vector<Sample> TrackerLink::recorded(const Sample& sample, bool takes_newcomers) {
+  const auto is_recorded = [&] { return std::find(sensors.begin(), sensors.end(), sample.sensor) != sensors.end(); };
+  // That it is gone is no report of it.
+  if (sample.status == kStatusUnplugged) return is_recorded() ? std::vector{sample} : std::vector<Sample>();
   int& times = heard[sample.sensor];
   times = std::min(times + 1, kMissedAfter);
   newest_s[sample.sensor] = sample.time_s;
@@ -75,7 +80,6 @@ std::vector<Sample> TrackerLink::recorded(const Sample& sample, bool takes_newco
     sensors = reporting();
     return std::exchange(unsorted, {});
   }
-  const auto is_recorded = [&] { return std::find(sensors.begin(), sensors.end(), sample.sensor) != sensors.end(); };
   // Behind the others: which one leads does not change under the operator's hands.
   if (takes_newcomers && times == kTimesHeard && !is_recorded()) sensors.push_back(sample.sensor);
   return is_recorded() ? std::vector{sample} : std::vector<Sample>();
@@ -150,6 +154,7 @@ void AcquisitionController::Impl::dropDevice() {
   tracker.lost = false;
   tracker.since_return.invalidate();
   tracker.sensors.clear();
+  other_names.clear();
   if (!tracker.device) return;
   if (take.collecting()) failTake("the tracker was disconnected; this take counts for no place");
   tracker.drop();
@@ -305,7 +310,17 @@ void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const Ta
                       known.tracker.value_or("another tracker"));
 }
 
+void AcquisitionController::Impl::compareNames(TableMetadata& known, const TableMetadata& said) {
+  if (places.sensors().empty()) {
+    if (!sensorNames(said).empty()) forgetSensorNames(known);
+    return;
+  }
+  other_names = otherNamesText(places.sensors(), sensorNames(known), sensorNames(said));
+  if (!other_names.empty()) note("tracker", other_names);
+}
+
 void AcquisitionController::Impl::remarkOnTracker() {
+  if (!other_names.empty()) emit owner->remarked(QString::fromStdString(other_names));
   if (!other_tracker) return;
   emit owner->remarked(
       QString::fromStdString("This session was begun with " + store->metadata().tracker.value_or("another tracker") +
@@ -340,11 +355,13 @@ void AcquisitionController::Impl::correctSetup(const Setup& stated) {
 }
 
 void AcquisitionController::Impl::mergeMetadata() {
+  other_names.clear();
   if (!store || store->isReadOnly() || !tracker.running()) return;
   const TableMetadata now_said = said();
   TableMetadata known = store->metadata();
   if (known.rig == kDefaultRig && now_said.rig) known.rig = now_said.rig;
   compareTrackers(known, now_said);
+  compareNames(known, now_said);
   const TableMetadata both = merged(known, now_said);
   if (toJson(both) == toJson(store->metadata())) return;
   if (told(store->setMetadata(both))) emit owner->metadataChanged(both);

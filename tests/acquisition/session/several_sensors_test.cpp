@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "acquisition/protocols/sample_status.h"
 #include "acquisition/session/imported_session.h"
 #include "acquisition/session/recorded_sensors.h"
 #include "tests/acquisition/session/controller_bench.h"
@@ -44,6 +45,15 @@ struct TwoSensors : Bench {
     return {sensors.begin(), sensors.end()};
   }
 };
+
+/// Another tracker in place of the one before, which tells the names of its sensors.
+void connectNamed(TwoSensors& bench, const std::vector<std::string>& names) {
+  auto device = std::make_unique<FakeTracker>();
+  device->names = names;
+  device->on_jig[1] = kSecond;
+  bench.tracker = device.get();
+  bench.controller.adoptDevice(std::move(device));
+}
 
 }  // namespace
 
@@ -155,6 +165,21 @@ class SeveralSensorsTest : public QObject {
     bench.tracker->on_jig[1].is_plugged = true;
     bench.tracker->stand(8.0);
     QCOMPARE(bench.nodes.size(), std::size_t{2});
+  }
+
+  void oneThatIsUnpluggedDoesNotReport() {
+    TwoSensors bench(newPath());
+    bench.tracker->stand(0.5);
+    bench.tracker->on_jig[1].is_plugged = false;
+    for (int n = 0; n < 3.0 * kRate_hz; ++n) {
+      bench.tracker->send(bench.tracker->true_pose);
+      const double time_s = bench.controller.status().live->time_s;
+      emit bench.tracker->samplesReceived({{time_s, 1, {}, kStatusUnplugged}, {time_s, 2, {}, kStatusUnplugged}});
+    }
+    const AcquisitionStatus status = bench.controller.status();
+    QCOMPARE(bench.recorded(), Numbers({0, 1}));
+    QCOMPARE(status.reporting, Numbers({0, 1}));
+    QCOMPARE(status.reason, QString("sensor 1 does not report: plug it in again"));
   }
 
   void theLeadingOneMayFallSilentToo() {
@@ -327,6 +352,41 @@ class SeveralSensorsTest : public QObject {
     QCOMPARE(bench.controller.status().missing, Numbers({1}));
     bench.controller.take();
     FT_VERIFY_MATCH(holdsAll(bench.take_failures.value(0).toStdString(), {"sensor 1 does not report"}));
+  }
+
+  void sensorsOfOtherNamesRecordNothing() {
+    const QString path = newPath();
+    {
+      TwoSensors bench(path);
+      connectNamed(bench, {"Old (TDATA)", "A (TDATA)"});
+      // Before the first take nothing hangs on them.
+      connectNamed(bench, {"A (TDATA)", "B (TDATA)"});
+      bench.takeHere();
+      QCOMPARE(bench.sensorsOfTable(), Numbers({0, 1}));
+      QVERIFY(bench.remarks.isEmpty());
+      bench.controller.closeSession();
+    }
+    TwoSensors bench(path, {}, false, 100.0);
+    connectNamed(bench, {"B (TDATA)", "A (TDATA)"});
+    QCOMPARE(bench.remarks.size(), 1);
+    FT_VERIFY_MATCH(holdsAll(
+        bench.remarks[0].toStdString(),
+        {"Sensor 0 was A in this session and is B now", "sensor 1 was B", "connect them in the order of the session"}));
+    bench.readTables();
+    const std::size_t n_rows = bench.samples.rows.size();
+    bench.takeHere();
+    bench.controller.setAutomatic(true);
+    bench.tracker->stand(5.0);
+    bench.readTables();
+    QVERIFY(bench.nodes.empty() && bench.samples.rows.size() == n_rows);
+    QVERIFY(bench.controller.status().attention);
+    QCOMPARE(bench.controller.status().reason, bench.remarks[0]);
+    FT_VERIFY_MATCH(holdsAll(bench.take_failures.value(0).toStdString(), {"Sensor 0 was A"}));
+
+    bench.controller.setAutomatic(false);
+    connectNamed(bench, {"A (TRANSFORM)", "B (TDATA)", "C (TDATA)"});
+    bench.takeHere();
+    QCOMPARE(bench.nodes.size(), std::size_t{2});
   }
 
   void aSessionOfOneSensorGoesOnWithIt() {
