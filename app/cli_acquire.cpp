@@ -129,6 +129,7 @@ class Acquisition {
     controller_.setAutomatic(options_.automatic);
     if (!options_.sensors.empty()) controller_.setSensors(sensors);
     if (const auto others = otherSensors(sensors); !others.empty()) return notPossible(others);
+    tellLeaderStays(sensors);
     controller_.setReconnects(options_.reconnect_s > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
@@ -197,6 +198,14 @@ class Acquisition {
     if (asked.empty() || std::is_permutation(asked.begin(), asked.end(), recorded.begin(), recorded.end())) return {};
     return options_.session + ": its places were taken by " + sensorsText(recorded) + ", not by " + sensorsText(asked) +
            "; leave --sensor out, or name a new session file";
+  }
+
+  /// The sensor that leads is settled by the first take.
+  void tellLeaderStays(const std::vector<int>& asked) {
+    const std::vector<int> recorded = recordedSensors(controller_.status());
+    if (asked.empty() || recorded.empty() || asked.front() == recorded.front()) return;
+    tell("the session stays led by sensor " + std::to_string(recorded.front()) + ", not by sensor " +
+         std::to_string(asked.front()) + ": its first places were taken so");
   }
 
   /// Which of several sensors are recorded, whenever that changes.
@@ -331,6 +340,7 @@ class Acquisition {
   }
 
   void onRemark(const QString& message) {
+    if (message == controller_.status().other_names) return fail(message.toStdString());
     remarks_.push_back(message.toStdString());
     if (is_open_) tell(remarks_.back());
   }

@@ -383,6 +383,9 @@ void NdiStartup::settled() {
   facts["max_error_mm"] = fixedText(ndi_.gate.most_error_mm, 2);
   facts["volume"] = ndi_.gate.inside_volume ? "inside" : "any";
   if (!firmware_.empty()) facts["firmware"] = firmware_;
+  for (const auto& [handle, sensor] : sensors())
+    if (const auto told = facts.find("tool_" + hex(handle)); told != facts.end())
+      facts["sensor_" + std::to_string(sensor + 1)] = told->second;
   for (std::size_t i = 0; i < ndi_.roms.size(); ++i) facts["rom_" + std::to_string(i + 1)] = ndi_.roms[i].path;
   finish();
 }

@@ -500,10 +500,13 @@ bool NdiParser::take(const std::optional<NdiFrame>& frame, std::vector<Reading>&
     const auto sensor = settings_.sensors.find(tool.handle);
     if (sensor == settings_.sensors.end()) continue;
     Reading reading = ndiReading(tool, sensor->second, settings_.frame_hz, settings_.gate);
-    if (reading.unit_s) {
-      const auto [last, first] = last_frame_.try_emplace(tool.handle, tool.frame);
-      if (!first && std::exchange(last->second, tool.frame) == tool.frame) continue;
+    if (!reading.unit_s) {
+      if (unplugged_.insert(tool.handle).second) out.push_back(std::move(reading));
+      continue;
     }
+    unplugged_.erase(tool.handle);
+    const auto [last, first] = last_frame_.try_emplace(tool.handle, tool.frame);
+    if (!first && std::exchange(last->second, tool.frame) == tool.frame) continue;
     out.push_back(std::move(reading));
   }
   return true;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -109,7 +110,6 @@ std::optional<NdiFrame> decodeNdiBx(std::string_view bytes);
 std::string ndiSystemMeaning(unsigned status);
 
 /// Status texts of readings.
-inline constexpr const char* kStatusUnplugged = "unplugged";
 inline constexpr const char* kStatusOutOfVolume = "out_of_volume";
 inline constexpr const char* kStatusPartlyOutOfVolume = "partly_out_of_volume";
 inline constexpr const char* kStatusErrorValue = "error_value";
@@ -133,7 +133,8 @@ struct NdiStreamSettings {
   NdiGate gate;
 };
 
-/// Turns replies to TX or BX, cut anywhere, into readings. A reply whose frame was seen before brings none.
+/// Turns replies to TX or BX, cut anywhere, into readings. A reply whose frame was seen before brings none;
+/// a tool that is unplugged has no frame, and brings one reading as it goes.
 class NdiParser : public StreamParser {
  public:
   explicit NdiParser(NdiStreamSettings settings) : settings_(std::move(settings)) {}
@@ -153,6 +154,7 @@ class NdiParser : public StreamParser {
   NdiStreamSettings settings_;
   FrameFinder finder_;
   std::map<int, std::uint32_t> last_frame_;  ///< By handle.
+  std::set<int> unplugged_;                  ///< Handles of the tools that were told to be gone.
   std::uint64_t damaged_ = 0;
 };
 

@@ -83,6 +83,8 @@ void AcquisitionController::take() {
     emit takeFailed(QStringLiteral("The tracker is not connected; connect it and take again."));
   } else if (!impl_->places.current) {
     emit takeFailed(QStringLiteral("All places are done; choose one to retake it."));
+  } else if (!impl_->other_names.empty()) {
+    impl_->failTake(impl_->other_names);
   } else if (const auto silent = impl_->tracker.silentSensors(); !silent.empty()) {
     impl_->failTake(silentText(silent));
   } else if (const auto off_m = impl_->places.tooFar_m(impl_->tracker.live);

@@ -84,6 +84,7 @@ struct AcquisitionStatus {
   std::vector<SensorProgress> sensors;  ///< Those recorded, the leading one first; empty until it is known.
   std::vector<int> reporting;           ///< Every sensor that the tracker sends.
   std::vector<int> missing;             ///< Recorded ones that it has not sent since its stream began.
+  QString other_names;                  ///< Which recorded sensors are others than in the session; empty = none.
   bool takes_settle_sensors = false;    ///< Takes of the session say which are recorded: they go on.
 };
 

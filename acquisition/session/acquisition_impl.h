@@ -32,6 +32,8 @@ struct AcquisitionController::Impl {
   /// Sets other_tracker where the session was begun with another one; before the first take that one is forgotten.
   void compareTrackers(TableMetadata& known, const TableMetadata& said);
   void remarkOnTracker();
+  /// Sets other_names where a recorded sensor has another name now; before the first take the names are forgotten.
+  void compareNames(TableMetadata& known, const TableMetadata& said);
   /// Those that took the places done go on; before the first take those that a person chose, else all that report.
   void settleSensors();
   std::vector<int> sensorsOfState();  ///< Chosen by a person for this session; empty = none were.
@@ -86,6 +88,7 @@ struct AcquisitionController::Impl {
   bool loose_refused = false;  ///< The newest loose readings could not be written; said once.
   /// The tracker or set-up that records now, where the session was begun with another.
   std::optional<std::string> other_tracker;
+  std::string other_names;  ///< Which recorded sensors are others than in the session: nothing is recorded of them.
 
   Setup stated_setup;  ///< By a person.
 

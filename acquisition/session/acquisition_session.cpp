@@ -80,6 +80,7 @@ void AcquisitionController::Impl::close() {
   loose = LooseReadings();
   loose_refused = false;
   other_tracker.reset();
+  other_names.clear();
   tracker.time_offset_s.reset();
   tracker.live.reset();
   tracker.recent_times_s.clear();

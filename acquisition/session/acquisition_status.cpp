@@ -74,6 +74,7 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.sensors = progress();
   result.reporting = tracker.reporting();
   result.missing = tracker.missingSensors();
+  result.other_names = QString::fromStdString(other_names);
   result.takes_settle_sensors = takes_settle_sensors;
   return result;
 }
@@ -99,6 +100,8 @@ QString AcquisitionController::Impl::reason(bool* attention) const {
     *attention = tracker.state == DeviceState::kFailed;
     return tracker.text.isEmpty() ? QStringLiteral("connect the tracker") : tracker.text;
   }
+  *attention = !other_names.empty();
+  if (*attention) return QString::fromStdString(other_names);
   *attention = !tracker.live && tracker.since_sample.isValid() && tracker.since_sample.elapsed() >= 2000;
   if (*attention) return QStringLiteral("the tracker stopped sending: check its line and its switch");
   if (!places.current) return QStringLiteral("all places are done");

@@ -55,6 +55,7 @@ bool RunningTake::waitedInVain(const Sample& live) {
 
 void AcquisitionController::Impl::addSample(const Sample& sample) {
   const bool look = tracker.leads(sample) && follow(sample);
+  if (!other_names.empty()) return;
   if (take.collecting()) return endTake(take.sampler.add(sample));
   keepLoose(loose.between(sample));
   if (take.automatic && look) considerAutomaticTake();

@@ -1,12 +1,13 @@
 #include "acquisition/session/acquisition_tracker.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <utility>
 
+#include "acquisition/protocols/sample_status.h"
 #include "acquisition/session/acquisition_impl.h"
 #include "acquisition/session/guarded_call.h"
 #include "acquisition/session/recorded_sensors.h"
+#include "acquisition/session/sensor_names.h"
 #include "calib/tables/metadata_keys.h"
 #include "calib/tables/table_json.h"
 #include "calib/tables/table_metadata.h"
@@ -25,22 +26,6 @@ constexpr int kLastRetry_ms = 8000;
 constexpr qint64 kReturnShown_ms = 4000;
 constexpr int kTimesHeard = 3;
 constexpr int kMissedAfter = 30;  ///< Readings of another sensor.
-
-/// Where a tracker names its sensors, which of its numbers stand for another one now: "sensor 0 being C, not B".
-std::string exchangedText(const TableMetadata& known, const TableMetadata& said) {
-  static const std::string kBefore = "_sensor_";
-  std::string text;
-  for (const auto& [key, name] : said.other) {
-    const std::size_t at = key.rfind(kBefore);
-    const auto before = known.other.find(key);
-    if (at == std::string::npos || before == known.other.end() || before->second == name) continue;
-    const int station = std::atoi(key.c_str() + at + kBefore.size());
-    if (station < 1) continue;
-    text += (text.empty() ? "" : ", ") + ("sensor " + std::to_string(station - 1)) + " being " + name + ", not " +
-            before->second;
-  }
-  return text;
-}
 
 }  // namespace
 
@@ -80,6 +65,9 @@ void TrackerLink::beginStream() {
 }
 
 std::vector<Sample> TrackerLink::recorded(const Sample& sample, bool takes_newcomers) {
+  const auto is_recorded = [&] { return std::find(sensors.begin(), sensors.end(), sample.sensor) != sensors.end(); };
+  // That it is gone is no report of it.
+  if (sample.status == kStatusUnplugged) return is_recorded() ? std::vector{sample} : std::vector<Sample>();
   int& times = heard[sample.sensor];
   times = std::min(times + 1, kMissedAfter);
   newest_s[sample.sensor] = sample.time_s;
@@ -92,7 +80,6 @@ std::vector<Sample> TrackerLink::recorded(const Sample& sample, bool takes_newco
     sensors = reporting();
     return std::exchange(unsorted, {});
   }
-  const auto is_recorded = [&] { return std::find(sensors.begin(), sensors.end(), sample.sensor) != sensors.end(); };
   // Behind the others: which one leads does not change under the operator's hands.
   if (takes_newcomers && times == kTimesHeard && !is_recorded()) sensors.push_back(sample.sensor);
   return is_recorded() ? std::vector{sample} : std::vector<Sample>();
@@ -167,6 +154,7 @@ void AcquisitionController::Impl::dropDevice() {
   tracker.lost = false;
   tracker.since_return.invalidate();
   tracker.sensors.clear();
+  other_names.clear();
   if (!tracker.device) return;
   if (take.collecting()) failTake("the tracker was disconnected; this take counts for no place");
   tracker.drop();
@@ -310,14 +298,11 @@ void AcquisitionController::Impl::remarkOnMissing() {
 void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {
   other_tracker.reset();
   const bool is_other = known.tracker && said.tracker && *known.tracker != *said.tracker;
-  std::string change = differenceText(known.setup, said.setup);
-  if (const std::string exchanged = exchangedText(known, said); !exchanged.empty())
-    change += (change.empty() ? "" : ", ") + exchanged;
+  const std::string change = differenceText(known.setup, said.setup);
   if (!is_other && change.empty()) return;
   if (std::all_of(places.rows.begin(), places.rows.end(), [](const auto& rows) { return rows.empty(); })) {
     if (is_other) known.tracker = said.tracker;
     for (const auto& [key, value] : said.setup) known.setup[key] = value;
-    for (const auto& [key, value] : said.other) known.other[key] = value;
     return;
   }
   other_tracker = is_other ? *said.tracker : "a set-up with " + change;
@@ -325,7 +310,17 @@ void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const Ta
                       known.tracker.value_or("another tracker"));
 }
 
+void AcquisitionController::Impl::compareNames(TableMetadata& known, const TableMetadata& said) {
+  if (places.sensors().empty()) {
+    if (!sensorNames(said).empty()) forgetSensorNames(known);
+    return;
+  }
+  other_names = otherNamesText(places.sensors(), sensorNames(known), sensorNames(said));
+  if (!other_names.empty()) note("tracker", other_names);
+}
+
 void AcquisitionController::Impl::remarkOnTracker() {
+  if (!other_names.empty()) emit owner->remarked(QString::fromStdString(other_names));
   if (!other_tracker) return;
   emit owner->remarked(
       QString::fromStdString("This session was begun with " + store->metadata().tracker.value_or("another tracker") +
@@ -360,11 +355,13 @@ void AcquisitionController::Impl::correctSetup(const Setup& stated) {
 }
 
 void AcquisitionController::Impl::mergeMetadata() {
+  other_names.clear();
   if (!store || store->isReadOnly() || !tracker.running()) return;
   const TableMetadata now_said = said();
   TableMetadata known = store->metadata();
   if (known.rig == kDefaultRig && now_said.rig) known.rig = now_said.rig;
   compareTrackers(known, now_said);
+  compareNames(known, now_said);
   const TableMetadata both = merged(known, now_said);
   if (toJson(both) == toJson(store->metadata())) return;
   if (told(store->setMetadata(both))) emit owner->metadataChanged(both);

@@ -90,6 +90,8 @@ class NdiTest : public QObject {
   void badBinary();
   void gates();
   void forms_data();
+  void unpluggedIsToldOnce_data() { forms_data(); }
+  void unpluggedIsToldOnce();
   void cutAtEveryOffset_data() { forms_data(); }
   void cutAtEveryOffset();
   void byteByByte_data() { forms_data(); }
@@ -327,6 +329,25 @@ void NdiTest::forms_data() {
   QTest::addColumn<bool>("binary");
   QTest::newRow("BX") << true;
   QTest::newRow("TX") << false;
+}
+
+void NdiTest::unpluggedIsToldOnce() {
+  QFETCH(bool, binary);
+  const NdiStreamSettings settings = streamOf(binary);
+  NdiParser parser(settings);
+  NdiTool there, gone;
+  there.handle = gone.handle = settings.sensors.begin()->first;
+  gone.state = NdiState::kUnoccupied;
+  const auto readingsOf = [&](const NdiTool& tool) {
+    return parsed(parser, {binary ? encodeNdiBx({{tool}, 0}) : encodeNdiReply(encodeNdiTx({{tool}, 0}))});
+  };
+  for (there.frame = 7; there.frame < 9; ++there.frame) {
+    QCOMPARE(readingsOf(there).size(), std::size_t{1});
+    const std::vector<Reading> first = readingsOf(gone);
+    QCOMPARE(first.size(), std::size_t{1});
+    QCOMPARE(first[0].sample.status, std::string(kStatusUnplugged));
+    QVERIFY(readingsOf(gone).empty() && readingsOf(gone).empty());
+  }
 }
 
 void NdiTest::cutAtEveryOffset() {

@@ -20,7 +20,7 @@ class FakeTracker : public acquisition::TrackerDevice {
   Pose true_pose{{-1.0, -1.0, -1.0}, Eigen::Quaterniond::Identity()};
   std::vector<Pose> guided;
   QString tracker_name = QStringLiteral("fake");
-  std::map<std::string, std::string> facts;  ///< What it says of itself beside.
+  std::vector<std::string> names;  ///< Of the sensors, where it tells them.
   /// A sensor on the jig.
   struct OnJig {
     Pose jig_from_sensor;
@@ -37,7 +37,7 @@ class FakeTracker : public acquisition::TrackerDevice {
     TableMetadata metadata;
     metadata.tracker = tracker_name.toStdString();
     metadata.rate_hz = kRate_hz;
-    metadata.other.insert(facts.begin(), facts.end());
+    for (std::size_t i = 0; i < names.size(); ++i) metadata.other["fake_sensor_" + std::to_string(i + 1)] = names[i];
     return metadata;
   }
 

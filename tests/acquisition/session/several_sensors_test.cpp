@@ -5,9 +5,9 @@
 #include <map>
 #include <set>
 
+#include "acquisition/protocols/sample_status.h"
 #include "acquisition/session/imported_session.h"
 #include "acquisition/session/recorded_sensors.h"
-#include "calib/tables/metadata_keys.h"
 #include "tests/acquisition/session/controller_bench.h"
 #include "tests/acquisition/session/raw_sql.h"
 #include "tests/acquisition/session/session_samples.h"
@@ -57,44 +57,6 @@ class SeveralSensorsTest : public QObject {
   QString newPath() { return folder_.filePath(QStringLiteral("s%1.fieldtrue").arg(++count_)); }
 
  private slots:
-  /// A server that numbers its sensors as they come may give a number to another one: told at once, and marked in what
-  /// is taken then. The order of the first start, before anything was taken, is no one's promise.
-  void anotherSensorUnderANumberIsTold() {
-    QTemporaryDir folder;
-    const QString path = folder.filePath("names.fieldtrue");
-    const auto begun = [&](const char* first, const char* second, QStringList& remarks) {
-      auto bench = std::make_unique<testing::Bench>(path, testing::planOf({3, 3, 2}), false);
-      QObject::connect(&bench->controller, &AcquisitionController::remarked,
-                       [&remarks](const QString& remark) { remarks << remark; });
-      auto tracker = std::make_unique<testing::FakeTracker>();
-      tracker->facts = {{"openigtlink_sensor_1", first}, {"openigtlink_sensor_2", second}};
-      bench->tracker = tracker.get();
-      bench->controller.adoptDevice(std::move(tracker));
-      return bench;
-    };
-    QStringList remarks;
-    {
-      testing::Bench made(path);  // Nothing is taken with it.
-    }
-    {
-      const auto bench = begun("B", "C", remarks);
-      QVERIFY2(remarks.isEmpty(), qPrintable(remarks.join('\n')));
-      bench->takeHere();
-      QCOMPARE(bench->stored.size(), std::size_t{1});
-    }
-    {
-      const auto bench = begun("B", "C", remarks);
-      QVERIFY2(remarks.isEmpty(), qPrintable(remarks.join('\n')));
-    }
-    const auto bench = begun("C", "B", remarks);
-    QCOMPARE(remarks.size(), 1);
-    FT_VERIFY_MATCH(testing::holdsAll(remarks[0].toStdString(), {"sensor 0 being C, not B", "sensor 1 being B, not C",
-                                                                 "one calibration of both is wrong"}));
-    bench->takeHere();
-    bench->readTables();
-    QVERIFY(bench->table.metadata.other.contains(kOtherTracker));
-  }
-
   void everyRowIsTheMeanOfItsSensor() {
     TwoSensors bench(newPath());
     for (int place = 0; place < 4; ++place) bench.takeHere();
@@ -195,6 +157,21 @@ class SeveralSensorsTest : public QObject {
     bench.tracker->on_jig[1].is_plugged = true;
     bench.tracker->stand(8.0);
     QCOMPARE(bench.nodes.size(), std::size_t{2});
+  }
+
+  void oneThatIsUnpluggedDoesNotReport() {
+    TwoSensors bench(newPath());
+    bench.tracker->stand(0.5);
+    bench.tracker->on_jig[1].is_plugged = false;
+    for (int n = 0; n < 3.0 * kRate_hz; ++n) {
+      bench.tracker->send(bench.tracker->true_pose);
+      const double time_s = bench.controller.status().live->time_s;
+      emit bench.tracker->samplesReceived({{time_s, 1, {}, kStatusUnplugged}, {time_s, 2, {}, kStatusUnplugged}});
+    }
+    const AcquisitionStatus status = bench.controller.status();
+    QCOMPARE(bench.recorded(), Numbers({0, 1}));
+    QCOMPARE(status.reporting, Numbers({0, 1}));
+    QCOMPARE(status.reason, QString("sensor 1 does not report: plug it in again"));
   }
 
   void theLeadingOneMayFallSilentToo() {
