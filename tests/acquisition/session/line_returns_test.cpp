@@ -263,6 +263,7 @@ void LineReturnsTest::aTraceBreaksWhereTheTrackerWasLost() {
     Operator person(newPath());
     PoweredUnit* unit = nullptr;
     behindAPty(person, unit);
+    QTest::qWait(3000);  // So much of it is played before the break: a take can begin meanwhile on a busy machine too.
     person.loseIt([unit] { unit->restart(); });
     if (QTest::currentTestFailed()) return;
     person.takeAgain();
