@@ -108,7 +108,7 @@ RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structur
   const double share_rad2 = share(search.floorPlacingSd_rad(), search.placingSd_rad());
   RowNoise noise;
   for (std::size_t i = 0; i < rows.rows.size(); ++i) {
-    const identify::Vector6d& left = structure.left[i];
+    const identify::Vector6d& left = structure.noise[i];
     const Eigen::Vector3d left_m = search.whitening().position[i].triangularView<Eigen::Lower>().solve(left.head<3>());
     noise.square_m2.push_back(share_m2 * left_m.squaredNorm());
     noise.whitened.push_back(left.squaredNorm());

@@ -89,7 +89,11 @@ class FoldFitter {
       starts.push_back({ways_[w], start.searched, start.gain - parameters * std::log(n)});
     }
     std::stable_sort(starts.begin(), starts.end(), [](const Start& a, const Start& b) { return a.gain > b.gain; });
-    starts.resize(std::min(starts.size(), kSearchedAFold));
+    // The linearised scan ranks shapes that bend along with the search too low: what the whole recording names at this
+    // step is searched to the end as well, from where the fold's own rows put it.
+    const auto is_own = [&](const Start& start) { return start.way == ways_[step]; };
+    const auto others = starts.begin() + static_cast<std::ptrdiff_t>(std::min(starts.size(), kSearchedAFold));
+    starts.erase(std::stable_partition(others, starts.end(), is_own), starts.end());
     const double base = search_.bicOf(model, used);
     double best = base - (step == 0 ? identify::EffectSelectionOptions{}.least_gain_first
                                     : identify::EffectSelectionOptions{}.least_gain_more) *

@@ -15,6 +15,7 @@ namespace fieldtrue::identify {
 namespace {
 
 constexpr int kGroups = 4;  // Room, transmitter, sensor, jig or time.
+constexpr double kRidge = 1e-7;
 
 /// Values of the regular solid harmonics of degree 1 to `degree`, by the Legendre recurrences in Cartesian form.
 Eigen::VectorXd harmonics(const Eigen::Vector3d& p, int degree) {
@@ -214,7 +215,6 @@ struct SubsetFit {
 };
 
 SubsetFit fitSubset(const Normal& normal, const std::vector<Eigen::Index>& columns) {
-  constexpr double kRidge = 1e-7;
   const auto n = static_cast<Eigen::Index>(columns.size());
   Eigen::MatrixXd matrix(n, n);
   Eigen::VectorXd right(n);
@@ -231,6 +231,14 @@ SubsetFit fitSubset(const Normal& normal, const std::vector<Eigen::Index>& colum
   fit.explained = 2.0 * fit.x.dot(right) - fit.x.dot(matrix * fit.x);
   fit.n_effective = factor.solve(matrix).trace();
   return fit;
+}
+
+/// Leverage of every channel in the fit of all columns.
+Eigen::VectorXd leverageIn(const Normal& normal) {
+  Eigen::MatrixXd ridged = normal.matrix;
+  ridged.diagonal().array() += kRidge;
+  const Eigen::LLT<Eigen::MatrixXd> factor(ridged);
+  return factor.matrixL().solve(normal.columns.transpose()).colwise().squaredNorm();
 }
 
 std::vector<Eigen::Index> columnsOfGroups(const Basis& basis, Eigen::Index q, unsigned groups) {
@@ -267,6 +275,20 @@ GapOrigin originOf(const Normal& normal, const Basis& basis, Eigen::Index q, dou
 
 /// Under a normal law the t scale with 8 degrees of freedom is 0.915 of the SD.
 constexpr double kScaleOfNormal = 0.915;
+
+/// @param leverage of every channel
+void setNoise(const Eigen::VectorXd& left, const Eigen::VectorXd& leverage, const Linearized& at,
+              Structure& structure) {
+  constexpr double kMostLeverage = 0.9;  // More is the fit's word for the row, not the row's.
+  structure.noise.assign(at.order().size(), Vector6d::Zero());
+  for (std::size_t k = 0; k < at.order().size(); ++k) {
+    for (Eigen::Index part = 0; part < at.channels(); part += 3) {
+      const Eigen::Index first = static_cast<Eigen::Index>(k) * at.channels() + part;
+      const double free = 1.0 - std::min(kMostLeverage, leverage.segment<3>(first).mean());
+      structure.noise[at.order()[k]].segment<3>(part) = left.segment<3>(first) / std::sqrt(free);
+    }
+  }
+}
 
 void setScales(const Eigen::VectorXd& left, const Linearized& at, double inflate, bool both, Structure& structure) {
   structure.left.assign(at.order().size(), Vector6d::Zero());
@@ -322,6 +344,7 @@ Structure findStructure(const Linearized& at, const GapRows& rows, bool with_ori
   structure.energy_sd = std::sqrt(2.0 * extra * (1.0 + extra / freedom));
   structure.p_value = tailOfF(explained / extra / variance, extra, freedom);
   if (with_origin) structure.origin = originOf(normal, basis, q, variance);
+  setNoise(left.cwiseQuotient(weight), leverageIn(normal), at, structure);
   setScales(left.cwiseQuotient(weight), at, std::sqrt(count / freedom), at.channels() == 6, structure);
   return structure;
 }

@@ -19,7 +19,11 @@ struct Structure {
   double p_value = 1.0;    ///< F test (Paulson 1942).
   int n_parameters = 0;
   GapOrigin origin;            ///< Shares by Shapley's rule over the four groups.
-  std::vector<Vector6d> left;  ///< Whitened residuals after the flexible fit, by row.
+  std::vector<Vector6d> left;  ///< Whitened residuals after the flexible fit, by row, widened alike.
+  /// The same, each row widened by its own leverage: the expected square is that of its noise, also where rows that
+  /// stand out were given little weight.
+  /// @source MacKinnon & White 1985, J. Econometrics 29 305 (HC2)
+  std::vector<Vector6d> noise;
 };
 
 /// @param with_origin whether to split the energy by origin (16 fits instead of one)

@@ -102,6 +102,41 @@ class GapStructureTest : public QObject {
     }
   }
 
+  /// What is left of each row, squared, is on the mean its noise squared, whatever its law: with one row of sixteen six
+  /// times as wrong as the others, and where positions alone leave the fit half as many parameters as numbers.
+  void noiseIsThatOfTheReadings_data() {
+    QTest::addColumn<bool>("has_orientation");
+    QTest::addColumn<double>("slip");
+    QTest::newRow("poses") << true << 1.0;
+    QTest::newRow("positions") << false << 1.0;
+    QTest::newRow("poses, slips") << true << 6.0;
+    QTest::newRow("positions, slips") << false << 6.0;
+  }
+  void noiseIsThatOfTheReadings() {
+    QFETCH(bool, has_orientation);
+    QFETCH(double, slip);
+    const NoisyRows options{.per_axis = 4, .change = {}};
+    double told = 0.0;
+    double planted = 0.0;
+    for (unsigned seed = 1; seed <= 100; ++seed) {
+      std::vector<Node> nodes = noisyNodes(options, seed);
+      for (Node& node : nodes) {
+        const Eigen::Vector3d at_m = node.reference_from_sensor.position_m;
+        Eigen::Vector3d noise_m = node.tracker_from_sensor.position_m - at_m;
+        if (node.node % 16 == 5) noise_m *= slip;
+        node.tracker_from_sensor.position_m = at_m + noise_m;
+        node.has_orientation = has_orientation;
+        planted += noise_m.squaredNorm() / (options.sd_m * options.sd_m);
+      }
+      const GapRows rows = makeGapRows(nodes, {}).value();
+      const GapPhysics physics(rows, {});
+      const Linearized at(physics, {}, makeWhitening(rows, options.sd_m, options.sd_rad), octantBlocks(rows));
+      for (const Vector6d& one : findStructure(at, rows, false).noise) told += one.head<3>().squaredNorm();
+    }
+    // A slip draws the fit a little, and is found that much smaller.
+    FT_VERIFY_MATCH(near(told / planted, 1.0, slip > 1.0 ? 0.04 : 0.02));
+  }
+
   void saysWhereItComesFrom_data() {
     QTest::addColumn<int>("source");
     QTest::addColumn<int>("turns");
