@@ -202,6 +202,47 @@ class SeveralSensorsTest : public QObject {
     }
   }
 
+  void oneThatHasEnoughGoesOnWatching() {
+    TwoSensors bench(newPath());
+    bench.tracker->on_jig[1].every = 4;
+    bench.tracker->carryTo(bench.placePose(0));
+    bench.controller.take();
+    // Sensor 0 has its 60 readings after half a second, sensor 1 after two.
+    bench.tracker->stand(1.0);
+    QCOMPARE(bench.controller.status().sensors[0].collected, 60);
+    bench.tracker->on_jig[0].jig_from_sensor.position_m.x() += 0.003;
+    bench.tracker->stand(1.1);
+    QVERIFY2(bench.nodes.empty(), "what the sensor saw of the slip started all over");
+    bench.tracker->stand(1.2);
+    QCOMPARE(bench.nodes.size(), std::size_t{2});
+    FT_VERIFY_MATCH(holdsAll(bench.suspicions[0].toStdString(), {"sensor 0: moved once while sampling"}));
+    const Pose stood = inverse(bench.tracker->reference_from_tracker) * bench.tracker->true_pose;
+    for (const Node& node : bench.nodes) {
+      QCOMPARE(node.n_used + node.n_rejected, 60);
+      FT_VERIFY_MATCH(
+          near(node.tracker_from_sensor, stood * bench.tracker->on_jig[node.sensor].jig_from_sensor, 2e-4, 1e-6));
+    }
+  }
+
+  void slowlyCarriedIsNotTakenByItself() {
+    TwoSensors bench(newPath());
+    bench.tracker->rate_hz = 30.0;
+    for (int sensor = 0; sensor < 4; ++sensor) {
+      bench.tracker->on_jig[sensor].jig_from_sensor.position_m.y() = 0.04 * sensor;
+      bench.tracker->on_jig[sensor].noise_m = 5e-4;  // Uniform: an SD of 0.3 mm along each axis.
+    }
+    bench.controller.setAutomatic(true);
+    Pose before = bench.placePose(0);
+    before.position_m.y() -= 0.2;
+    bench.tracker->carryTo(before);
+    bench.tracker->carryTo(bench.placePose(0), 20.0);
+    QVERIFY(bench.nodes.empty() && bench.controller.status().take == TakeState::kIdle);
+    // It rests 0.7 s by a window of 0.5 s, and two seconds are sampled.
+    bench.tracker->stand(0.5 + 0.7 + 2.0 + 0.2);
+    QCOMPARE(bench.nodes.size(), std::size_t{4});
+    QCOMPARE(bench.suspicions[0], QString());
+  }
+
   void whatIsSuspiciousIsToldOfItsSensor() {
     TwoSensors bench(newPath(), planOf({3, 2, 1}));
     for (int place = 0; place < 4; ++place) bench.takeHere();
