@@ -36,6 +36,7 @@ namespace fieldtrue::cli {
 namespace {
 
 constexpr int kTakesBeforeSkipping = 3;
+constexpr double kReconnect_s = 300.0;  ///< Where nothing is said.
 
 struct AcquireOptions {
   std::string device;
@@ -45,9 +46,9 @@ struct AcquireOptions {
   int samples_per_node = 60;
   std::string until;  ///< When a take is complete, where not by that.
   bool automatic = false;
-  std::string sensors;         ///< Those recorded, as readSensors reads them.
-  double reconnect_s = 300.0;  ///< For so long a tracker that was lost is waited for.
-  std::string trace;           ///< Where the bytes of the tracker's line are written; empty = nowhere.
+  std::string sensors;                ///< Those recorded, as readSensors reads them.
+  std::optional<double> reconnect_s;  ///< For so long a tracker that was lost is waited for.
+  std::string trace;                  ///< Where the bytes of the tracker's line are written; empty = nowhere.
   std::vector<std::string> setup;
 };
 
@@ -127,10 +128,9 @@ class Acquisition {
     if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
     controller_.setTakeLength(length);
     controller_.setAutomatic(options_.automatic);
-    if (!options_.sensors.empty()) controller_.setSensors(sensors);
     if (const auto others = otherSensors(sensors); !others.empty()) return notPossible(others);
-    tellLeaderStays(sensors);
-    controller_.setReconnects(options_.reconnect_s > 0.0);
+    chooseSensors(sensors);
+    controller_.setReconnects(patience_s() > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
     if (!over_) QCoreApplication::exec();
@@ -192,18 +192,49 @@ class Acquisition {
     return sensors;
   }
 
+  double patience_s() const { return options_.reconnect_s.value_or(kReconnect_s); }
+
+  std::string notTheSessions(const std::vector<int>& asked) const {
+    return options_.session + ": its places were taken by " + sensorsText(controller_.status().of_session) +
+           ", not by " + sensorsText(asked);
+  }
+
   /// Why the sensors that were asked for cannot go on with the session; empty when they can.
   std::string otherSensors(const std::vector<int>& asked) const {
+    const std::vector<int> of_session = controller_.status().of_session;
+    if (of_session.empty() || acquisition::areAmong(asked, of_session)) return {};
+    return notTheSessions(asked) + "; leave --sensor out, or name a new session file";
+  }
+
+  /// Whether the leading sensor may be left out is known when the tracker runs: only where it is dead.
+  void chooseSensors(const std::vector<int>& asked) {
     const std::vector<int> recorded = recordedSensors(controller_.status());
-    if (asked.empty() || std::is_permutation(asked.begin(), asked.end(), recorded.begin(), recorded.end())) return {};
-    return options_.session + ": its places were taken by " + sensorsText(recorded) + ", not by " + sensorsText(asked) +
-           "; leave --sensor out, or name a new session file";
+    const bool is_resumed = controller_.status().takes_settle_sensors;
+    if (is_resumed && !asked.empty() && !acquisition::areAmong({recorded.front()}, asked)) {
+      without_leader_ = asked;
+      return;
+    }
+    if (!options_.sensors.empty()) controller_.setSensors(asked);
+    if (is_resumed) tellLeaderStays(asked);
+  }
+
+  /// @return whether it is sure what is recorded
+  bool leaderIsSettled() {
+    if (without_leader_.empty()) return true;
+    const int leader = recordedSensors(status_).front();
+    if (acquisition::areAmong({leader}, status_.reporting)) {
+      fail(notTheSessions(without_leader_) + ": sensor " + std::to_string(leader) +
+           " leads and reports; leave --sensor out, or name a new session file");
+    } else if (acquisition::areAmong({leader}, status_.missing)) {
+      controller_.setSensors(std::exchange(without_leader_, {}));
+    }
+    return false;
   }
 
   /// The sensor that leads is settled by the first take.
   void tellLeaderStays(const std::vector<int>& asked) {
     const std::vector<int> recorded = recordedSensors(controller_.status());
-    if (asked.empty() || recorded.empty() || asked.front() == recorded.front()) return;
+    if (asked.empty() || asked.front() == recorded.front()) return;
     tell("the session stays led by sensor " + std::to_string(recorded.front()) + ", not by sensor " +
          std::to_string(asked.front()) + ": its first places were taken so");
   }
@@ -236,10 +267,16 @@ class Acquisition {
     beginPatience(what + "; nothing came");
   }
 
-  /// Who asked for a sensor that is not there is not left to wait for it.
+  /// A sensor that was asked for and is not there; empty where each is.
+  std::string notThere() const {
+    if (options_.sensors.empty() || status_.missing.empty() || status_.takes_settle_sensors) return {};
+    return "--sensor " + options_.sensors + ": the tracker sends only " + sensorsText(status_.reporting);
+  }
+
+  /// Who asked for a sensor that is not there is not left to wait for it, but where --reconnect says for how long.
   void endWhereOneIsMissing() {
-    if (options_.sensors.empty() || status_.missing.empty() || status_.takes_settle_sensors) return;
-    fail("--sensor " + options_.sensors + ": the tracker sends only " + sensorsText(status_.reporting));
+    const std::string why = notThere();
+    if (!why.empty() && options_.reconnect_s.value_or(0.0) == 0.0) fail(why);
   }
 
   void onStatus(const acquisition::AcquisitionStatus& status) {
@@ -257,6 +294,7 @@ class Acquisition {
       return;
     }
     if (status.device != acquisition::DeviceState::kRunning) return;
+    if (!leaderIsSettled()) return;
     if (!told_start_) tellStart();
     tellSensors();
     endWhereOneIsMissing();
@@ -362,9 +400,12 @@ class Acquisition {
   void beginPatience(const std::string& what) {
     patience_ = std::make_unique<QTimer>();
     patience_->setSingleShot(true);
-    const std::string why = what + " within " + fixedText(options_.reconnect_s, 0) + " s (--reconnect)";
-    QObject::connect(patience_.get(), &QTimer::timeout, &context_, [this, why] { fail(why); });
-    patience_->start(static_cast<int>(1000.0 * options_.reconnect_s));
+    const std::string within = " within " + fixedText(patience_s(), 0) + " s (--reconnect)";
+    QObject::connect(patience_.get(), &QTimer::timeout, &context_, [this, what, within] {
+      const std::string not_there = notThere();
+      fail((not_there.empty() ? what : not_there) + within);
+    });
+    patience_->start(static_cast<int>(1000.0 * patience_s()));
   }
 
   void onDeviceBack() {
@@ -463,6 +504,7 @@ class Acquisition {
   std::unique_ptr<QSocketNotifier> input_;
   std::unique_ptr<QTimer> patience_;  ///< While a tracker that was lost, or a silent sensor, is waited for.
   std::vector<int> silent_;           ///< Sensors that were told of.
+  std::vector<int> without_leader_;   ///< Asked for, and not settled until it is known whether the leading one is dead.
   std::string typed_;
   std::vector<int> told_sensors_;
   std::string session_plan_;
@@ -489,6 +531,15 @@ std::string noTraceOf(const acquisition::TrackerDevice& device, const AcquireOpt
   if (!folder.isWritable()) return "--trace " + options.trace + ": its folder cannot be written to";
   if (QFileInfo(QString::fromStdString(options.trace)).isDir()) return "--trace " + options.trace + ": it is a folder";
   return noRoomFor(options.trace);
+}
+
+/// Nothing at all is no way to say all of them.
+CLI::Validator someSensors() {
+  return CLI::Validator(
+      [](std::string& text) {
+        return text.empty() ? std::string("'' names no sensors: all, 0 or 0+2 (numbers up to 1000) do") : std::string();
+      },
+      "");
 }
 
 Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
@@ -541,12 +592,15 @@ void addAcquireCommand(CommandLine& line) {
   addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
   command
       ->add_option("--sensor", options->sensors,
-                   "Record these of several sensors: 0, or 0+2 of which the first leads; default all that report")
-      ->type_name("N[+N]|all");
+                   "Record these of several sensors: 0, or 0+2 of which the first leads; default all that report. A "
+                   "session that is resumed goes on without those of its own that are not named")
+      ->type_name("N[+N]|all")
+      ->check(someSensors());
   command->add_flag("--auto", options->automatic, "Take by itself whenever the sensor stands still at its place");
   command
       ->add_option("--reconnect", options->reconnect_s,
-                   "Wait so long for a tracker that is lost to come back (default 300); 0 = end at once")
+                   "Wait so long for a tracker that is lost to come back (default 300), and for a sensor that --sensor "
+                   "names; 0 = end at once")
       ->type_name("S")
       ->check(numberWithin(0.0, 1e6));
   command->add_option("--trace", options->trace, "Writes the last bytes of the tracker's line (*.trace.zip) at the end")

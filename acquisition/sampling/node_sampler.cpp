@@ -91,6 +91,7 @@ void NodeSampler::cancel() {
   newest_s_.reset();
   message_.clear();
   samples_.clear();
+  watched_.clear();
   abandoned_.clear();
   statistics_.reset();
 }
@@ -108,6 +109,14 @@ TakeState NodeSampler::add(const Sample& sample) {
   }
   if (isGood(sample)) look();
   return passTime(sample.time_s);
+}
+
+void NodeSampler::watch(const Sample& sample) {
+  if (state_ != TakeState::kDone || !isGood(sample)) return;
+  watched_.push_back(sample);
+  if (looked() < next_look_) return;
+  next_look_ = looked() + blockNow();
+  if (const auto moved = motion()) startOver(*moved);
 }
 
 TakeState NodeSampler::passTime(double time_s) {
@@ -130,7 +139,9 @@ void NodeSampler::look() {
   }
 }
 
-int NodeSampler::blockNow() const { return std::max(options_.block, collected_ / kMostBlocks); }
+int NodeSampler::looked() const { return collected_ + static_cast<int>(watched_.size()); }
+
+int NodeSampler::blockNow() const { return std::max(options_.block, looked() / kMostBlocks); }
 
 bool NodeSampler::isComplete(bool is_due) {
   if (options_.length.until == TakeLength::Until::kSeconds) return isCompleteByTime();
@@ -170,13 +181,15 @@ void NodeSampler::timeOut() {
 std::optional<std::string> NodeSampler::motion() const {
   std::vector<Eigen::Vector3d> positions_m, turns_rad;
   std::optional<Eigen::Quaterniond> first;
-  for (const Sample& sample : samples_) {
-    if (!isGood(sample)) continue;
-    const Pose& pose = sample.tracker_from_sensor;
-    const Eigen::Quaterniond orientation = pose.orientation.normalized();
-    if (!first) first = orientation;
-    positions_m.push_back(pose.position_m);
-    turns_rad.push_back(rotationVector_rad(orientation * first->conjugate()));
+  for (const auto* part : {&samples_, &watched_}) {
+    for (const Sample& sample : *part) {
+      if (!isGood(sample)) continue;
+      const Pose& pose = sample.tracker_from_sensor;
+      const Eigen::Quaterniond orientation = pose.orientation.normalized();
+      if (!first) first = orientation;
+      positions_m.push_back(pose.position_m);
+      turns_rad.push_back(rotationVector_rad(orientation * first->conjugate()));
+    }
   }
   const Shift shift = largestShift(positions_m, blockNow(), options_.still_floor_m, options_.still_sigmas);
   if (shift.moved()) return "moved " + millimetres(shift.size);
@@ -193,8 +206,10 @@ void NodeSampler::startOver(const std::string& motion) {
   message_ = "retaking: " + motion;
   collected_ = 0;
   next_look_ = options_.block;
-  abandoned_.insert(abandoned_.end(), samples_.begin(), samples_.end());
-  samples_.clear();
+  for (auto* part : {&samples_, &watched_}) {
+    abandoned_.insert(abandoned_.end(), part->begin(), part->end());
+    part->clear();
+  }
 }
 
 void NodeSampler::finish() {

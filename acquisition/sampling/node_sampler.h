@@ -38,6 +38,8 @@ class NodeSampler {
   void start();  ///< Begins a take, dropping what was collected.
   void cancel();
   TakeState add(const Sample& sample);
+  /// One that is done looks on: motion starts it over, and nothing else of the sample counts.
+  void watch(const Sample& sample);
   /// Time goes on, also for a sensor that says nothing. @param time_s of the clock of the samples
   TakeState passTime(double time_s);
   /// What is collected counts no more, even where that was enough. @param motion what was seen: "moved 3 mm"
@@ -54,10 +56,12 @@ class NodeSampler {
   }  ///< Every sample since the last start over, bad ones too.
   /// What was collected before the last start over.
   const std::vector<Sample>& abandoned() const { return abandoned_; }
+  const std::vector<Sample>& watched() const { return watched_; }  ///< Good samples since it was done.
   const std::optional<NodeStatistics>& statistics() const { return statistics_; }
 
  private:
   void look();
+  int looked() const;  ///< Good samples in which motion is looked for.
   int blockNow() const;
   bool isComplete(bool is_due);
   bool isCompleteByTime();
@@ -81,6 +85,7 @@ class NodeSampler {
   double now_s_ = 0.0;
   std::string message_;
   std::vector<Sample> samples_;
+  std::vector<Sample> watched_;
   std::vector<Sample> abandoned_;
   std::optional<NodeStatistics> statistics_;
 };

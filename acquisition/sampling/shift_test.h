@@ -25,4 +25,13 @@ struct Shift {
 /// @param sigmas standard errors of the difference of the centres (3-D) allowed; widened by 10/n for few readings
 Shift largestShift(std::span<const Eigen::Vector3d> values, int block, double floor, double sigmas);
 
+/// How far the readings run along a straight line, first to last, and how far they may by how the means of six equal
+/// parts of them scatter about that line.
+///
+/// What a hand carries at a steady pace is seen here though it trembles: of a few readings largestShift takes tremor
+/// for correlated noise, and then allows what the noise of a day might do.
+/// @param values readings at equal steps of time; fewer than 6 show nothing
+/// @param floor a run up to this is never motion, same unit as the readings
+Shift steadyRun(std::span<const Eigen::Vector3d> values, double floor);
+
 }  // namespace fieldtrue::acquisition

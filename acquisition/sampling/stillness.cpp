@@ -109,7 +109,8 @@ StillnessDetector::Judgement StillnessDetector::judge() const {
   // The means of the two halves lie half the window apart.
   result.speed_m_s = driftBetweenHalves(positions) / (0.5 * span_s);
   const int block = std::max(1, static_cast<int>(positions.size() / 4));
-  result.still = !largestShift(positions, block, floor_m_, kStillSigmas).moved();
+  result.still =
+      !steadyRun(positions, floor_m_).moved() && !largestShift(positions, block, floor_m_, kStillSigmas).moved();
   result.reason = result.still ? "still" : movingReason(result.speed_m_s);
   return result;
 }

@@ -23,7 +23,10 @@ TakeState TakeSampler::add(const Sample& sample) {
   for (OfSensor& one : of_sensors_) {
     if (one.sensor != sample.sensor) continue;
     const int restarts = one.sampler.restarts();
-    one.sampler.add(sample);
+    if (one.sampler.state() == TakeState::kDone)
+      one.sampler.watch(sample);
+    else
+      one.sampler.add(sample);
     if (one.sampler.restarts() == restarts) continue;
     for (OfSensor& other : of_sensors_)
       if (other.sensor != sample.sensor) other.sampler.startOver(one.sampler.lastMotion());

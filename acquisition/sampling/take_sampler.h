@@ -10,8 +10,8 @@ namespace fieldtrue::acquisition {
 /// Collects one take of one place of every sensor on the jig, each by a sampler of its own. Pure, as they are.
 ///
 /// It is done when each of them is. The jig is rigid: what one sensor sees of its motion makes all start over, those
-/// too that had enough. The time limit counts for all from the first sample of any, so that one that is silent ends the
-/// take too.
+/// too that had enough: until the last one has, they go on watching. The time limit counts for all from the first
+/// sample of any, so that one that is silent ends the take too.
 class TakeSampler {
  public:
   struct OfSensor {

@@ -86,6 +86,7 @@ struct AcquisitionStatus {
   std::vector<int> missing;             ///< Recorded ones that it has not sent since its stream began.
   QString other_names;                  ///< Which recorded sensors are others than in the session; empty = none.
   bool takes_settle_sensors = false;    ///< Takes of the session say which are recorded: they go on.
+  std::vector<int> of_session;          ///< Those that took its places, the leading one first.
 };
 
 /// Runs an acquisition: device, samplers and store.
@@ -135,7 +136,8 @@ class AcquisitionController : public QObject {
   void goTo(int place);  ///< Makes any place current: retake it. -1 goes back to the first one not done.
   void setAutomatic(bool automatic);
   /// Which sensors of several are recorded, kept with the session; the first leads. Empty = every one that reports
-  /// before the first take, led by the lowest. Those that took a session's places go on.
+  /// before the first take, led by the lowest. Those that took a session's places go on, or some of them, where others
+  /// are dead: the leading one stays while it reports.
   void setSensors(const std::vector<int>& sensors);
   void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
   void setTakeLength(const fieldtrue::acquisition::TakeLength& length);  ///< Answers with failed where it is none.

@@ -36,8 +36,15 @@ struct AcquisitionController::Impl {
   void compareNames(TableMetadata& known, const TableMetadata& said);
   /// Those that took the places done go on; before the first take those that a person chose, else all that report.
   void settleSensors();
-  std::vector<int> sensorsOfState();  ///< Chosen by a person for this session; empty = none were.
+  std::vector<int> sensorsOfState(const std::string& key);  ///< Chosen by a person; empty = none were.
+  std::vector<int> sensorsOfSession();  ///< Those that took its places, but for such as are left out from then on.
+  void leadPlaces(const std::vector<int>& going_on);
   void chooseSensors(const std::vector<int>& sensors);
+  /// Of the sensors that took the places those that are left when others are dead.
+  void goOnWith(const std::vector<int>& sensors);
+  void remarkOnLeftOut();
+  /// Tells, once it is sure, of a sensor that came too late to be recorded.
+  void noticeLate(const Sample& sample);
   void remarkOnMissing();
   /// Tells in the table, as soon as it is true, that another tracker has recorded too.
   Result<void> markOtherTracker();
@@ -93,9 +100,11 @@ struct AcquisitionController::Impl {
   Setup stated_setup;  ///< By a person.
 
   TrackerLink tracker;
-  bool sensors_are_settled = false;   ///< One that begins to report does not join those that are recorded.
-  bool takes_settle_sensors = false;  ///< The session's takes say which ones are recorded.
-  SignalWindow heard;                 ///< Of every sensor, by the device's clock.
+  bool sensors_are_settled = false;     ///< One that begins to report does not join those that are recorded.
+  bool takes_settle_sensors = false;    ///< The session's takes say which ones are recorded.
+  std::vector<int> sensors_of_session;  ///< Those that took its places, the leading one first.
+  std::vector<int> late_sensors;        ///< That are not recorded, and not told of yet.
+  SignalWindow heard;                   ///< Of every sensor, by the device's clock.
   KnownPlaces places;
   RunningTake take;
   ViewUpdates views;

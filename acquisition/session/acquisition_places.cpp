@@ -57,6 +57,7 @@ void KnownPlaces::clear() {
   done_nodes.clear();
   takes_m.clear();
   current.reset();
+  led_by.reset();
   misfits.clear();
   can_undo = can_redo = false;
   updateGuess();
@@ -80,10 +81,6 @@ Result<std::vector<Sample>> KnownPlaces::reload(std::size_t place) {
 }
 
 void KnownPlaces::setRows(std::size_t place, const std::vector<Node>& rows_now) {
-  const auto counted = [this](std::size_t at) {
-    const Node* node = leading(at);
-    return node && node->role != NodeRole::kSkipped ? node : nullptr;
-  };
   const bool replaces = counted(place);
   rows[place] = rows_now;
   const Node* now = counted(place);
@@ -92,9 +89,35 @@ void KnownPlaces::setRows(std::size_t place, const std::vector<Node>& rows_now) 
     if (now) done_nodes.push_back(*now);
     return;
   }
+  gatherDone();
+}
+
+const Node* KnownPlaces::leading(std::size_t place) const {
+  if (led_by) return rowOf(place, *led_by);
+  return rows[place].empty() ? nullptr : &rows[place].front();
+}
+
+const Node* KnownPlaces::counted(std::size_t place) const {
+  const Node* node = leading(place);
+  return node && node->role != NodeRole::kSkipped ? node : nullptr;
+}
+
+void KnownPlaces::gatherDone() {
   done_nodes.clear();
   for (std::size_t at = 0; at < rows.size(); ++at)
     if (const Node* node = counted(at)) done_nodes.push_back(*node);
+}
+
+void KnownPlaces::leadBy(std::optional<int> sensor) {
+  if (led_by == sensor) return;
+  led_by = sensor;
+  for (std::size_t place = 0; place < rows.size(); ++place) {
+    const Node* now = counted(place);
+    takes_m[place] = now ? now->reference_from_sensor.position_m : kNoTake_m;
+  }
+  gatherDone();
+  judgeAll();
+  updateGuess();
 }
 
 std::vector<int> KnownPlaces::sensors() const {

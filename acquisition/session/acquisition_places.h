@@ -27,9 +27,13 @@ struct KnownPlaces {
   /// Reads again what is stored of one place. @return the samples of its live take
   Result<std::vector<Sample>> reload(std::size_t place);
   void setRows(std::size_t place, const std::vector<Node>& rows_now);
+  const Node* counted(std::size_t place) const;  ///< The leading row; null where there is none, or it was skipped.
+  void gatherDone();
   const Node* rowOf(std::size_t place, int sensor) const;  ///< Null where it has none.
-  /// The row of the sensor that leads there; null without a take.
-  const Node* leading(std::size_t place) const { return rows[place].empty() ? nullptr : &rows[place].front(); }
+  /// The row of the sensor that leads now; before one does, of the one that led there. Null without one.
+  const Node* leading(std::size_t place) const;
+  /// From now on this sensor tells how the takes fit, though some are led by another; none = of each its own.
+  void leadBy(std::optional<int> sensor);
   /// The sensors that took the places, the leading one first; empty before the first take.
   std::vector<int> sensors() const;
   std::optional<std::size_t> next() const;
@@ -53,6 +57,7 @@ struct KnownPlaces {
   /// Not at the current place, as far as that can be told.
   bool isElsewhere(const std::optional<Sample>& live) const;
 
+  std::optional<int> led_by;
   const std::optional<SessionStore>& store;  ///< None while no session is open.
   std::vector<PlaceState> states;
   std::vector<std::vector<Node>> rows;  ///< Of each place: one a sensor, the leading one first.

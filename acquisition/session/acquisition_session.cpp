@@ -59,6 +59,7 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   if (!content->newest_fit.empty()) emit owner->fitOpened(QString::fromStdString(content->newest_fit));
   for (const std::string& remark : store->remarks()) emit owner->remarked(QString::fromStdString(remark));
   remarkOnTracker();
+  remarkOnLeftOut();
 }
 
 bool AcquisitionController::Impl::isOpenAlready(const QString& path) const {
@@ -81,6 +82,7 @@ void AcquisitionController::Impl::close() {
   loose_refused = false;
   other_tracker.reset();
   other_names.clear();
+  late_sensors.clear();
   tracker.time_offset_s.reset();
   tracker.live.reset();
   tracker.recent_times_s.clear();

@@ -76,6 +76,7 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.missing = tracker.missingSensors();
   result.other_names = QString::fromStdString(other_names);
   result.takes_settle_sensors = takes_settle_sensors;
+  result.of_session = sensors_of_session;
   return result;
 }
 

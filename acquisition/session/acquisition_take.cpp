@@ -89,6 +89,7 @@ void AcquisitionController::Impl::stopTake() {
     for (const TakeSampler::OfSensor& one : take.sampler.ofSensors()) {
       keepLoose(loose.cancelled(node, one.sampler.abandoned()));
       keepLoose(loose.cancelled(node, one.sampler.samples()));
+      keepLoose(loose.cancelled(node, one.sampler.watched()));
     }
   }
   take.sampler.cancel();

@@ -101,11 +101,18 @@ std::vector<int> TrackerLink::silentSensors() const {
   return silent;
 }
 
+bool TrackerLink::isSure() const {
+  return std::any_of(heard.begin(), heard.end(), [](const auto& one) { return one.second == kMissedAfter; });
+}
+
+bool TrackerLink::joinsLate(const Sample& sample) const {
+  const auto times = heard.find(sample.sensor);
+  return times != heard.end() && times->second == kTimesHeard && isSure();
+}
+
 std::vector<int> TrackerLink::missingSensors() const {
-  const bool is_sure =
-      std::any_of(heard.begin(), heard.end(), [](const auto& one) { return one.second == kMissedAfter; });
   std::vector<int> missing;
-  for (const int sensor : is_sure ? sensors : std::vector<int>())
+  for (const int sensor : isSure() ? sensors : std::vector<int>())
     if (!heard.contains(sensor)) missing.push_back(sensor);
   return missing;
 }
@@ -246,14 +253,17 @@ void AcquisitionController::Impl::onSamples(const std::vector<Sample>& samples) 
     if (recorded.empty() && !tracker.sensors.empty() && take.collecting())
       endTake(take.sampler.passTime(sessionTime_s(sample.time_s)));
     if (takes_settle_sensors && !tracker.told_missing) remarkOnMissing();
+    if (!sensors_are_settled || takes_settle_sensors) noticeLate(sample);
   }
   views.tellSoon();
 }
 
 void AcquisitionController::Impl::settleSensors() {
-  std::vector<int> settled = places.sensors();
+  sensors_of_session = places.sensors();
+  std::vector<int> settled = sensorsOfSession();
   takes_settle_sensors = !settled.empty();
-  if (settled.empty() && store) settled = sensorsOfState();
+  leadPlaces(settled);
+  if (settled.empty() && store) settled = sensorsOfState(kSensorsState);
   if (settled.empty()) settled = tracker.asked_sensors;
   sensors_are_settled = !settled.empty();
   // Before a stream is heard, and where it is not heard any more, it stays as it was.
@@ -261,7 +271,9 @@ void AcquisitionController::Impl::settleSensors() {
     settled = tracker.sensors.empty() || tracker.heard.empty() ? tracker.sensors : tracker.reporting();
   if (settled == tracker.sensors) return;
   stopTake();
+  const bool stays_led = !settled.empty() && !tracker.sensors.empty() && settled.front() == tracker.sensors.front();
   tracker.sensors = settled;
+  if (stays_led) return;
   tracker.live.reset();
   tracker.recent_times_s.clear();
   take.stillness.clear();
@@ -269,17 +281,73 @@ void AcquisitionController::Impl::settleSensors() {
   take.stand.forget();
 }
 
-std::vector<int> AcquisitionController::Impl::sensorsOfState() {
-  const auto text = store->state(kSensorsState);
+std::vector<int> AcquisitionController::Impl::sensorsOfSession() {
+  std::vector<int> sensors = places.sensors();
+  return sensors.empty() ? sensors : goingOn(std::move(sensors), sensorsOfState(kGoingOnState));
+}
+
+void AcquisitionController::Impl::leadPlaces(const std::vector<int>& going_on) {
+  const bool some_left_out = !going_on.empty() && !sensorsOfState(kGoingOnState).empty();
+  const auto leader = some_left_out ? std::optional(going_on.front()) : std::nullopt;
+  if (leader == places.led_by) return;
+  places.leadBy(leader);
+  ++views.revision;
+  views.told_recorded.reset();
+}
+
+std::vector<int> AcquisitionController::Impl::sensorsOfState(const std::string& key) {
+  const auto text = store->state(key);
   const auto sensors = text ? readSensors(*text) : tl::unexpected(text.error());
   return told(sensors) ? *sensors : std::vector<int>();
 }
 
 void AcquisitionController::Impl::chooseSensors(const std::vector<int>& sensors) {
   tracker.asked_sensors = sensors;
-  if (store && !takes_settle_sensors) told(store->setState(kSensorsState, textOf(sensors)));
+  if (store && takes_settle_sensors) {
+    goOnWith(sensors);
+  } else if (store) {
+    told(store->setState(kSensorsState, textOf(sensors)));
+  }
   settleSensors();
   views.tellSoon();
+}
+
+void AcquisitionController::Impl::goOnWith(const std::vector<int>& sensors) {
+  const std::vector<int> of_session = places.sensors(), going_on = goingOn(of_session, sensors);
+  const std::vector<int> before = sensorsOfSession();
+  if (!areAmong(sensors, of_session) || store->isReadOnly() || going_on == before) return;
+  const int leader = before.front();
+  if (!areAmong({leader}, going_on) && tracker.running() && areAmong({leader}, tracker.reporting()) &&
+      !areAmong({leader}, tracker.silentSensors())) {
+    const std::string led = "Sensor " + std::to_string(leader) + " leads and reports: it cannot be left out.";
+    emit owner->remarked(QString::fromStdString(led));
+    return;
+  }
+  if (!told(store->setState(kGoingOnState, textOf(sensors)))) return;
+  const std::string text = goingOnText(of_session, going_on);
+  note("tracker", text);
+  emit owner->remarked(QString::fromStdString(text));
+}
+
+void AcquisitionController::Impl::remarkOnLeftOut() {
+  const std::vector<int> of_session = places.sensors(), going_on = sensorsOfSession();
+  if (going_on.size() < of_session.size())
+    emit owner->remarked(QString::fromStdString(goingOnText(of_session, going_on)));
+}
+
+void AcquisitionController::Impl::noticeLate(const Sample& sample) {
+  if (tracker.joinsLate(sample) && !areAmong({sample.sensor}, tracker.sensors)) late_sensors.push_back(sample.sensor);
+  if (!takes_settle_sensors) return;
+  for (const int late : std::exchange(late_sensors, {})) {
+    const std::string sensor = "Sensor " + std::to_string(late);
+    const std::string text =
+        areAmong({late}, places.sensors())
+            ? sensor + " reports again and is left out of this session: tick it on Connect to record it again."
+            : sensor + " reports and is not recorded in this session: its takes settled that " +
+                  fieldtrue::sensorsText(tracker.sensors) + (tracker.sensors.size() == 1 ? " is" : " are") + ".";
+    note("tracker", text);
+    emit owner->remarked(QString::fromStdString(text));
+  }
 }
 
 void AcquisitionController::Impl::remarkOnMissing() {
@@ -290,7 +358,7 @@ void AcquisitionController::Impl::remarkOnMissing() {
   std::string text = fieldtrue::sensorsText(missing) + (is_one ? " is" : " are") +
                      " recorded in this session, and the tracker does not send " + (is_one ? "it" : "them") +
                      ", only " + fieldtrue::sensorsText(tracker.reporting()) + ": plug " + (is_one ? "it" : "them") +
-                     " in again, or begin a new session.";
+                     " in again, or go on without (untick it on Connect; acquire --sensor).";
   text[0] = 'S';
   emit owner->remarked(QString::fromStdString(text));
 }
@@ -315,7 +383,7 @@ void AcquisitionController::Impl::compareNames(TableMetadata& known, const Table
     if (!sensorNames(said).empty()) forgetSensorNames(known);
     return;
   }
-  other_names = otherNamesText(places.sensors(), sensorNames(known), sensorNames(said));
+  other_names = otherNamesText(sensorsOfSession(), sensorNames(known), sensorNames(said));
   if (!other_names.empty()) note("tracker", other_names);
 }
 

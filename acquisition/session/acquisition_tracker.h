@@ -22,10 +22,13 @@ struct TrackerLink {
   /// Of a reading and those before it, what is of the sensors that are recorded: nothing until it is known which ones
   /// are. @param takes_newcomers a sensor that begins to report is recorded too
   std::vector<Sample> recorded(const Sample& sample, bool takes_newcomers = true);
+  /// Whether a sensor began to report with this reading, when others had for a while.
+  bool joinsLate(const Sample& sample) const;
   std::vector<int> reporting() const;  ///< Every sensor heard in this stream, in order.
   bool leads(const Sample& sample) const { return !sensors.empty() && sample.sensor == sensors.front(); }
   /// Recorded ones that have sent nothing for a while though others do.
   std::vector<int> silentSensors() const;
+  bool isSure() const;  ///< That by now each one that is there has reported.
   /// Recorded ones that have sent nothing since the stream began, once it is sure that others do.
   std::vector<int> missingSensors() const;
   void add(const Sample& sample);

@@ -24,14 +24,19 @@ Eigen::Vector3d seen_m(const Eigen::Vector3d& jig_m, int sensor, int n) {
 }
 
 /// A recording of a tracker whose jig stands at the first place, is carried to the second, and stands there.
-/// @param second_until_s from then on the second sensor says nothing
-QByteArray recording(double second_until_s = 1e9, int rate_hz = 60) {
+struct Heard {
+  double from_s = 0.0, until_s = 1e9;
+};
+
+/// @param heard when each sensor says something
+QByteArray recording(const std::array<Heard, 2>& heard = {}, int rate_hz = 60) {
   QByteArray text = "node,sensor,visit,t_s,x_m,y_m,z_m,qw,qx,qy,qz,status\n";
   for (int n = 0; n < 30 * rate_hz; ++n) {
     const double t_s = n / static_cast<double>(rate_hz);
     const double way = std::clamp((t_s - 8.0) / 2.0, 0.0, 1.0);
     for (int sensor = 0; sensor < 2; ++sensor) {
-      if (sensor == 1 && t_s >= second_until_s) continue;
+      const Heard& of_sensor = heard[static_cast<std::size_t>(sensor)];
+      if (t_s < of_sensor.from_s || t_s >= of_sensor.until_s) continue;
       const Eigen::Vector3d p_m = seen_m((1.0 - way) * kJigStands_m[0] + way * kJigStands_m[1], sensor, n);
       text += "-1," + QByteArray::number(sensor) + ",0," + QByteArray::number(t_s, 'f', 5);
       for (const double x : p_m) text += "," + QByteArray::number(x, 'g', 17);
@@ -50,7 +55,7 @@ class CliAcquireSensorsTest : public QObject {
   void initTestCase() {
     QVERIFY(folder_.isValid());
     QVERIFY(writeWhole(at("two.samples.csv"), recording()));
-    QVERIFY(writeWhole(at("falls.samples.csv"), recording(5.0)));
+    QVERIFY(writeWhole(at("falls.samples.csv"), recording({{{}, {0.0, 5.0}}})));
   }
 
   void bothAreRecorded() {
@@ -82,7 +87,7 @@ class CliAcquireSensorsTest : public QObject {
   }
   void slowTrackersAreTakenByThemselves() {
     QFETCH(int, rate_hz);
-    QVERIFY(writeWhole(at("slow.samples.csv"), recording(1e9, rate_hz)));
+    QVERIFY(writeWhole(at("slow.samples.csv"), recording({}, rate_hz)));
     const QString session = QStringLiteral("slow-%1").arg(rate_hz);
     const CliRun run =
         runCli({"acquire", "--device", "trace:" + at("slow.samples.csv") + ",rate=10", "--plan", "grid:2x1x1@0.2",
@@ -115,6 +120,7 @@ class CliAcquireSensorsTest : public QObject {
     QTest::addColumn<QString>("choice");
     QTest::addColumn<int>("status");
     QTest::addColumn<QByteArray>("sentence");
+    QTest::newRow("nothing") << "" << 2 << QByteArray("--sensor: '' names no sensors: all, 0 or 0+2");
     QTest::newRow("no number") << "x" << 2 << QByteArray("--sensor: 'x' names no sensors");
     QTest::newRow("half a list") << "0+" << 2 << QByteArray("--sensor: '0+' names no sensors");
     QTest::newRow("twice") << "1+1" << 2 << QByteArray("names sensor 1 twice");
@@ -131,6 +137,43 @@ class CliAcquireSensorsTest : public QObject {
     QCOMPARE(run.err.trimmed().count('\n'), 0);
     if (status == 2) QVERIFY(!QFileInfo::exists(at("refused.fieldtrue")));
     QFile::remove(at("refused.fieldtrue"));
+  }
+
+  void oneThatComesLateIsWaitedFor() {
+    QVERIFY(writeWhole(at("late.samples.csv"), recording({{{}, {4.0, 1e9}}})));
+    const CliRun refused = acquired("late", {"--sensor", "1"}, "late.samples.csv");
+    FT_VERIFY_STATUS(refused, 1);
+    QVERIFY2(refused.err.contains("--sensor 1: the tracker sends only sensor 0"), refused.err.constData());
+    const CliRun waited = acquired("late", {"--sensor", "1", "--reconnect", "20"}, "late.samples.csv");
+    FT_VERIFY_STATUS(waited, 0);
+    QVERIFY2(waited.err.contains("note: sensor 1 does not report"), waited.err.constData());
+    for (const Node& node : tableOfSession("late").nodes) QCOMPARE(node.sensor, 1);
+    const CliRun in_vain = acquired("vain", {"--sensor", "0+5", "--reconnect", "1"});
+    FT_VERIFY_STATUS(in_vain, 1);
+    const QByteArray why = "--sensor 0+5: the tracker sends only sensors 0 and 1 within 1 s (--reconnect)";
+    QVERIFY2(in_vain.err.contains(why), in_vain.err.constData());
+  }
+
+  void aSessionGoesOnWithoutADeadOne_data() {
+    QTest::addColumn<int>("dead");
+    QTest::newRow("another") << 1;
+    QTest::newRow("the leading one") << 0;
+  }
+  void aSessionGoesOnWithoutADeadOne() {
+    QFETCH(int, dead);
+    const QString name = QStringLiteral("dead-%1").arg(dead), left = QString::number(1 - dead);
+    FT_VERIFY_STATUS(acquired(name, {"--reconnect", "0"}, "falls.samples.csv"), 1);
+    QCOMPARE(tableOfSession(name).nodes.size(), std::size_t{2});
+    std::array<Heard, 2> heard;
+    heard[static_cast<std::size_t>(dead)].until_s = -1.0;
+    QVERIFY(writeWhole(at("left.samples.csv"), recording(heard)));
+    const CliRun run = acquired(name, {"--sensor", left}, "left.samples.csv");
+    FT_VERIFY_STATUS(run, 0);
+    const QByteArray told = "note: Sensor " + QByteArray::number(dead) + " is left out of this session from here on";
+    QVERIFY2(run.err.contains(told), run.err.constData());
+    const CalibrationTable table = tableOfSession(name);
+    QCOMPARE(table.nodes.size(), std::size_t{3});
+    QVERIFY(table.nodes[2].node == 1 && table.nodes[2].sensor == 1 - dead);
   }
 
   void aSessionGoesOnWithItsOwn() {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <set>
 
+#include "acquisition/session/recorded_sensors.h"
 #include "widgets/workbench/workbench.h"
 
 namespace fieldtrue::widgets {
@@ -18,7 +19,15 @@ constexpr int kBoxesInARow = 6;
 std::vector<int> knownSensors(const acquisition::AcquisitionStatus& status) {
   std::set<int> sensors(status.reporting.begin(), status.reporting.end());
   for (const acquisition::SensorProgress& one : status.sensors) sensors.insert(one.sensor);
+  sensors.insert(status.of_session.begin(), status.of_session.end());
   return {sensors.begin(), sensors.end()};
+}
+
+/// Once places are taken one that is dead may be left out, and taken in again.
+bool mayChange(const acquisition::AcquisitionStatus& status, int sensor, const acquisition::SensorProgress* recorded) {
+  if (recorded && status.sensors.size() == 1) return false;
+  if (!status.takes_settle_sensors || (recorded && recorded->silent)) return true;
+  return !recorded && acquisition::areAmong({sensor}, status.of_session);
 }
 
 }  // namespace
@@ -53,12 +62,12 @@ void RecordedSensors::onStatus(const acquisition::AcquisitionStatus& status) {
     const auto recorded = std::find_if(status.sensors.begin(), status.sensors.end(), is_it);
     const bool is_recorded = recorded != status.sensors.end();
     box->setChecked(is_recorded);
-    box->setEnabled(!status.takes_settle_sensors && !(is_recorded && status.sensors.size() == 1));
+    box->setEnabled(mayChange(status, sensor, is_recorded ? &*recorded : nullptr));
     box->setText(is_recorded && recorded->silent ? tr("Sensor %1, silent").arg(sensor) : tr("Sensor %1").arg(sensor));
   }
   hint_->setText(
       status.takes_settle_sensors
-          ? tr("The places of this session were taken by these. Another session may record others.")
+          ? tr("The places of this session were taken by these. One that is silent may be left out from here on.")
           : tr("Those ticked are recorded at every place, at once. Sensor %1 leads: by it rest and place are judged.")
                 .arg(status.sensors.front().sensor));
 }

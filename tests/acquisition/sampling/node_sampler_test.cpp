@@ -392,6 +392,40 @@ class NodeSamplerTest : public QObject {
     QVERIFY2(*still_after <= std::max(6.0, std::ceil(0.5 * rate_hz) + 1.0), qPrintable(QString::number(*still_after)));
   }
 
+  /// Between the places it is not the place, however slowly it is carried: each row is ten carries of 10 s.
+  void whatIsCarriedIsNeverAtRest_data() {
+    QTest::addColumn<double>("rate_hz");
+    QTest::addColumn<double>("speed_m_s");
+    QTest::addColumn<double>("tremor_m");
+    for (const double rate_hz : {7.5, 30.0, 120.0, 240.0}) {
+      QTest::addRow("%g Hz, 5 cm/s", rate_hz) << rate_hz << 0.05 << 0.0;
+      QTest::addRow("%g Hz, 2 cm/s", rate_hz) << rate_hz << 0.02 << 0.0;
+    }
+    for (const double rate_hz : {30.0, 120.0, 240.0})
+      QTest::addRow("%g Hz, 5 cm/s, trembling", rate_hz) << rate_hz << 0.05 << 2e-3;
+  }
+  void whatIsCarriedIsNeverAtRest() {
+    QFETCH(double, rate_hz);
+    QFETCH(double, speed_m_s);
+    QFETCH(double, tremor_m);
+    int judged_still = 0;
+    for (std::uint64_t run = 0; run < 10; ++run) {
+      StillnessDetector detector;
+      NoisySensor sensor(3e-4, 0.0, 40 + run);
+      sensor.path_m = [&](int n) {
+        const double time_s = n / rate_hz, turn = 2.0 * M_PI * 8.0 * time_s;
+        return Eigen::Vector3d(tremor_m * std::sin(turn), speed_m_s * time_s, tremor_m * std::cos(1.1 * turn));
+      };
+      for (int n = 0; n < 10.0 * rate_hz; ++n) {
+        Sample sample = sensor.next();
+        sample.time_s = n / rate_hz;
+        detector.add(sample);
+        if (n % std::max(1, static_cast<int>(rate_hz / 30.0)) == 0) judged_still += detector.still() ? 1 : 0;
+      }
+    }
+    QCOMPARE(judged_still, 0);
+  }
+
   void aGapIsNoSlowTracker() {
     StillnessDetector detector;
     NoisySensor sensor(1e-4, 0.0, 8);

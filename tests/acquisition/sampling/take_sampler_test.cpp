@@ -129,14 +129,24 @@ class TakeSamplerTest : public QObject {
              qPrintable(QString::number(known.of(1)->collected())));
   }
 
+  void motionThatOneSeesStartsAllOver_data() {
+    QTest::addColumn<bool>("first_moves");
+    QTest::addColumn<bool>("second_moves");
+    QTest::newRow("both") << true << true;
+    QTest::newRow("the one that has enough") << true << false;
+    QTest::newRow("the one that has not") << false << true;
+  }
   void motionThatOneSeesStartsAllOver() {
+    QFETCH(bool, first_moves);
+    QFETCH(bool, second_moves);
     TakeSampler take;
     take.start({0, 1});
-    // Sensor 0 has its 60 readings and looks no more; sensor 1, which misses every other one, is half way when the jig
-    // is knocked.
+    // Sensor 0 has its 60 readings; sensor 1, which misses every other one, has 40 when the jig is knocked, by which
+    // one of them may stand where it was, for the jig may turn about it.
     NoisySensor first = standing(0), second = standing(1);
     const auto knock = [](int n) { return stepAt(n, 80, 0.003); };
-    first.path_m = second.path_m = knock;
+    if (first_moves) first.path_m = knock;
+    if (second_moves) second.path_m = knock;
     for (int n = 0; n < 1000 && take.state() == TakeState::kCollecting; ++n) {
       take.add(first.next());
       const Sample sample = second.next();
@@ -148,6 +158,40 @@ class TakeSamplerTest : public QObject {
       QCOMPARE(one.sampler.restarts(), 1);
       QVERIFY(!one.sampler.abandoned().empty());
       for (const Sample& sample : one.sampler.samples()) QVERIFY(sample.time_s > 79.0 / kNoisySensor_hz);
+    }
+  }
+
+  void whatIsWatchedEntersNoMean() {
+    TakeSampler take;
+    NodeSampler alone;
+    take.start({0, 1});
+    alone.start();
+    NoisySensor often = standing(0), seldom = standing(1);
+    for (int n = 0; take.state() == TakeState::kCollecting; ++n) {
+      const Sample sample = often.next(), other = seldom.next();
+      take.add(sample);
+      if (alone.state() == TakeState::kCollecting) alone.add(sample);
+      if (n % 8 == 0) take.add(other);
+    }
+    QCOMPARE(take.state(), TakeState::kDone);
+    const NodeSampler& watching = *take.of(0);
+    // The 60th of the other one comes with the 473rd reading.
+    QCOMPARE(watching.watched().size(), std::size_t{473 - 60});
+    QCOMPARE(watching.restarts(), 0);
+    QCOMPARE(watching.samples().size(), std::size_t{60});
+    FT_VERIFY_MATCH(sameBits(watching.statistics()->mean, alone.statistics()->mean));
+    QCOMPARE(watching.statistics()->covariance_m2, alone.statistics()->covariance_m2);
+  }
+
+  /// A resting sensor that watches for 10 s is never taken to move: none in 30 such bounds it below 10 %.
+  void whoWatchesForLongSeesNoMotionInNoise() {
+    for (std::uint64_t run = 0; run < 30; ++run) {
+      NodeSampler sampler;
+      sampler.start();
+      NoisySensor sensor(3e-3, 0.8, 2000 + run);
+      while (sampler.state() == TakeState::kCollecting) sampler.add(sensor.next());
+      for (int n = 0; n < 10 * kNoisySensor_hz; ++n) sampler.watch(sensor.next());
+      QCOMPARE(sampler.restarts(), 0);
     }
   }
 

@@ -27,8 +27,10 @@ class FakeTracker : public acquisition::TrackerDevice {
     double noise_m = 1e-4;  ///< Bounded: nothing of it is ever an outlier.
     bool is_plugged = true;
     bool lies_in_room = false;  ///< Where it was taken off the jig, and not carried along.
+    std::uint64_t every = 1;    ///< Of so many readings it makes one.
   };
   std::map<int, OnJig> on_jig{{0, {}}};
+  double rate_hz = kRate_hz;
 
   void start() override { emit stateChanged(acquisition::DeviceState::kRunning, "running"); }
   void stop() override {}
@@ -43,10 +45,10 @@ class FakeTracker : public acquisition::TrackerDevice {
 
   void restartClock() { n_ = 0; }
   void send(const Pose& pose, const std::string& status = {}) {
-    const double time_s = static_cast<double>(n_++) / kRate_hz;
+    const double time_s = static_cast<double>(n_++) / rate_hz;
     std::vector<Sample> samples;
     for (const auto& [number, sensor] : on_jig) {
-      if (!sensor.is_plugged) continue;
+      if (!sensor.is_plugged || n_ % sensor.every != 0) continue;
       const Pose at = sensor.lies_in_room ? sensor.jig_from_sensor : pose * sensor.jig_from_sensor;
       Sample sample{time_s, number, inverse(reference_from_tracker) * at, status};
       for (double& x : sample.tracker_from_sensor.position_m) x += sensor.noise_m * uniform_(random_);
@@ -55,11 +57,11 @@ class FakeTracker : public acquisition::TrackerDevice {
     emit samplesReceived(samples);
   }
   void stand(double seconds, const std::string& status = {}) {
-    for (int n = 0; n < seconds * kRate_hz; ++n) send(true_pose, status);
+    for (int n = 0; n < seconds * rate_hz; ++n) send(true_pose, status);
   }
   void carryTo(const Pose& place, double seconds = 0.8) {
     const Pose from = true_pose;
-    const int steps = static_cast<int>(seconds * kRate_hz);
+    const int steps = static_cast<int>(seconds * rate_hz);
     for (int n = 1; n <= steps; ++n) {
       const double s = n / double(steps);
       true_pose = {from.position_m + s * (place.position_m - from.position_m), place.orientation};

@@ -202,6 +202,47 @@ class SeveralSensorsTest : public QObject {
     }
   }
 
+  void oneThatHasEnoughGoesOnWatching() {
+    TwoSensors bench(newPath());
+    bench.tracker->on_jig[1].every = 4;
+    bench.tracker->carryTo(bench.placePose(0));
+    bench.controller.take();
+    // Sensor 0 has its 60 readings after half a second, sensor 1 after two.
+    bench.tracker->stand(1.0);
+    QCOMPARE(bench.controller.status().sensors[0].collected, 60);
+    bench.tracker->on_jig[0].jig_from_sensor.position_m.x() += 0.003;
+    bench.tracker->stand(1.1);
+    QVERIFY2(bench.nodes.empty(), "what the sensor saw of the slip started all over");
+    bench.tracker->stand(1.2);
+    QCOMPARE(bench.nodes.size(), std::size_t{2});
+    FT_VERIFY_MATCH(holdsAll(bench.suspicions[0].toStdString(), {"sensor 0: moved once while sampling"}));
+    const Pose stood = inverse(bench.tracker->reference_from_tracker) * bench.tracker->true_pose;
+    for (const Node& node : bench.nodes) {
+      QCOMPARE(node.n_used + node.n_rejected, 60);
+      FT_VERIFY_MATCH(
+          near(node.tracker_from_sensor, stood * bench.tracker->on_jig[node.sensor].jig_from_sensor, 2e-4, 1e-6));
+    }
+  }
+
+  void slowlyCarriedIsNotTakenByItself() {
+    TwoSensors bench(newPath());
+    bench.tracker->rate_hz = 30.0;
+    for (int sensor = 0; sensor < 4; ++sensor) {
+      bench.tracker->on_jig[sensor].jig_from_sensor.position_m.y() = 0.04 * sensor;
+      bench.tracker->on_jig[sensor].noise_m = 5e-4;  // Uniform: an SD of 0.3 mm along each axis.
+    }
+    bench.controller.setAutomatic(true);
+    Pose before = bench.placePose(0);
+    before.position_m.y() -= 0.2;
+    bench.tracker->carryTo(before);
+    bench.tracker->carryTo(bench.placePose(0), 20.0);
+    QVERIFY(bench.nodes.empty() && bench.controller.status().take == TakeState::kIdle);
+    // It rests 0.7 s by a window of 0.5 s, and two seconds are sampled.
+    bench.tracker->stand(0.5 + 0.7 + 2.0 + 0.2);
+    QCOMPARE(bench.nodes.size(), std::size_t{4});
+    QCOMPARE(bench.suspicions[0], QString());
+  }
+
   void whatIsSuspiciousIsToldOfItsSensor() {
     TwoSensors bench(newPath(), planOf({3, 2, 1}));
     for (int place = 0; place < 4; ++place) bench.takeHere();
@@ -394,10 +435,15 @@ class SeveralSensorsTest : public QObject {
     bench.tracker->stand(0.1);
     QCOMPARE(bench.recorded(), Numbers({0, 1, 2}));
     bench.takeHere();
+    QVERIFY(bench.remarks.isEmpty());
     bench.tracker->on_jig[3] = kThird;
     bench.tracker->stand(1.0);
     QCOMPARE(bench.recorded(), Numbers({0, 1, 2}));
+    const QString told =
+        "Sensor 3 reports and is not recorded in this session: its takes settled that sensors 0, 1 and 2 are.";
+    QCOMPARE(bench.remarks, QStringList{told});
     bench.takeHere();
+    QCOMPARE(bench.remarks.size(), 1);
     QCOMPARE(bench.sensorsOfTable(), Numbers({0, 1, 2}));
     QCOMPARE(bench.table.nodes.size(), std::size_t{6});
   }
@@ -411,6 +457,81 @@ class SeveralSensorsTest : public QObject {
     bench.tracker->stand(0.5);
     QCOMPARE(bench.nodes.size(), std::size_t{2});
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
+    QCOMPARE(bench.remarks.size(), 1);
+    FT_VERIFY_MATCH(holdsAll(bench.remarks[0].toStdString(), {"Sensor 2 reports and is not recorded"}));
+  }
+
+  void oneThatIsLeftOutByChoiceIsNoNews() {
+    TwoSensors bench(newPath());
+    bench.tracker->stand(1.0);
+    bench.controller.setSensors({0});
+    bench.tracker->on_jig[2] = kThird;
+    bench.takeHere();
+    bench.takeHere();
+    QVERIFY2(bench.remarks.isEmpty(), qPrintable(bench.remarks.join("\n")));
+  }
+
+  void aSessionGoesOnWithoutADeadOne() {
+    const QString path = newPath();
+    {
+      TwoSensors bench(path);
+      bench.takeHere();
+      bench.tracker->on_jig[1].is_plugged = false;
+      bench.tracker->stand(3.0);
+      bench.controller.setSensors({0});
+      QCOMPARE(bench.recorded(), Numbers({0}));
+      QCOMPARE(bench.remarks, QStringList{"Sensor 1 is left out of this session from here on: what is taken now has no "
+                                          "rows of it."});
+      bench.takeHere();
+      QCOMPARE(bench.nodes.size(), std::size_t{3});
+      QVERIFY(!bench.controller.status().attention);
+      bench.controller.closeSession();
+    }
+    const auto events = SessionStore::open(path)->events().value();
+    QCOMPARE(std::count_if(events.begin(), events.end(),
+                           [](const auto& event) { return event.second.starts_with("Sensor 1 is left out"); }),
+             1);
+    TwoSensors bench(path, {}, false, 100.0);
+    QCOMPARE(bench.remarks.size(), 1);
+    FT_VERIFY_MATCH(holdsAll(bench.remarks[0].toStdString(), {"Sensor 1 is left out of this session"}));
+    bench.tracker->on_jig.erase(1);
+    bench.takeHere();
+    QCOMPARE(bench.nodes.size(), std::size_t{1});
+    QCOMPARE(bench.controller.status().of_session, Numbers({0, 1}));
+    bench.tracker->on_jig[1] = kSecond;
+    bench.tracker->stand(0.5);
+    QCOMPARE(bench.remarks.size(), 2);
+    FT_VERIFY_MATCH(holdsAll(bench.remarks[1].toStdString(), {"Sensor 1 reports again and is left out"}));
+    bench.controller.setSensors({1, 0});
+    QCOMPARE(bench.recorded(), Numbers({0, 1}));
+    bench.takeHere();
+    bench.readTables();
+    std::vector<std::pair<int, int>> rows;
+    for (const Node& node : bench.table.nodes) rows.emplace_back(node.node, node.sensor);
+    QCOMPARE(rows.size(), std::size_t{6});
+    QCOMPARE(std::count_if(rows.begin(), rows.end(), [](const auto& row) { return row.second == 1; }), 2);
+  }
+
+  void whereTheLeadingOneIsDeadTheLowestLeads() {
+    // So far from it that its positions cannot stand for those of the sensor that led.
+    TwoSensors bench(newPath(), planOf({3, 2, 2}));
+    bench.tracker->on_jig[1].jig_from_sensor.position_m = {0.0, 0.5, 0.3};
+    bench.tracker->on_jig[2] = kThird;
+    bench.controller.setSensors({1, 2, 0});
+    for (int place = 0; place < 8; ++place) bench.takeHere();
+    bench.controller.setSensors({2, 0});
+    QCOMPARE(bench.recorded(), Numbers({1, 0, 2}));
+    QCOMPARE(bench.remarks, QStringList{"Sensor 1 leads and reports: it cannot be left out."});
+    bench.tracker->on_jig[1].is_plugged = false;
+    bench.tracker->stand(3.0);
+    bench.controller.setSensors({2, 0});
+    QCOMPARE(bench.recorded(), Numbers({0, 2}));
+    FT_VERIFY_MATCH(holdsAll(bench.remarks.value(1).toStdString(), {"Sensor 1 is left out", "Sensor 0 leads"}));
+    for (int place = 8; place < 12; ++place) bench.takeHere();
+    QCOMPARE(bench.n_finished, 1);
+    QVERIFY(bench.refused.empty() && bench.controller.status().recorded->misfits.empty());
+    QCOMPARE(bench.nodes.size(), std::size_t{8 * 3 + 4 * 2});
+    for (const QString& suspicion : bench.suspicions) QCOMPARE(suspicion, QString());
   }
 
   void askedForBeforeAnythingIsRead() {
