@@ -65,7 +65,7 @@ std::vector<Reading> parsed(NdiParser& parser, const std::vector<std::string>& p
   return readings;
 }
 
-std::string statusOf(NdiTool tool, const NdiGate& gate = {2.0, true}) {
+std::string statusOf(const NdiTool& tool, const NdiGate& gate = {2.0, true}) {
   return ndiReading(tool, 0, 40.0, gate).sample.status;
 }
 
