@@ -4,7 +4,6 @@
 #include <QFile>
 #include <QFileInfo>
 #include <QSocketNotifier>
-#include <QStorageInfo>
 #include <QTimer>
 #include <algorithm>
 #include <array>
@@ -24,6 +23,9 @@
 #include "acquisition/session/acquisition_controller.h"
 #include "acquisition/session/recorded_sensors.h"
 #include "app/cli.h"
+#include "app/cli_acquire_sensors.h"
+#include "app/cli_acquire_trace.h"
+#include "app/cli_live_line.h"
 #include "app/cli_signals.h"
 #include "app/cli_values.h"
 #include "calib/core/json_text.h"
@@ -67,46 +69,6 @@ bool holdsNothing(const QString& session_path) {
   const auto newest_s = session->newestSample_s();
   return table && table->nodes.empty() && newest_s && !*newest_s;
 }
-
-/// Why a trace would not fit onto its disk; empty where it would.
-std::string noRoomFor(const std::string& trace) {
-  // Bytes, and a row of numbers for each chunk of them that is kept.
-  constexpr auto kMostOfFile = 2 * static_cast<qint64>(acquisition::LineTrace::kMostBytes);
-  const qint64 free = QStorageInfo(QFileInfo(QString::fromStdString(trace)).path()).bytesAvailable();
-  if (free < 0 || free >= kMostOfFile) return {};
-  return "--trace " + trace + ": its disk has " + std::to_string(free >> 20) + " MiB free, and a trace may need " +
-         std::to_string(kMostOfFile >> 20) + "; free some space, or write it elsewhere";
-}
-
-/// What the tracker does now, on a terminal's last line.
-class LiveLine {
- public:
-  LiveLine() : terminal_(isatty(STDERR_FILENO) != 0) {}
-  LiveLine(const LiveLine&) = delete;
-  LiveLine& operator=(const LiveLine&) = delete;
-  ~LiveLine() { clear(); }
-
-  void show(const acquisition::AcquisitionStatus& status) {
-    if (!terminal_) return;
-    std::string text;
-    if (status.take == acquisition::TakeState::kCollecting) {
-      text = std::to_string(status.collected) + "/" + std::to_string(status.wanted) + "  ";
-    }
-    text += status.reason.toStdString();
-    if (text == shown_) return;
-    shown_ = text;
-    std::cerr << "\r\033[K" << text << std::flush;
-  }
-
-  void clear() {
-    if (!shown_.empty()) std::cerr << "\r\033[K" << std::flush;
-    shown_.clear();
-  }
-
- private:
-  bool terminal_;
-  std::string shown_;
-};
 
 /// One acquisition on the event loop: prints what happens, reads what the operator types, and knows when it is over.
 class Acquisition {
@@ -186,78 +148,52 @@ class Acquisition {
            " was recorded with another plan; leave --plan out to resume it, or name a new session file";
   }
 
-  static std::vector<int> recordedSensors(const acquisition::AcquisitionStatus& status) {
-    std::vector<int> sensors;
-    for (const acquisition::SensorProgress& one : status.sensors) sensors.push_back(one.sensor);
-    return sensors;
-  }
-
   double patience_s() const { return options_.reconnect_s.value_or(kReconnect_s); }
-
-  std::string notTheSessions(const std::vector<int>& asked) const {
-    return options_.session + ": its places were taken by " + sensorsText(controller_.status().of_session) +
-           ", not by " + sensorsText(asked);
-  }
 
   /// Why the sensors that were asked for cannot go on with the session; empty when they can.
   std::string otherSensors(const std::vector<int>& asked) const {
     const std::vector<int> of_session = controller_.status().of_session;
     if (of_session.empty() || acquisition::areAmong(asked, of_session)) return {};
-    return notTheSessions(asked) + "; leave --sensor out, or name a new session file";
+    return notTheSessionsText(options_.session, of_session, asked);
   }
 
   /// Whether the leading sensor may be left out is known when the tracker runs: only where it is dead.
   void chooseSensors(const std::vector<int>& asked) {
     const std::vector<int> recorded = recordedSensors(controller_.status());
     const bool is_resumed = controller_.status().takes_settle_sensors;
-    if (is_resumed && !asked.empty() && !acquisition::areAmong({recorded.front()}, asked)) {
+    if (is_resumed && !asked.empty() && !acquisition::isAmong(recorded.front(), asked)) {
       without_leader_ = asked;
       return;
     }
     if (!options_.sensors.empty()) controller_.setSensors(asked);
-    if (is_resumed) tellLeaderStays(asked);
+    if (is_resumed && !asked.empty() && asked.front() != recorded.front()) tell(leaderStaysText(recorded, asked));
   }
 
   /// @return whether it is sure what is recorded
   bool leaderIsSettled() {
     if (without_leader_.empty()) return true;
     const int leader = recordedSensors(status_).front();
-    if (acquisition::areAmong({leader}, status_.reporting)) {
-      fail(notTheSessions(without_leader_) + ": sensor " + std::to_string(leader) +
-           " leads and reports; leave --sensor out, or name a new session file");
-    } else if (acquisition::areAmong({leader}, status_.missing)) {
+    if (acquisition::isAmong(leader, status_.reporting)) {
+      fail(notTheSessionsText(options_.session, status_.of_session, without_leader_,
+                              "sensor " + std::to_string(leader) + " leads and reports"));
+    } else if (acquisition::isAmong(leader, status_.missing)) {
       controller_.setSensors(std::exchange(without_leader_, {}));
     }
     return false;
   }
 
-  /// The sensor that leads is settled by the first take.
-  void tellLeaderStays(const std::vector<int>& asked) {
-    const std::vector<int> recorded = recordedSensors(controller_.status());
-    if (asked.empty() || asked.front() == recorded.front()) return;
-    tell("the session stays led by sensor " + std::to_string(recorded.front()) + ", not by sensor " +
-         std::to_string(asked.front()) + ": its first places were taken so");
-  }
-
   /// Which of several sensors are recorded, whenever that changes.
   void tellSensors() {
     const std::vector<int> recorded = recordedSensors(status_);
-    const auto reports = [this](int sensor) {
-      return std::find(status_.reporting.begin(), status_.reporting.end(), sensor) != status_.reporting.end();
-    };
     const bool is_news = recorded != told_sensors_ && !recorded.empty() && status_.reporting.size() > 1;
-    if (!is_news || !std::all_of(recorded.begin(), recorded.end(), reports)) return;
+    if (!is_news || !acquisition::areAmong(recorded, status_.reporting)) return;
     told_sensors_ = recorded;
-    std::string text = "Recording " + sensorsText(recorded);
-    if (recorded.size() > 1) text += ", led by sensor " + std::to_string(recorded.front());
-    tell(text + " of " + std::to_string(status_.reporting.size()) + " that report (--sensor chooses)");
+    tell(recordingText(recorded, status_.reporting.size()));
   }
 
   /// One of several that is silent is waited for as a tracker that is lost.
   void tellSilent() {
-    std::vector<int> silent;
-    for (const acquisition::SensorProgress& one : status_.sensors)
-      if (one.silent) silent.push_back(one.sensor);
+    const std::vector<int> silent = silentSensors(status_);
     if (silent == silent_) return;
     silent_ = silent;
     patience_.reset();
@@ -522,17 +458,6 @@ class Acquisition {
   bool over_ = false;
 };
 
-/// Why the trace that is asked for cannot be written; said before a day's recording, not after it.
-std::string noTraceOf(const acquisition::TrackerDevice& device, const AcquireOptions& options) {
-  if (options.trace.empty()) return {};
-  if (!device.trace()) return "--trace writes what goes over a tracker's line, and " + options.device + " has none";
-  const QFileInfo folder(QFileInfo(QString::fromStdString(options.trace)).path());
-  if (!folder.isDir()) return "--trace " + options.trace + ": its folder does not exist";
-  if (!folder.isWritable()) return "--trace " + options.trace + ": its folder cannot be written to";
-  if (QFileInfo(QString::fromStdString(options.trace)).isDir()) return "--trace " + options.trace + ": it is a folder";
-  return noRoomFor(options.trace);
-}
-
 /// Nothing at all is no way to say all of them.
 CLI::Validator someSensors() {
   return CLI::Validator(
@@ -548,7 +473,7 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   // Made only to see that its text can be read, before a session file is made; it is not started.
   const auto device = acquisition::makeDevice(options.device, *scene);
   if (!device) return wrongUsage(device.error());
-  if (const auto why = noTraceOf(**device, options); !why.empty()) return wrongUsage(why);
+  if (const auto why = noTraceOf(**device, options.device, options.trace); !why.empty()) return wrongUsage(why);
   const auto setup = readSetupArgument(options.setup);
   if (!setup) return tl::unexpected(setup.error());
   const auto length =

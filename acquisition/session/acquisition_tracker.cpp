@@ -65,7 +65,7 @@ void TrackerLink::beginStream() {
 }
 
 std::vector<Sample> TrackerLink::recorded(const Sample& sample, bool takes_newcomers) {
-  const auto is_recorded = [&] { return std::find(sensors.begin(), sensors.end(), sample.sensor) != sensors.end(); };
+  const auto is_recorded = [&] { return isAmong(sample.sensor, sensors); };
   // That it is gone is no report of it.
   if (sample.status == kStatusUnplugged) return is_recorded() ? std::vector{sample} : std::vector<Sample>();
   int& times = heard[sample.sensor];
@@ -317,8 +317,8 @@ void AcquisitionController::Impl::goOnWith(const std::vector<int>& sensors) {
   const std::vector<int> before = sensorsOfSession();
   if (!areAmong(sensors, of_session) || store->isReadOnly() || going_on == before) return;
   const int leader = before.front();
-  if (!areAmong({leader}, going_on) && tracker.running() && areAmong({leader}, tracker.reporting()) &&
-      !areAmong({leader}, tracker.silentSensors())) {
+  if (!isAmong(leader, going_on) && tracker.running() && isAmong(leader, tracker.reporting()) &&
+      !isAmong(leader, tracker.silentSensors())) {
     const std::string led = "Sensor " + std::to_string(leader) + " leads and reports: it cannot be left out.";
     emit owner->remarked(QString::fromStdString(led));
     return;
@@ -336,12 +336,12 @@ void AcquisitionController::Impl::remarkOnLeftOut() {
 }
 
 void AcquisitionController::Impl::noticeLate(const Sample& sample) {
-  if (tracker.joinsLate(sample) && !areAmong({sample.sensor}, tracker.sensors)) late_sensors.push_back(sample.sensor);
+  if (tracker.joinsLate(sample) && !isAmong(sample.sensor, tracker.sensors)) late_sensors.push_back(sample.sensor);
   if (!takes_settle_sensors) return;
   for (const int late : std::exchange(late_sensors, {})) {
     const std::string sensor = "Sensor " + std::to_string(late);
     const std::string text =
-        areAmong({late}, places.sensors())
+        isAmong(late, places.sensors())
             ? sensor + " reports again and is left out of this session: tick it on Connect to record it again."
             : sensor + " reports and is not recorded in this session: its takes settled that " +
                   fieldtrue::sensorsText(tracker.sensors) + (tracker.sensors.size() == 1 ? " is" : " are") + ".";

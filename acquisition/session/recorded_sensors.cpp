@@ -22,24 +22,27 @@ int numberOf(std::string_view text) {
 
 }  // namespace
 
+bool isAmong(int sensor, const std::vector<int>& others) {
+  return std::find(others.begin(), others.end(), sensor) != others.end();
+}
+
 bool areAmong(const std::vector<int>& some, const std::vector<int>& others) {
-  return std::all_of(some.begin(), some.end(),
-                     [&others](int sensor) { return std::find(others.begin(), others.end(), sensor) != others.end(); });
+  return std::all_of(some.begin(), some.end(), [&others](int sensor) { return isAmong(sensor, others); });
 }
 
 std::vector<int> goingOn(std::vector<int> of_session, const std::vector<int>& chosen) {
   if (chosen.empty()) return of_session;
   std::vector<int> going_on = std::move(of_session);
   const int led_by = going_on.empty() ? 0 : going_on.front();
-  std::erase_if(going_on, [&chosen](int sensor) { return !areAmong({sensor}, chosen); });
-  if (!areAmong({led_by}, going_on)) std::sort(going_on.begin(), going_on.end());
+  std::erase_if(going_on, [&chosen](int sensor) { return !isAmong(sensor, chosen); });
+  if (!isAmong(led_by, going_on)) std::sort(going_on.begin(), going_on.end());
   return going_on;
 }
 
 std::string goingOnText(const std::vector<int>& of_session, const std::vector<int>& going_on) {
   std::vector<int> left_out;
   for (const int sensor : of_session)
-    if (!areAmong({sensor}, going_on)) left_out.push_back(sensor);
+    if (!isAmong(sensor, going_on)) left_out.push_back(sensor);
   if (left_out.empty()) return "Every sensor of this session is recorded again from here on.";
   std::string text = sensorsText(left_out) + (left_out.size() == 1 ? " is" : " are") +
                      " left out of this session from here on: what is taken now has no rows of " +

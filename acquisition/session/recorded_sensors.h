@@ -18,6 +18,7 @@ inline constexpr const char* kGoingOnState = "sensors_going_on";
 std::vector<int> goingOn(std::vector<int> of_session, const std::vector<int>& chosen);
 /// What it means that a session goes on with some of its sensors. Both with the leading one first.
 std::string goingOnText(const std::vector<int>& of_session, const std::vector<int>& going_on);
+bool isAmong(int sensor, const std::vector<int>& others);
 /// Whether each of some sensors is one of others.
 bool areAmong(const std::vector<int>& some, const std::vector<int>& others);
 

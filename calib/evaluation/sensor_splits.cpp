@@ -1,6 +1,7 @@
 #include "calib/evaluation/sensor_splits.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -15,13 +16,19 @@
 namespace fieldtrue::evaluation {
 namespace {
 
+/// Nothing where it is below what any tracker tells.
+std::string differenceText(double difference) {
+  constexpr double kLeast = 5e-4;  // Millimetres or degrees.
+  return std::abs(difference) < kLeast ? "0" : significantText(difference);
+}
+
 std::string splitText(const SensorSplit& split, const std::string& what, const char* unit,
                       const Validation& validation) {
   const PairedDifference& difference = split.separate_less_shared;
   const std::string figures = "corrected by itself, each sensor leaves " + errorText(split.separate) + " " + unit +
                               ", with the correction that all share " + errorText(split.shared) + " " + unit +
-                              " (difference " + significantText(difference.low90) + " to " +
-                              significantText(difference.high90) + " " + unit + "; " + toText(validation) + ")";
+                              " (difference " + differenceText(difference.low90) + " to " +
+                              differenceText(difference.high90) + " " + unit + "; " + toText(validation) + ")";
   if (split.is_better) return "The sensors err differently in " + what + ": " + figures + ".";
   if (difference.low90 > 0.0) return "The sensors share one correction of " + what + ": " + figures + ".";
   return "Nothing shows that the sensors err differently in " + what + ", so they share one correction: " + figures +

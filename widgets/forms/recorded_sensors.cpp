@@ -27,7 +27,7 @@ std::vector<int> knownSensors(const acquisition::AcquisitionStatus& status) {
 bool mayChange(const acquisition::AcquisitionStatus& status, int sensor, const acquisition::SensorProgress* recorded) {
   if (recorded && status.sensors.size() == 1) return false;
   if (!status.takes_settle_sensors || (recorded && recorded->silent)) return true;
-  return !recorded && acquisition::areAmong({sensor}, status.of_session);
+  return !recorded && acquisition::isAmong(sensor, status.of_session);
 }
 
 }  // namespace

@@ -152,6 +152,15 @@ class SensorsTest : public QObject {
     FT_VERIFY_MATCH(holdsAll(comparison.split->text, {"share one correction"}));
   }
 
+  /// What no correction tells apart differs by the computer's rounding: that is no figure for a person.
+  void aDifferenceOfRoundingIsNone() {
+    const auto choice = calibration::parseCorrectorChoice("rigid", "none").value();
+    const auto splits = splitsOf(twoSensors({}), choice, {}, {});
+    FT_VERIFY_OK(splits);
+    QVERIFY(splits->position.has_value());
+    FT_VERIFY_MATCH(holdsAll(splits->position->text, {"(difference 0 to 0 mm; "}));
+  }
+
   void sensorsThatErrDifferentlyAreToldApart() {
     // A gain of 2 % is up to 2 cm of the second's reading, and none of the first's.
     const Comparison comparison =

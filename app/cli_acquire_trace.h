@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "acquisition/devices/tracker_device.h"
+
+namespace fieldtrue::cli {
+
+/// Why a trace would not fit onto its disk; empty where it would.
+std::string noRoomFor(const std::string& trace);
+/// Why the trace that is asked for cannot be written; said before a day's recording, not after it. Empty where it can,
+/// or none is asked for.
+/// @param address of the device, as it was typed
+std::string noTraceOf(const acquisition::TrackerDevice& device, const std::string& address, const std::string& trace);
+
+}  // namespace fieldtrue::cli
