@@ -72,7 +72,7 @@ class StrongBendsTest : public QObject {
   }
 
   /// A loop at a corner of the grid bends a few places by decimetres, and a scan of small changes takes it for a small
-  /// body: what is left is told by folds that search the loop all the same (0.11 and 0.08 by those that did not).
+  /// body: what is left is told by folds that search the loop all the same (0.11 and 0.04 by those that did not).
   void everyFoldFindsALoopAtACorner_data() {
     using Vector = std::vector<double>;
     QTest::addColumn<Vector>("center_m");
