@@ -42,6 +42,7 @@ struct Options {
   std::string role = "dev";
   bool samples = false;
   bool levels = false;
+  bool unforeseen = false;
 };
 
 std::uint64_t wholeNumber(const std::string& option, const std::string& text, std::uint64_t low, std::uint64_t high) {
@@ -74,7 +75,7 @@ Options parse(std::span<const std::string> arguments) {
   static constexpr std::string_view kWithValue[] = {"--out",      "--seed",     "--sessions", "--count",
                                                     "--threads",  "--jobs",     "--role",     "--shelf",
                                                     "--max-rows", "--strength", "--cli"};
-  static constexpr std::string_view kFlags[] = {"--samples", "--levels"};
+  static constexpr std::string_view kFlags[] = {"--samples", "--levels", "--unforeseen"};
   const auto given = optionsOf(arguments, "generate", kWithValue, kFlags);
   Options options;
   for (const auto& [name, text] : given) {
@@ -86,10 +87,12 @@ Options parse(std::span<const std::string> arguments) {
     if (name == "--max-rows") options.most_rows = wholeNumber(name, text, 48, 100000);
     if (name == "--strength") options.strength = strengthOf(text);
     if (name == "--role") options.role = oneOf(name, text, {"dev", "test"});
-    if (name == "--shelf") options.shelf = oneOf(name, text, {"all", "none", "single", "pairs", "off", "signals"});
+    if (name == "--shelf")
+      options.shelf = oneOf(name, text, {"all", "none", "single", "pairs", "off", "unforeseen", "signals"});
   }
   options.samples = given.count("--samples") > 0;
   options.levels = given.count("--levels") > 0;
+  options.unforeseen = given.count("--unforeseen") > 0;
   if (options.levels && options.strength)
     throw std::invalid_argument("generate: --levels and --strength exclude each other");
   if (options.out.empty()) throw std::invalid_argument("generate: --out DIR is needed, the folder to write");
@@ -97,6 +100,14 @@ Options parse(std::span<const std::string> arguments) {
   if (options.sessions == 0) throw std::invalid_argument("generate: --sessions K is needed, how many to write");
   if (options.cli.empty()) options.cli = fs::read_symlink("/proc/self/exe").parent_path() / "fieldtrue-cli";
   return options;
+}
+
+/// Two sessions of each unforeseen kind at each of the four strengths.
+void wishUnforeseen(const Options& options, std::vector<SessionWish>& wishes) {
+  for (const std::string& kind : unforeseenIds())
+    for (const double level : kLevels)
+      for (int twice = 0; twice < 2; ++twice)
+        wishes.push_back({"unforeseen", level, options.samples, options.most_rows, kind});
 }
 
 /// Shelves in their shares; of one effect alone a fifth of the sessions at each of the four strengths.
@@ -116,12 +127,13 @@ std::vector<SessionWish> drawWishes(const Options& options, Random& random) {
   std::map<std::string, std::size_t> seen;
   std::vector<SessionWish> wishes;
   for (const std::string& shelf : shelves) {
-    SessionWish wish{shelf, std::nullopt, options.samples, options.most_rows};
+    SessionWish wish{shelf, std::nullopt, options.samples, options.most_rows, ""};
     const std::size_t turn = seen[shelf]++ % 5;
-    if (shelf == "single" || shelf == "off")
+    if (shelf == "single" || shelf == "off" || shelf == "unforeseen")
       wish.level = options.levels && turn < 4 ? std::optional(kLevels[turn]) : options.strength;
     wishes.push_back(std::move(wish));
   }
+  if (options.unforeseen) wishUnforeseen(options, wishes);
   // An order that tells nothing.
   for (std::size_t n = wishes.size(); n > 1; --n)
     std::swap(wishes[n - 1], wishes[static_cast<std::size_t>(uniformInt(random, 0, static_cast<int>(n) - 1))]);

@@ -45,6 +45,9 @@ const std::vector<Kind>& alignedKinds();
 /// Effects that stand in no catalogue.
 const std::vector<Kind>& foreignKinds();
 
+/// What goes wrong in a laboratory, as somebody thought of who knew neither the catalogue nor the diagnosis.
+const std::vector<Kind>& unforeseenKinds();
+
 /// Effects that only raw samples show.
 const std::vector<std::string>& signalIds();
 

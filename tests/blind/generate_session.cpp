@@ -211,6 +211,15 @@ void knowAlignment(Setup& setup, Random& random) {
   setup.alignment_rad = uniform(random, 0.0005, 0.002);
 }
 
+std::vector<Kind> kindsOn(const SessionWish& wish, bool aligned) {
+  if (wish.shelf == "off") return foreignKinds();
+  if (wish.shelf != "unforeseen") return aligned ? alignedKinds() : catalogueKinds();
+  std::vector<Kind> kinds;
+  for (const Kind& kind : unforeseenKinds())
+    if (wish.kind.empty() || kind.id == wish.kind) kinds.push_back(kind);
+  return kinds;
+}
+
 /// @return the effects of a session; none when no believable geometry has the wished strength on this design
 std::vector<Placed> drawEffects(const SessionWish& wish, const Setup& setup, const Alignment& alignment,
                                 Random& random) {
@@ -223,7 +232,8 @@ std::vector<Placed> drawEffects(const SessionWish& wish, const Setup& setup, con
     }
     const double wished = wish.level ? *wish.level : logUniform(random, 0.2, 3.0);
     const bool aligned = setup.alignment_known && uniform(random, 0, 1) < 0.5;
-    const std::vector<Kind>& kinds = wish.shelf == "off" ? foreignKinds() : aligned ? alignedKinds() : catalogueKinds();
+    const std::vector<Kind> kinds = kindsOn(wish, aligned);
+    if (std::none_of(kinds.begin(), kinds.end(), [&](const Kind& kind) { return kind.fits(setup); })) return {};
     Placed placed;
     if (place(pick(kinds, setup, random), setup, alignment, wished, random, placed)) return {placed};
   }
@@ -283,6 +293,12 @@ GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed) {
   for (int design = 0; design < 50; ++design)
     if (std::optional<GeneratedSession> session = drawSession(wish, random)) return *std::move(session);
   throw std::runtime_error("no believable geometry reaches the wished strength; another seed is needed");
+}
+
+std::vector<std::string> unforeseenIds() {
+  std::vector<std::string> ids;
+  for (const Kind& kind : unforeseenKinds()) ids.push_back(kind.id);
+  return ids;
 }
 
 std::vector<std::string> catalogueIds() {

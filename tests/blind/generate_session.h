@@ -23,10 +23,11 @@ struct GeneratedSession {
 inline constexpr std::array<double, 4> kLevels = {0.35, 0.7, 1.4, 2.8};
 
 struct SessionWish {
-  std::string shelf;            ///< none, single, pairs, off, signals
+  std::string shelf;            ///< none, single, pairs, off, unforeseen, signals
   std::optional<double> level;  ///< gap to noise of a single effect; nothing: drawn
   bool samples = false;         ///< sample tables for all, not for a quarter of the sessions whatever their shelf
   std::size_t most_rows = 0;    ///< 0: any number
+  std::string kind;             ///< of an unforeseen effect; "": drawn
 };
 
 /// Draws one session.
@@ -35,6 +36,9 @@ GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed);
 
 /// Every effect of the catalogue, in order of name.
 std::vector<std::string> catalogueIds();
+
+/// Every unforeseen kind, in their order.
+std::vector<std::string> unforeseenIds();
 
 /// Faults of the sample stream of one session; zero or one: none.
 struct StreamFault {
