@@ -47,6 +47,8 @@ Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a) { return a * a.trans
 
 Eigen::MatrixXd times(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) { return a * b; }
 
+Eigen::MatrixXd transposedTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) { return a.transpose() * b; }
+
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.selfadjointView<Eigen::Lower>() * b;
 }

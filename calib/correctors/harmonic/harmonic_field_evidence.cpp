@@ -1,13 +1,11 @@
 #include "calib/correctors/harmonic/harmonic_field_evidence.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
-#include "calib/correctors/multiquadric/hmq_kernel.h"
 #include "calib/correctors/numerics/dense_solver.h"
 
 namespace fieldtrue::correctors {
@@ -18,10 +16,28 @@ using GroupVector = Eigen::Matrix<double, kPerSource, 1>;
 /// The smallest prior variance worth telling from none, in squared units; the search is logarithmic from there up to 1.
 constexpr double kSmallestVariance = 1e-12;
 
+/// Inverse of a matrix without an eigenvalue below 1; where those above are so large that rounding hides it, of one as
+/// near to it as rounding is.
+Eigen::MatrixXd inverseOf(const Eigen::MatrixXd& matrix) {
+  constexpr double kMostRounding = 1e-6;
+  Eigen::MatrixXd inverse = matrix;
+  for (double rounding = 1e-15; !choleskyInPlace(inverse) && rounding < kMostRounding; rounding *= 10.0) {
+    inverse = matrix;
+    inverse.diagonal() *= 1.0 + rounding;
+  }
+  choleskyInverseInPlace(inverse);
+  completeSymmetric(inverse);
+  return inverse;
+}
+
 /// Posterior of the chosen groups' unknowns.
 class Posterior {
  public:
-  Posterior(const GroupedSystem& system, double noise_factor) : system_(system), noise_factor_(noise_factor) {}
+  Posterior(const GroupedSystem& system, double noise_factor, Eigen::Index likely)
+      : system_(system), noise_factor_(noise_factor) {
+    const Eigen::MatrixXd made = system.columns(0, likely);
+    for (Eigen::Index g = 0; g < likely; ++g) made_.emplace(g, made.middleCols<kPerSource>(kPerSource * g));
+  }
 
   std::vector<Eigen::Index> groups;
   std::vector<double> variance;
@@ -37,7 +53,7 @@ class Posterior {
     columns_.resize(system_.right().size(), size());
     for (std::size_t k = 0; k < groups.size(); ++k) {
       auto made = made_.find(groups[k]);
-      if (made == made_.end()) made = made_.emplace(groups[k], system_.columns(groups[k])).first;
+      if (made == made_.end()) made = made_.emplace(groups[k], system_.columns(groups[k], 1)).first;
       columns_.middleCols(start(k), kPerSource) = made->second;
     }
   }
@@ -59,8 +75,7 @@ class Posterior {
     }
     h = sd.asDiagonal() * h * sd.asDiagonal() / noise_factor_;
     h.diagonal().array() += 1.0;
-    const Eigen::LLT<Eigen::MatrixXd> llt(h);
-    covariance_ = sd.asDiagonal() * llt.solve(Eigen::MatrixXd::Identity(size(), size())) * sd.asDiagonal();
+    covariance_ = sd.asDiagonal() * inverseOf(h) * sd.asDiagonal();
     mean_ = covariance_ * right / noise_factor_;
     right_ = std::move(right);
   }
@@ -184,14 +199,10 @@ GroupedSystem::GroupedSystem(const Eigen::MatrixXd& design, const Eigen::MatrixX
   }
 }
 
-Eigen::MatrixXd GroupedSystem::columns(Eigen::Index group) const {
-  Eigen::MatrixXd columns = -by_nuisance_ * by_nuisance_.middleRows(kPerSource * group, kPerSource).transpose();
-  const auto n_rows = static_cast<std::size_t>(design_.rows());
-  for (Eigen::Index other = 0; other < design_.cols(); ++other)
-    for (Eigen::Index own = 0; own < kPerSource; ++own)
-      columns(other, own) +=
-          dotProduct(design_.col(other).data(), design_.col(kPerSource * group + own).data(), n_rows);
-  return columns;
+Eigen::MatrixXd GroupedSystem::columns(Eigen::Index first_group, Eigen::Index count) const {
+  const Eigen::Index first = kPerSource * first_group, n = kPerSource * count;
+  return transposedTimes(design_, design_.middleCols(first, n)) -
+         times(by_nuisance_, by_nuisance_.middleRows(first, n).transpose());
 }
 
 GroupSelection selectGroups(const GroupedSystem& system, const GroupSelectionOptions& options,
@@ -199,7 +210,7 @@ GroupSelection selectGroups(const GroupedSystem& system, const GroupSelectionOpt
   constexpr int kStepsEach = 3;
   constexpr int kStepsLast = 12;
   constexpr double kLeastNoise = 1e-30;
-  Posterior posterior(system, options.noise_factor);
+  Posterior posterior(system, options.noise_factor, options.likely);
   if (options.noise_unknown)
     posterior.setNoiseFactor(std::max(kLeastNoise, system.y_squared() / std::max(1.0, system.n_rows())));
   std::vector<Offer> offers;

@@ -29,7 +29,7 @@ class GroupedSystem {
   double unit_m() const { return unit_m_; }
   /// Of A^T A, on the diagonal.
   const GroupMatrix& block(Eigen::Index group) const { return blocks_[static_cast<std::size_t>(group)]; }
-  Eigen::MatrixXd columns(Eigen::Index group) const;  ///< Of A^T A, kPerSource of them.
+  Eigen::MatrixXd columns(Eigen::Index first_group, Eigen::Index count) const;  ///< Of A^T A, kPerSource each.
 
  private:
   const Eigen::MatrixXd& design_;
@@ -47,6 +47,7 @@ struct GroupSelectionOptions {
   std::size_t most_groups = 40;
   double noise_factor = 1.0;   ///< Variance of the noise in units of the one stated.
   bool noise_unknown = false;  ///< Found anew after every group, starting from y itself.
+  Eigen::Index likely = 0;     ///< First groups that may well be chosen: their products are made at once.
 };
 
 /// The groups chosen, and the posterior of their unknowns.

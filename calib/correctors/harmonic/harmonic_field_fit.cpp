@@ -181,8 +181,9 @@ class Fitter {
     const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(linear.rigid.rows(), 6);
     const GroupedSystem system(linear.design, basis, linear.y, box_.extent_m());
     const bool unknown = data_.jig_sd_m <= 0.0;
+    const auto n_chosen = static_cast<Eigen::Index>(chosen_.sites.size());  // The first candidates, see refine().
     const GroupSelection selection =
-        selectGroups(system, {options_.least_gain, options_.most_sources, noiseForStep(), unknown}, control_);
+        selectGroups(system, {options_.least_gain, options_.most_sources, noiseForStep(), unknown, n_chosen}, control_);
     noise_factor_ = std::clamp(selection.noise_factor, 1e-16, 1e16);
 
     Eigen::VectorXd amplitudes = Eigen::VectorXd::Zero(linear.present.size());

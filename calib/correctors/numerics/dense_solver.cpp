@@ -40,6 +40,18 @@ int sizeOf(const Eigen::MatrixXd& matrix) {
   return static_cast<int>(matrix.rows());
 }
 
+/// A B or A^T B. @param rows of the product
+Eigen::MatrixXd product(CBLAS_TRANSPOSE transpose, const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
+                        Eigen::Index rows) {
+  useOneThread();
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(rows, b.cols());
+  if (product.size() > 0 && b.rows() > 0)
+    cblas_dgemm(CblasColMajor, transpose, CblasNoTrans, static_cast<int>(rows), static_cast<int>(b.cols()),
+                static_cast<int>(b.rows()), 1.0, a.data(), static_cast<int>(a.rows()), b.data(),
+                static_cast<int>(b.rows()), 0.0, product.data(), static_cast<int>(rows));
+  return product;
+}
+
 /// The inverse of a lower triangular matrix in its place, by halves: OpenBLAS' own dtrtri goes through blocks of a
 /// quarter of the matrix a column at a time, which takes three times as long at 567 rows.
 /// @param l first element; columns are `stride` apart
@@ -138,14 +150,13 @@ Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a) {
 }
 
 Eigen::MatrixXd times(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  useOneThread();
   FT_CHECK(a.cols() == b.rows());
-  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(a.rows(), b.cols());
-  if (product.size() > 0 && b.rows() > 0)
-    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, static_cast<int>(a.rows()), static_cast<int>(b.cols()),
-                static_cast<int>(b.rows()), 1.0, a.data(), static_cast<int>(a.rows()), b.data(),
-                static_cast<int>(b.rows()), 0.0, product.data(), static_cast<int>(a.rows()));
-  return product;
+  return product(CblasNoTrans, a, b, a.rows());
+}
+
+Eigen::MatrixXd transposedTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  FT_CHECK(a.rows() == b.rows());
+  return product(CblasTrans, a, b, a.cols());
 }
 
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {

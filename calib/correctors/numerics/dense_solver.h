@@ -39,6 +39,9 @@ Eigen::MatrixXd timesOwnTranspose(const Eigen::MatrixXd& a);
 /// A B.
 Eigen::MatrixXd times(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
+/// A^T B.
+Eigen::MatrixXd transposedTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+
 /// A B for symmetric A whose lower triangle is given.
 Eigen::MatrixXd symmetricTimes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
