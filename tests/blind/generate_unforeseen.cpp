@@ -1,9 +1,139 @@
-#include "tests/blind/generate_effects.h"
+#include "tests/blind/generate_unforeseen.h"
+
+#include <algorithm>
+#include <cmath>
 
 namespace blind {
+namespace unforeseen {
+
+Scene sceneOf(const Setup& setup) {
+  Scene scene;
+  scene.up = setup.tracker_from_jig * Vector3d::UnitZ();
+  scene.duration_s = std::max(1.0, setup.duration_s());
+  for (const Row& row : setup.rows) {
+    scene.poses.push_back(setup.expected(row));
+    const Vector3d& p_m = scene.poses.back().position_m;
+    scene.middle_m += p_m / static_cast<double>(setup.rows.size());
+    scene.lowest_m = std::min(scene.lowest_m, p_m.dot(scene.up));
+    scene.highest_m = std::max(scene.highest_m, p_m.dot(scene.up));
+  }
+  return scene;
+}
+
+double extent_m(const Scene& scene, const Vector3d& toward) {
+  double farthest_m = 0;
+  for (const SolvedPose& pose : scene.poses)
+    farthest_m = std::max(farthest_m, (pose.position_m - scene.middle_m).dot(toward));
+  return farthest_m;
+}
+
+Vector3d beside(const Scene& scene, const Vector3d& toward, double clearance_m) {
+  Vector3d at_m = scene.middle_m + (extent_m(scene, toward) + clearance_m) * toward;
+  while (at_m.norm() < 0.5) at_m += 0.1 * toward;
+  return at_m;
+}
+
+Vector3d level(Random& random, const Vector3d& up) {
+  const Vector3d any = direction(random);
+  const Vector3d side = any - any.dot(up) * up;
+  return side.norm() > 0.05 ? side.normalized() : up.unitOrthogonal();
+}
+
+Vector3d keptAway(const Vector3d& p_m, double distance_m) {
+  const double r_m = p_m.norm();
+  if (r_m >= distance_m) return p_m;
+  return r_m > 1e-9 ? Vector3d(p_m * (distance_m / r_m)) : Vector3d(0, 0, -distance_m);
+}
+
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  const double place = share * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (place - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+double middleTime_s(const Row& row) { return 0.5 * (row.start_s + row.end_s); }
+
+int passed(const std::vector<double>& instants_s, double time_s) {
+  return static_cast<int>(std::count_if(instants_s.begin(), instants_s.end(), [&](double s) { return s <= time_s; }));
+}
+
+std::vector<double> instants(Random& random, const Scene& scene, int count) {
+  std::vector<double> list_s;
+  for (int n = 1; n <= count; ++n) list_s.push_back(scene.duration_s * (n + uniform(random, -0.3, 0.3)) / (count + 1));
+  return list_s;
+}
+
+Matrix3d echo(const Vector3d& at_m, const Matrix3d& polarizability_m3, const Vector3d& p_m) {
+  return dipoleField(keptAway(p_m - at_m, 0.12)) * polarizability_m3 * dipoleField(at_m);
+}
+
+void addField(const SolvedPose& pose, const Matrix3d& field, Matrix3d& couplings) {
+  couplings += pose.orientation.toRotationMatrix().transpose() * field;
+}
+
+void turnAbout(const Vector3d& pivot_m, const Vector3d& rotation_rad, Vector3d& p_m, Quaterniond& attitude) {
+  p_m = pivot_m + turned(rotation_rad, Quaterniond::Identity()) * (p_m - pivot_m);
+  attitude = turned(rotation_rad, attitude);
+}
+
+Drawn drawnOf(const Story& story, std::function<void(World&, double size)> apply) {
+  const auto describe = [story](double size, json& effect) {
+    effect["parameters"] = story.parameters;
+    effect["parameters"][story.size_name] = size;
+    if (story.location_m) effect["location_m"] = listed(*story.location_m);
+  };
+  return {"unforeseen:" + story.words, story.phrase, story.smallest, story.largest, std::move(apply), describe};
+}
+
+}  // namespace unforeseen
 
 const std::vector<Kind>& unforeseenKinds() {
-  static const std::vector<Kind> kinds;
+  using namespace unforeseen;
+  constexpr auto kRigAxes = Kind::Needs::kRigAxes;
+  constexpr auto kLayers = Kind::Needs::kLayers;
+  static const std::vector<Kind> kinds = {
+      {"unforeseen:operator_in_wheelchair", 1, drawWheelchair},
+      {"unforeseen:lift_car_parks_at_floors", 1, drawLift},
+      {"unforeseen:steel_door_left_ajar", 1, drawDoor},
+      {"unforeseen:hip_pushes_carts_into_contact", 1, drawTouchingCarts},
+      {"unforeseen:beating_neighbour_transmitter", 1, drawBeatingNeighbour},
+      {"unforeseen:lighting_line_harmonic", 1, drawLightingLine},
+      {"unforeseen:excess_transmitter_cable_coiled", 1, drawCoiledCable},
+      {"unforeseen:raised_floor_pedestals", 1, drawPedestals},
+      {"unforeseen:ceiling_grid_with_open_joints", 1, drawCeilingGrid},
+      {"unforeseen:blind_lowered_slat_by_slat", 1, drawBlind},
+      {"unforeseen:step_stool_for_high_places", 1, drawStepStool},
+      {"unforeseen:eddy_tail_in_next_slot", 1, drawEddyTail},
+      {"unforeseen:plank_swells_across_grain", 1, drawSwellingPlank, kRigAxes},
+      {"unforeseen:hinged_board_not_flat", 1, drawFoldedBoard, kRigAxes},
+      {"unforeseen:spacer_blocks_of_odd_thickness", 1, drawSpacerBlocks, kLayers},
+      {"unforeseen:eccentric_measuring_wheel", 1, drawEccentricWheel, kRigAxes},
+      {"unforeseen:arm_creeps_between_retightenings", 1, drawCreepingArm, kRigAxes},
+      {"unforeseen:taut_cable_pulls_sensor", 1, drawTautCable},
+      {"unforeseen:holder_screw_backs_out", 1, drawLooseHolder},
+      {"unforeseen:floating_floor_tilts_under_operator", 1, drawFloatingFloor, kRigAxes},
+      {"unforeseen:shift_change_reads_with_parallax", 1, drawParallax, kRigAxes},
+      {"unforeseen:fan_sways_hanging_transmitter", 1, drawSwayingTransmitter},
+      {"unforeseen:backlash_in_alternate_rows", 1, drawBacklash, kLayers},
+      {"unforeseen:second_page_from_older_drawing", 1, drawSecondPage, kRigAxes},
+      {"unforeseen:post_twists_as_it_dries", 1, drawTwistingPost, kRigAxes},
+      {"unforeseen:amplifier_switches_range", 1, drawRangeSwitch},
+      {"unforeseen:dead_zone_in_demodulator", 1, drawDeadZone},
+      {"unforeseen:cable_loop_picks_up_midway", 1, drawCableLoop},
+      {"unforeseen:adaptive_filter_not_settled_far_out", 1, drawUnsettledFilter},
+      {"unforeseen:correction_map_of_another_room", 1, drawForeignMap},
+      {"unforeseen:multiplexer_remembers_second_sensor", 1, drawMultiplexer},
+      {"unforeseen:supply_sags_when_autoclave_heats", 1, drawSaggingSupply},
+      {"unforeseen:coarse_trig_table", 1, drawCoarseTable},
+      {"unforeseen:coordinate_clips_at_wall", 1, drawClippedCoordinate},
+      {"unforeseen:ferrite_core_warms_under_lamp", 1, drawWarmCore},
+      {"unforeseen:loudspeaker_magnet_biases_core", 1, drawBiasedCore},
+      {"unforeseen:wireless_sensor_slips_phase", 1, drawPhaseSlip},
+      {"unforeseen:fused_compass_near_steel", 1, drawFusedCompass},
+      {"unforeseen:handover_to_second_transmitter", 1, drawHandover},
+  };
   return kinds;
 }
 
