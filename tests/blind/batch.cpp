@@ -57,6 +57,11 @@ Batch batchOf(const std::map<std::string, std::string>& options, const std::stri
   return batch;
 }
 
+void needProgram(const Batch& batch) {
+  if (::access(batch.cli.c_str(), X_OK) != 0)
+    throw std::runtime_error("cannot run " + batch.cli.string() + "; name the program with --cli PATH");
+}
+
 ResultFile::ResultFile(fs::path path, std::string schema) : path_(std::move(path)), schema_(std::move(schema)) {}
 
 json ResultFile::document() const {

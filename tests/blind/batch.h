@@ -24,6 +24,9 @@ std::size_t wholeOption(const std::map<std::string, std::string>& options, const
 /// @error std::invalid_argument without --in, or when --jobs is no number
 Batch batchOf(const std::map<std::string, std::string>& options, const std::string& command);
 
+/// @error std::runtime_error when fieldtrue-cli cannot be run
+void needProgram(const Batch& batch);
+
 /// A document of a set with an entry a session, each with the hash of what it was made from. Processes can share it.
 class ResultFile {
  public:

@@ -8,6 +8,7 @@
 #include "tests/blind/generate_session.h"
 #include "tests/blind/judgement.h"
 #include "tests/blind/oracle_figures.h"
+#include "tests/blind/replicate_figures.h"
 
 namespace blind {
 namespace {
@@ -428,6 +429,7 @@ Scoreboard scoreboardOf(std::span<const Session> sessions) {
   addShrinkage(board.figures, single, pairs);
   addForetold(board.figures, single);
   addOracleFigures(board.figures, answered_for);
+  addReplicateFigures(board.figures, single);
   addCoverage(board.figures, single);
   addProbability(board.figures, single_or_none);
   addSets(board.figures, pairs, single);

@@ -10,6 +10,7 @@
 #include "tests/blind/foretell.h"
 #include "tests/blind/generate.h"
 #include "tests/blind/oracle.h"
+#include "tests/blind/replicate.h"
 #include "tests/blind/score.h"
 
 namespace {
@@ -22,6 +23,7 @@ with the simulator and the diagnosis: it has its own physics, its own pose solve
   answer     run `fieldtrue-cli diagnose` on them; each answer is written once
   foretell   simulate what the diagnosis found at places that no table held
   oracle     fit the parameters of the true effects to each recording, and put them to the same test
+  replicate  have small sessions of one effect diagnosed with replicates
   score      open the seal and print the scoreboard
   controls   make negative controls of a sealed set: shuffled, wrong floor, mirrored, reversed in time
 
@@ -93,6 +95,21 @@ Writes DIR/oracle.json; what is in it already is left, so that a run that was st
 Example: fieldtrue-blind oracle --in set --jobs 2
 )";
 
+constexpr const char* kReplicateHelp =
+    R"(Runs `fieldtrue-cli diagnose --replicates M` on the first sessions of one effect and at most 100 places, each in a folder
+of its own that holds nothing but its tables, and keeps in how many replicates the same was named. score compares the
+mean of these shares with how often what was named is the truth. The program makes replicates under its runner-up too;
+they are not used. Writes DIR/replicated.json; what is in it already is left.
+
+  --in DIR          sealed set
+  --cli PATH        the program to run; default fieldtrue-cli beside this program
+  --sessions N      how many sessions at most; default 60
+  --replicates M    of each; default 20
+  --jobs J          diagnoses side by side, one thread each; default 1
+
+Example: fieldtrue-blind replicate --in set --sessions 60 --jobs 2
+)";
+
 constexpr const char* kScoreHelp =
     R"(Checks truth and answers against their hashes and prints every figure with its 95 % interval (Wilson for shares,
 bootstrap otherwise), its target where there is one, and the confusion matrix. What was not answered counts as wrong.
@@ -123,9 +140,11 @@ struct Command {
 };
 
 constexpr Command kCommands[] = {
-    {"generate", kGenerateHelp, blind::runGenerate}, {"answer", kAnswerHelp, blind::runAnswer},
-    {"foretell", kForetellHelp, blind::runForetell}, {"oracle", kOracleHelp, blind::runOracle},
-    {"score", kScoreHelp, blind::runScore},          {"controls", kControlsHelp, blind::runControls}};
+    {"generate", kGenerateHelp, blind::runGenerate},    {"answer", kAnswerHelp, blind::runAnswer},
+    {"foretell", kForetellHelp, blind::runForetell},    {"oracle", kOracleHelp, blind::runOracle},
+    {"replicate", kReplicateHelp, blind::runReplicate}, {"score", kScoreHelp, blind::runScore},
+    {"controls", kControlsHelp, blind::runControls},
+};
 
 bool isHelp(const std::string& word) { return word == "--help" || word == "-h"; }
 
@@ -150,9 +169,9 @@ int main(int argc, char** argv) {
       return 1;
     }
   }
-  std::cerr
-      << "'" << arguments.front()
-      << "' is no command of fieldtrue-blind; it has generate, answer, foretell, oracle, score and controls (--help "
-         "tells more)\n";
+  std::string names;
+  for (const Command& command : kCommands) names += std::string(names.empty() ? "" : ", ") + command.name;
+  std::cerr << "'" << arguments.front() << "' is no command of fieldtrue-blind; it has " << names
+            << " (--help tells more)\n";
   return 2;
 }
