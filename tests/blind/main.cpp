@@ -9,6 +9,7 @@
 #include "tests/blind/controls.h"
 #include "tests/blind/foretell.h"
 #include "tests/blind/generate.h"
+#include "tests/blind/next.h"
 #include "tests/blind/oracle.h"
 #include "tests/blind/replicate.h"
 #include "tests/blind/score.h"
@@ -24,6 +25,7 @@ with the simulator and the diagnosis: it has its own physics, its own pose solve
   foretell   simulate what the diagnosis found at places that no table held
   oracle     fit the parameters of the true effects to each recording, and put them to the same test
   replicate  have small sessions of one effect diagnosed with replicates
+  next       make the measurement that undecided answers suggest, and random ones, and diagnose again
   score      open the seal and print the scoreboard
   controls   make negative controls of a sealed set: shuffled, wrong floor, mirrored, reversed in time
 
@@ -110,6 +112,21 @@ they are not used. Writes DIR/replicated.json; what is in it already is left.
 Example: fieldtrue-blind replicate --in set --sessions 60 --jobs 2
 )";
 
+constexpr const char* kNextHelp =
+    R"(Where an answer leaves the cause open (several in the first candidate's class, or less than 0.9 for it) and its sentence
+on the next measurement asks for further rows, they are made in the session's own world, with the same rig, seating and
+scatter, and put behind its table; beside it as many rows at random places, up to one step outside the grid. Both tables
+are diagnosed. score compares how large the true cause's intervals are then, how open the cause still is, and how often
+it is named right. Writes DIR/next.json; what is in it already is left.
+
+  --in DIR         answered set, of this very build of fieldtrue-blind: its sessions are made again from the seed
+  --cli PATH       the program to run; default fieldtrue-cli beside this program
+  --sessions N     how many sessions with one effect or several at most; default 150
+  --jobs J         sessions side by side; default 1
+
+Example: fieldtrue-blind next --in set --sessions 150 --jobs 2
+)";
+
 constexpr const char* kScoreHelp =
     R"(Checks truth and answers against their hashes and prints every figure with its 95 % interval (Wilson for shares,
 bootstrap otherwise), its target where there is one, and the confusion matrix. What was not answered counts as wrong.
@@ -140,9 +157,13 @@ struct Command {
 };
 
 constexpr Command kCommands[] = {
-    {"generate", kGenerateHelp, blind::runGenerate},    {"answer", kAnswerHelp, blind::runAnswer},
-    {"foretell", kForetellHelp, blind::runForetell},    {"oracle", kOracleHelp, blind::runOracle},
-    {"replicate", kReplicateHelp, blind::runReplicate}, {"score", kScoreHelp, blind::runScore},
+    {"generate", kGenerateHelp, blind::runGenerate},
+    {"answer", kAnswerHelp, blind::runAnswer},
+    {"foretell", kForetellHelp, blind::runForetell},
+    {"oracle", kOracleHelp, blind::runOracle},
+    {"replicate", kReplicateHelp, blind::runReplicate},
+    {"next", kNextHelp, blind::runNext},
+    {"score", kScoreHelp, blind::runScore},
     {"controls", kControlsHelp, blind::runControls},
 };
 

@@ -137,7 +137,7 @@ Answer answerOf(const std::filesystem::path& path, const json* record) {
 }
 
 /// Documents with an entry a session that score reads.
-constexpr const char* kResults[] = {"foretold", "oracle", "replicated"};
+constexpr const char* kResults[] = {"foretold", "oracle", "replicated", "next"};
 
 /// Entries of a document of the set, by file; nothing where the command that writes it did not run.
 std::map<std::string, json> entriesIn(const std::filesystem::path& path) {
