@@ -93,8 +93,9 @@ void BlindReplicateTest::aFailedDiagnosisIsToldApart() {
 
 void BlindReplicateTest::figuresByHand() {
   // Named as in 20, 10 and 15 of 20; the second is wrong, the first is another name of the same class.
-  const std::vector<Session> sessions = {replicatedSession("grid_scale", 20), replicatedSession("jig_tilt", 10),
-                                         replicatedSession("global_gain", 15)};
+  std::vector<Session> sessions = {replicatedSession("grid_scale", 20), replicatedSession("jig_tilt", 10),
+                                   replicatedSession("global_gain", 15)};
+  sessions[2].results["replicated"]["selected"].push_back("correlated_samples");  // No replicate can name it.
   Session failed = replicatedSession("global_gain", 0);
   failed.results["replicated"] = {{"trouble", "the diagnosis failed"}};
   std::vector<Figure> figures;

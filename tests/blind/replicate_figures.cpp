@@ -1,14 +1,25 @@
 #include "tests/blind/replicate_figures.h"
 
+#include <algorithm>
+
+#include "tests/blind/generate_effects.h"
 #include "tests/blind/judgement.h"
 
 namespace blind {
 namespace {
 
-/// Whether nothing but the true effect, or what the design cannot tell from it, was selected.
-bool isWhollyRight(const Session& session, const nlohmann::json& selected) {
-  return std::all_of(selected.begin(), selected.end(),
-                     [&](const nlohmann::json& effect) { return isRight(session, effect.get<std::string>()); });
+/// The selected effects that replicates can name: those of the signal show in samples alone.
+std::vector<std::string> ofPoses(const nlohmann::json& selected) {
+  std::vector<std::string> effects;
+  for (const nlohmann::json& effect : selected)
+    if (std::find(signalIds().begin(), signalIds().end(), effect) == signalIds().end()) effects.push_back(effect);
+  return effects;
+}
+
+/// Whether each is the true effect, or what the design cannot tell from it.
+bool areRight(const Session& session, const std::vector<std::string>& effects) {
+  return std::all_of(effects.begin(), effects.end(),
+                     [&](const std::string& effect) { return isRight(session, effect); });
 }
 
 }  // namespace
@@ -21,9 +32,10 @@ void addReplicateFigures(std::vector<Figure>& figures, const std::vector<const S
     const auto found = session->results.find("replicated");
     if (found == session->results.end() || found->second.contains("trouble")) continue;
     const nlohmann::json& entry = found->second;
-    if (entry.at("selected").empty() || entry.at("n").get<int>() == 0) continue;
+    const std::vector<std::string> named = ofPoses(entry.at("selected"));
+    if (named.empty() || entry.at("n").get<int>() == 0) continue;
     const double share = entry.at("named_so").get<double>() / entry.at("n").get<double>();
-    const bool is_right = isWhollyRight(*session, entry.at("selected"));
+    const bool is_right = areRight(*session, named);
     forecasts.push_back({share, is_right});
     shares.push_back(share);
     differences.push_back(share - (is_right ? 1.0 : 0.0));
