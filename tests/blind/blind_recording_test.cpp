@@ -105,7 +105,7 @@ void BlindRecordingTest::driftWarmsUpAndWanders() {
     nlohmann::json effect = {{"parameters", nlohmann::json::object()}};
     drawn.describe(1.0, effect);
     World world;
-    drawn.apply(world, 1e-3);
+    drawn.apply(world, 1e-3, {});
     const auto gainAt = [&](double share) {
       Row row;
       row.start_s = share * setup.duration_s();

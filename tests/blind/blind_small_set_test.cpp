@@ -236,7 +236,8 @@ void BlindSmallSetTest::tamperedTruthIsFound() {
 
 void BlindSmallSetTest::helpTellsEveryCommand_data() {
   QTest::addColumn<QString>("command");
-  for (const char* command : {"generate", "answer", "foretell", "score", "controls"}) QTest::newRow(command) << command;
+  for (const char* command : {"generate", "answer", "foretell", "oracle", "replicate", "next", "score", "controls"})
+    QTest::newRow(command) << command;
 }
 
 void BlindSmallSetTest::helpTellsEveryCommand() {

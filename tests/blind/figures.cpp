@@ -7,6 +7,9 @@
 
 #include "tests/blind/generate_session.h"
 #include "tests/blind/judgement.h"
+#include "tests/blind/next_figures.h"
+#include "tests/blind/oracle_figures.h"
+#include "tests/blind/replicate_figures.h"
 
 namespace blind {
 namespace {
@@ -426,6 +429,9 @@ Scoreboard scoreboardOf(std::span<const Session> sessions) {
   const Sessions pairs = onShelf(answered_for, "pairs");
   addShrinkage(board.figures, single, pairs);
   addForetold(board.figures, single);
+  addOracleFigures(board.figures, answered_for);
+  addReplicateFigures(board.figures, single);
+  addNextFigures(board.figures, answered_for);
   addCoverage(board.figures, single);
   addProbability(board.figures, single_or_none);
   addSets(board.figures, pairs, single);

@@ -1,20 +1,20 @@
 #include "tests/blind/foretell.h"
 
 #include <algorithm>
-#include <atomic>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <stdexcept>
-#include <thread>
 #include <vector>
 
 #include "tests/blind/bare_alignment.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/session_table.h"
 #include "tests/blind/sha256.h"
+#include "tests/blind/side_by_side.h"
 #include "tests/blind/subprocess.h"
 #include "tests/blind/temporary_folder.h"
+#include "tests/blind/unseen_places.h"
 
 namespace blind {
 namespace {
@@ -74,53 +74,24 @@ std::vector<std::size_t> byTime(const SessionTable& unseen) {
   return order;
 }
 
-/// Mean squares over some of the places.
-struct Squares {
-  double n = 0.0;
-  double start_m2 = 0.0, after_m2 = 0.0;
-  double start_rad2 = 0.0, after_rad2 = 0.0;
-
-  json toJson() const {
-    const double count = std::max(1.0, n);
-    return {{"n", n},
-            {"start_m2", start_m2 / count},
-            {"after_m2", after_m2 / count},
-            {"start_rad2", start_rad2 / count},
-            {"after_rad2", after_rad2 / count}};
-  }
-};
-
-json compared(const SessionTable& nodes, const SessionTable& unseen, const SessionTable& foretold) {
+/// The poses of a simulation in the order of the sealed places.
+std::vector<SolvedPose> byPlace(const SessionTable& unseen, const SessionTable& foretold) {
   if (foretold.rows.size() != unseen.rows.size())
     throw std::runtime_error("the simulation has " + std::to_string(foretold.rows.size()) + " places, not " +
                              std::to_string(unseen.rows.size()));
-  const BareAlignment bare = bareAlignment(nodes);
-  Squares inside, outside;
-  for (const auto& row : foretold.rows) {
-    const auto& sealed = unseen.rows.at(std::stoul(row[foretold.neededColumn("node")]));
-    const SolvedPose truth = trackedPose(unseen, sealed);
-    const SolvedPose start = bare.reported(truePose(unseen, sealed));
-    const SolvedPose after = trackedPose(foretold, row);
-    Squares& squares = sealed[unseen.neededColumn("inside")] == "1" ? inside : outside;
-    squares.n += 1.0;
-    squares.start_m2 += (start.position_m - truth.position_m).squaredNorm();
-    squares.after_m2 += (after.position_m - truth.position_m).squaredNorm();
-    squares.start_rad2 += rotationBetween(start.orientation, truth.orientation).squaredNorm();
-    squares.after_rad2 += rotationBetween(after.orientation, truth.orientation).squaredNorm();
-  }
-  return {{"inside", inside.toJson()}, {"outside", outside.toJson()}};
+  std::vector<SolvedPose> poses(unseen.rows.size());
+  for (const auto& row : foretold.rows)
+    poses.at(std::stoul(row[foretold.neededColumn("node")])) = trackedPose(foretold, row);
+  return poses;
 }
 
 json foretold(const Trial& trial, const json& session, const std::string& scene_sha256) {
   const std::string file = session.at("file").get<std::string>();
   json entry = {{"file", file}};
-  const fs::path sealed = trial.folder / "unseen" / (file + ".csv");
-  if (sha256Hex(textOf(sealed)) != session.at("unseen_sha256").get<std::string>())
-    throw std::runtime_error(sealed.string() + " was changed after it was sealed");
   const fs::path scene = trial.folder / (file + ".scene.json");
   if (sha256Hex(textOf(scene)) != scene_sha256)
     throw std::runtime_error(scene.string() + " was changed after it was answered");
-  const SessionTable unseen = readTable(sealed);
+  const SessionTable unseen = sealedPlaces(trial.folder, session);
   const TemporaryFolder desk;
   replaceFile(desk.path() / "unseen.plan.json", planOf(unseen, byTime(unseen)).dump());
   const Finished run = runProgram({trial.cli.string(), "simulate", "--exact", "--threads", "1", "--scene",
@@ -130,8 +101,8 @@ json foretold(const Trial& trial, const json& session, const std::string& scene_
     entry["trouble"] = "simulate ended with status " + std::to_string(run.exit_status);
     return entry;
   }
-  entry.update(
-      compared(readTable(trial.folder / (file + ".nodes.csv")), unseen, readTable(desk.path() / "foretold.nodes.csv")));
+  entry.update(comparedWithSealed(readTable(trial.folder / (file + ".nodes.csv")), unseen,
+                                  byPlace(unseen, readTable(desk.path() / "foretold.nodes.csv"))));
   return entry;
 }
 
@@ -154,23 +125,9 @@ std::vector<std::pair<json, std::string>> answeredSessions(const Trial& trial) {
 json foretellAll(const Trial& trial) {
   const auto sessions = answeredSessions(trial);
   std::vector<json> entries(sessions.size());
-  std::vector<std::string> troubles(sessions.size());
-  std::atomic<std::size_t> next = 0;
-  const auto work = [&] {
-    for (std::size_t i = next++; i < sessions.size(); i = next++) {
-      try {
-        entries[i] = foretold(trial, sessions[i].first, sessions[i].second);
-      } catch (const std::exception& problem) {
-        troubles[i] = problem.what();
-      }
-    }
-  };
-  std::vector<std::thread> workers;
-  for (std::size_t j = 0; j < trial.jobs; ++j) workers.emplace_back(work);
-  for (std::thread& worker : workers) worker.join();
-  for (std::size_t i = 0; i < troubles.size(); ++i)
-    if (!troubles[i].empty())
-      throw std::runtime_error(sessions[i].first.at("file").get<std::string>() + ": " + troubles[i]);
+  const auto name_of = [&](std::size_t i) { return sessions[i].first.at("file").get<std::string>(); };
+  sideBySide(trial.jobs, sessions.size(), name_of,
+             [&](std::size_t i) { entries[i] = foretold(trial, sessions[i].first, sessions[i].second); });
   return {{"schema", "fieldtrue.blind-foretold/1"}, {"sessions", entries}};
 }
 

@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -12,10 +11,8 @@
 #include <iostream>
 #include <limits>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 #include <vector>
 
 #include "tests/blind/generate_session.h"
@@ -23,6 +20,7 @@
 #include "tests/blind/plan_classes.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/sha256.h"
+#include "tests/blind/side_by_side.h"
 
 namespace blind {
 namespace {
@@ -111,7 +109,7 @@ void wishUnforeseen(const Options& options, std::vector<SessionWish>& wishes) {
 }
 
 /// Shelves in their shares; of one effect alone a fifth of the sessions at each of the four strengths.
-std::vector<SessionWish> drawWishes(const Options& options, Random& random) {
+std::vector<SessionWish> drawWishes(const Options& options) {
   struct Share {
     const char* shelf;
     double share;
@@ -124,17 +122,20 @@ std::vector<SessionWish> drawWishes(const Options& options, Random& random) {
     const auto end = static_cast<std::size_t>(std::llround(upto * static_cast<double>(options.sessions)));
     while (shelves.size() < end) shelves.emplace_back(options.shelf == "all" ? share.shelf : options.shelf);
   }
+  const std::vector<std::string> unforeseen = unforeseenIds();
   std::map<std::string, std::size_t> seen;
   std::vector<SessionWish> wishes;
   for (const std::string& shelf : shelves) {
     SessionWish wish{shelf, std::nullopt, options.samples, options.most_rows, ""};
-    const std::size_t turn = seen[shelf]++ % 5;
+    const std::size_t before = seen[shelf]++, turn = before % 5;
+    if (shelf == "unforeseen") wish.kind = unforeseen.at(before / 5 % unforeseen.size());
     if (shelf == "single" || shelf == "off" || shelf == "unforeseen")
       wish.level = options.levels && turn < 4 ? std::optional(kLevels[turn]) : options.strength;
     wishes.push_back(std::move(wish));
   }
   if (options.unforeseen) wishUnforeseen(options, wishes);
-  // An order that tells nothing.
+  // An order that tells nothing; sessionSeeds() counts these draws.
+  Random random(options.seed);
   for (std::size_t n = wishes.size(); n > 1; --n)
     std::swap(wishes[n - 1], wishes[static_cast<std::size_t>(uniformInt(random, 0, static_cast<int>(n) - 1))]);
   return wishes;
@@ -150,7 +151,7 @@ std::string nameOf(std::size_t index) {
 /// @return its truth, with the classes that plan-check declares beside those of this program's own physics
 json writeSession(const Options& options, const SessionWish& wish, const std::string& name, std::uint64_t seed,
                   bool asks_plan_check) {
-  GeneratedSession session = generateSession(wish, seed);
+  GeneratedSession session = makeSession(wish, seed).tables;
   const fs::path nodes = options.out / (name + ".nodes.csv");
   replaceFile(nodes, session.nodes_csv);
   if (!session.samples_csv.empty()) replaceFile(options.out / (name + ".samples.csv"), session.samples_csv);
@@ -166,28 +167,12 @@ json writeSession(const Options& options, const SessionWish& wish, const std::st
 }
 
 std::vector<json> writeSessions(const Options& options, bool asks_plan_check) {
-  Random random(options.seed);
-  const std::vector<SessionWish> wishes = drawWishes(options, random);
-  std::vector<std::uint64_t> seeds;
-  for (std::size_t n = 0; n < wishes.size(); ++n) seeds.push_back(random());
+  const std::vector<SessionWish> wishes = drawWishes(options);
+  const std::vector<std::uint64_t> seeds = sessionSeeds(options.seed, wishes.size());
   std::vector<json> truths(wishes.size());
-  std::atomic<std::size_t> next{0};
-  std::mutex guard;
-  std::string problem;
-  const auto work = [&] {
-    for (std::size_t n = next++; n < wishes.size(); n = next++) try {
-        truths[n] = writeSession(options, wishes[n], nameOf(n), seeds[n], asks_plan_check);
-      } catch (const std::exception& error) {
-        const std::lock_guard lock(guard);
-        problem = nameOf(n) + ": " + error.what();
-        next = wishes.size();
-      }
-  };
-  std::vector<std::thread> threads;
-  for (std::size_t t = 1; t < options.jobs; ++t) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
-  if (!problem.empty()) throw std::runtime_error(problem);
+  sideBySide(options.jobs, wishes.size(), nameOf, [&](std::size_t n) {
+    truths[n] = writeSession(options, wishes[n], nameOf(n), seeds[n], asks_plan_check);
+  });
   return truths;
 }
 
@@ -209,6 +194,8 @@ void writeFolder(const Options& options) {
   sealTruth(options.out, {{"schema", "fieldtrue.blind/1"},
                           {"seed", options.seed},
                           {"role", options.role},
+                          {"samples_for_all", options.samples},
+                          {"most_rows", options.most_rows},
                           {"classes_from", asks_plan_check ? "plan-check" : "generator"},
                           {"sessions", truths}});
   levelTimeStamps(options.out);

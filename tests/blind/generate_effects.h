@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,14 +11,35 @@
 
 namespace blind {
 
+/// How the shape of an effect departs from what was drawn: a number for each of Drawn::scales, or none at all.
+using ShapeChange = std::span<const double>;
+
+inline double changeAt(ShapeChange change, std::size_t at) { return change.empty() ? 0.0 : change[at]; }
+inline Vector3d vectorAt(ShapeChange change, std::size_t first) {
+  return {changeAt(change, first), changeAt(change, first + 1), changeAt(change, first + 2)};
+}
+
 /// An effect drawn for one session whose size is still open.
 struct Drawn {
   std::string id;
   std::string kind;
   double smallest = 0.1, largest = 1;  ///< believable range of `size`
-  std::function<void(World&, double size)> apply;
+  std::function<void(World&, double size, ShapeChange)> apply;
   std::function<void(double size, nlohmann::json& effect)> describe;
+  std::vector<double> scales = {};  ///< a telling difference of each number of its shape, in the number's own unit
 };
+
+/// A drawn effect at the size that the session wished for.
+struct Placed {
+  Drawn drawn;
+  double size = 1;
+  double rho = 0;
+};
+
+/// A course in time of about unit size: warming up along an exponential, a random walk on top. Its change is a straight
+/// line between six moments spread over the session.
+std::function<double(double time_s, ShapeChange)> wanderingCourse(const Setup& setup, Random& random);
+inline constexpr int kMomentsOfCourse = 6;
 
 /// A vector as truth.json has it.
 inline nlohmann::json listed(const Vector3d& v) { return nlohmann::json::array({v.x(), v.y(), v.z()}); }

@@ -41,11 +41,22 @@ constexpr Metal kSolids[] = {{"aluminium", 1, 3.5e7},
                              {"mild steel", 100, 6e6},
                              {"brass", 1, 1.6e7}};
 
+/// How a body differs from the one that was drawn.
+struct Move {
+  Vector3d by_m = Vector3d::Zero();
+  Quaterniond turn = Quaterniond::Identity();
+  double scale = 1;
+};
+
+using Solve = std::function<Scatterer(const Move&)>;
+
 struct Body {
   std::string kind;
-  Lattice lattice;
+  std::function<Lattice(const Move&)> lattice;
   Vector3d size_m;
   bool ferromagnetic = false;
+
+  Scatterer solved(const Move& move) const { return solveLattices({lattice(move)}); }
 };
 
 Body drawBody(const Setup& setup, Random& random, const Vector3d& center_m, double length_m) {
@@ -56,26 +67,34 @@ Body drawBody(const Setup& setup, Random& random, const Vector3d& center_m, doub
   if (shape == 1) body.size_m = length_m * Vector3d(1, uniform(random, 0.2, 0.35), uniform(random, 0.2, 0.35));
   if (shape == 2) body.size_m = length_m * Vector3d(1, uniform(random, 0.5, 1.0), uniform(random, 0.3, 0.8));
   const BodyShape shapes[] = {BodyShape::kSphere, BodyShape::kBar, BodyShape::kBox};
-  body.lattice = makeLattice(shapes[shape], center_m, rotation(random), body.size_m, shape == 1 ? 9 : 5);
+  const Quaterniond attitude = rotation(random);
   body.ferromagnetic = uniform(random, 0, 1) < 0.3;
-  if (body.ferromagnetic) {
-    body.lattice.permeability = uniform(random, 5, 60);  // ferrite, pressed or laminated iron: no eddy currents
-  } else {
-    body.lattice.permeability =
-        solidPermeability(body.size_m, metal.permeability, metal.conductivity_s_m, setup.carrier_hz);
-  }
+  // Ferrite, pressed or laminated iron: no eddy currents.
+  const double ferrite = body.ferromagnetic ? uniform(random, 5, 60) : 0;
+  body.lattice = [=, size_m = body.size_m, carrier_hz = setup.carrier_hz](const Move& move) {
+    Lattice lattice =
+        makeLattice(shapes[shape], center_m + move.by_m, move.turn * attitude, move.scale * size_m, shape == 1 ? 9 : 5);
+    lattice.permeability =
+        ferrite > 0 ? Complex(ferrite)
+                    : solidPermeability(move.scale * size_m, metal.permeability, metal.conductivity_s_m, carrier_hz);
+    return lattice;
+  };
   const char* names[] = {"sphere", "bar", "box"};
   body.kind = std::string(body.ferromagnetic ? "ferrite or laminated iron" : metal.name) + " " + names[shape];
   return body;
 }
 
-void addShare(World& world, const std::shared_ptr<Scatterer>& metal, double share) {
-  world.metal.emplace_back(share, *metal);
-}
-
-Drawn shareOf(std::string id, std::string kind, const std::shared_ptr<Scatterer>& metal, json fixed) {
-  Drawn drawn{std::move(id), std::move(kind), 0.15, 1.0, nullptr, nullptr};
-  drawn.apply = [metal](World& world, double share) { addShare(world, metal, share); };
+/// Place and attitude may change, and where `has_size` is set, the logarithm of the size.
+Drawn shareOf(std::string id, std::string kind, Solve solve, bool has_size, json fixed) {
+  Drawn drawn{std::move(id), std::move(kind), 0.15, 1.0, nullptr, nullptr, {0.1, 0.1, 0.1, 0.3, 0.3, 0.3}};
+  if (has_size) drawn.scales.push_back(0.2);
+  drawn.apply = [solve, has_size, as_drawn = std::make_shared<Scatterer>(solve(Move()))](World& world, double share,
+                                                                                         ShapeChange change) {
+    const bool is_changed = std::any_of(change.begin(), change.end(), [](double value) { return value != 0; });
+    const Move move{vectorAt(change, 0), turned(vectorAt(change, 3), Quaterniond::Identity()),
+                    has_size ? std::exp(changeAt(change, 6)) : 1};
+    world.metal.emplace_back(share, is_changed ? solve(move) : *as_drawn);
+  };
   drawn.describe = [fixed = std::move(fixed)](double share, json& effect) {
     effect.update(fixed);
     effect["parameters"]["metal_share"] = share;
@@ -90,8 +109,7 @@ Vector3d roomUp(const Setup& setup) { return setup.tracker_from_jig * Vector3d::
 Drawn drawCompactMetal(const Setup& setup, Random& random) {
   const Vector3d at_m = placeNearGrid(setup, random, kNearest_m, kFarthest_m);
   const Body body = drawBody(setup, random, at_m, uniform(random, 0.15, 0.4));
-  auto metal = std::make_shared<Scatterer>(solveLattices({body.lattice}));
-  return shareOf("compact_metal", body.kind, std::move(metal),
+  return shareOf("compact_metal", body.kind, [body](const Move& move) { return body.solved(move); }, true,
                  {{"location_m", listed(at_m)},
                   {"material", body.ferromagnetic ? "ferromagnetic" : "conductive"},
                   {"parameters", {{"size_m", listed(body.size_m)}}}});
@@ -116,17 +134,21 @@ Drawn drawMetalPlane(const Setup& setup, Random& random) {
   const Quaterniond attitude = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), toward);
   const bool ferromagnetic = uniform(random, 0, 1) < 0.25;
   const double side_m = uniform(random, 5.5, 7.5);
-  std::shared_ptr<Scatterer> metal;
+  Solve solve;
   if (ferromagnetic) {
-    metal = std::make_shared<Scatterer>(solvePermeableSheet(16, 16, side_m / 16, uniform(random, 0.02, 0.08),
-                                                            uniform(random, 40, 200), center_m, attitude));
+    const double permeability = uniform(random, 40, 200), thickness_m = uniform(random, 0.02, 0.08);
+    solve = [=](const Move& move) {
+      return solvePermeableSheet(16, 16, side_m / 16, thickness_m, permeability, center_m + move.by_m,
+                                 move.turn * attitude);
+    };
     kind = "layer of rods, " + kind;
   } else {
-    const MeshedSheet sheet(16, 16, side_m / 16, 1 / (3.5e7 * logUniform(random, 1e-4, 2e-3)), setup.carrier_hz);
-    metal = std::make_shared<Scatterer>(sheet.solve(center_m, attitude));
+    const auto sheet = std::make_shared<MeshedSheet>(16, 16, side_m / 16, 1 / (3.5e7 * logUniform(random, 1e-4, 2e-3)),
+                                                     setup.carrier_hz);
+    solve = [=](const Move& move) { return sheet->solve(center_m + move.by_m, move.turn * attitude); };
     kind = "aluminium " + kind;
   }
-  return shareOf("metal_plane", kind, std::move(metal),
+  return shareOf("metal_plane", kind, std::move(solve), false,
                  {{"location_m", listed(distance_m * toward)},
                   {"material", ferromagnetic ? "ferromagnetic" : "conductive"},
                   {"amplitude", {{"name", "distance_m"}, {"value", distance_m}}},
@@ -138,16 +160,22 @@ Drawn drawFinitePlate(const Setup& setup, Random& random) {
   const Quaterniond attitude = rotation(random);
   const int cells_x = 10, cells_y = uniformInt(random, 5, 10);
   const double cell_m = uniform(random, 0.3, 1.0) / cells_x;
-  std::shared_ptr<Scatterer> metal;
   const bool ferromagnetic = uniform(random, 0, 1) < 0.25;
+  Solve solve;
   if (ferromagnetic) {
-    metal = std::make_shared<Scatterer>(solvePermeableSheet(cells_x, cells_y, cell_m, uniform(random, 0.002, 0.008),
-                                                            uniform(random, 40, 200), at_m, attitude));
+    const double permeability = uniform(random, 40, 200), thickness_m = uniform(random, 0.002, 0.008);
+    solve = [=](const Move& move) {
+      return solvePermeableSheet(cells_x, cells_y, move.scale * cell_m, thickness_m, permeability, at_m + move.by_m,
+                                 move.turn * attitude);
+    };
   } else {
-    const MeshedSheet sheet(cells_x, cells_y, cell_m, 1 / (3.5e7 * logUniform(random, 2e-4, 5e-3)), setup.carrier_hz);
-    metal = std::make_shared<Scatterer>(sheet.solve(at_m, attitude));
+    const double sheet_ohm = 1 / (3.5e7 * logUniform(random, 2e-4, 5e-3));
+    solve = [=, carrier_hz = setup.carrier_hz](const Move& move) {
+      return MeshedSheet(cells_x, cells_y, move.scale * cell_m, sheet_ohm, carrier_hz)
+          .solve(at_m + move.by_m, move.turn * attitude);
+    };
   }
-  return shareOf("finite_plate", ferromagnetic ? "sheet of laminated iron" : "aluminium sheet", std::move(metal),
+  return shareOf("finite_plate", ferromagnetic ? "sheet of laminated iron" : "aluminium sheet", std::move(solve), true,
                  {{"location_m", listed(at_m)},
                   {"material", ferromagnetic ? "ferromagnetic" : "conductive"},
                   {"parameters",
@@ -160,12 +188,14 @@ Drawn drawClosedLoop(const Setup& setup, Random& random) {
   const Vector3d at_m = placeNearGrid(setup, random, kNearest_m, kFarthest_m);
   const Vector3d normal = direction(random);
   const double radius_m = uniform(random, 0.1, 0.4), wire_m = logUniform(random, 0.0004, 0.004);
-  const Polygon polygon = roundLoop(at_m, normal, radius_m, 32);
   const double resistance_ohm = 1.7e-8 * 2 * kPi * radius_m / (kPi * wire_m * wire_m) + logUniform(random, 0.001, 0.5);
-  auto metal = std::make_shared<Scatterer>(
-      solveClosedLoop(polygon, resistance_ohm, roundLoopInductance(radius_m, wire_m), setup.carrier_hz));
+  const auto solve = [=, carrier_hz = setup.carrier_hz](const Move& move) {
+    const double moved_radius_m = move.scale * radius_m;
+    return solveClosedLoop(roundLoop(at_m + move.by_m, move.turn * normal, moved_radius_m, 32), resistance_ohm,
+                           roundLoopInductance(moved_radius_m, wire_m), carrier_hz);
+  };
   return shareOf(
-      "closed_loop", "copper cable loop", std::move(metal),
+      "closed_loop", "copper cable loop", solve, true,
       {{"location_m", listed(at_m)},
        {"material", nullptr},
        {"parameters", {{"radius_m", radius_m}, {"normal", listed(normal)}, {"resistance_ohm", resistance_ohm}}}});
@@ -174,11 +204,14 @@ Drawn drawClosedLoop(const Setup& setup, Random& random) {
 Drawn drawMetalMoved(const Setup& setup, Random& random) {
   const Vector3d at_m = placeNearGrid(setup, random, kNearest_m, kFarthest_m);
   const Body body = drawBody(setup, random, at_m, uniform(random, 0.2, 0.4));
-  auto metal = std::make_shared<Scatterer>(solveLattices({body.lattice}));
   const double change_s = uniform(random, 0.3, 0.7) * setup.duration_s();
   const bool arrives = uniform(random, 0, 1) < 0.5;
-  (arrives ? metal->from_s : metal->until_s) = change_s;
-  return shareOf("metal_moved", body.kind + (arrives ? " brought in" : " taken away"), std::move(metal),
+  const auto solve = [=](const Move& move) {
+    Scatterer metal = body.solved(move);
+    (arrives ? metal.from_s : metal.until_s) = change_s;
+    return metal;
+  };
+  return shareOf("metal_moved", body.kind + (arrives ? " brought in" : " taken away"), solve, true,
                  {{"location_m", listed(at_m)},
                   {"material", body.ferromagnetic ? "ferromagnetic" : "conductive"},
                   {"parameters", {{"change_s", change_s}, {"size_m", listed(body.size_m)}}}});
@@ -188,13 +221,18 @@ Drawn drawOpposedBodies(const Setup& setup, Random& random) {
   const Vector3d at_m = placeNearGrid(setup, random, kNearest_m, 0.5);
   const double length_m = uniform(random, 0.2, 0.4);
   const Vector3d apart = uniform(random, 0.5, 0.7) * length_m * direction(random) + 0.08 * direction(random);
-  std::vector<Lattice> pair;
-  pair.push_back(makeLattice(BodyShape::kBox, at_m + apart, rotation(random), Vector3d::Constant(length_m * 0.8), 4));
-  pair.push_back(makeLattice(BodyShape::kBox, at_m - apart, rotation(random), Vector3d::Constant(length_m * 0.64), 4));
-  pair[0].permeability = solidPermeability(Vector3d::Constant(length_m), 1, 3.5e7, setup.carrier_hz);
-  pair[1].permeability = 40;
-  auto metal = std::make_shared<Scatterer>(solveLattices(pair));
-  return shareOf("off:opposed_bodies", "aluminium and ferrite blocks side by side", std::move(metal),
+  const Quaterniond first = rotation(random), second = rotation(random);
+  const auto solve = [=, carrier_hz = setup.carrier_hz](const Move& move) {
+    const auto block = [&](const Vector3d& from_middle_m, const Quaterniond& attitude, double share) {
+      return makeLattice(BodyShape::kBox, at_m + move.by_m + move.turn * (move.scale * from_middle_m),
+                         move.turn * attitude, Vector3d::Constant(move.scale * length_m * share), 4);
+    };
+    std::vector<Lattice> pair = {block(apart, first, 0.8), block(-apart, second, 0.64)};
+    pair[0].permeability = solidPermeability(Vector3d::Constant(move.scale * length_m), 1, 3.5e7, carrier_hz);
+    pair[1].permeability = 40;
+    return solveLattices(pair);
+  };
+  return shareOf("off:opposed_bodies", "aluminium and ferrite blocks side by side", solve, true,
                  {{"location_m", listed(at_m)}, {"material", nullptr}, {"parameters", {{"length_m", length_m}}}});
 }
 
@@ -203,11 +241,15 @@ Drawn drawFerriteAtTransmitter(const Setup& setup, Random& random) {
   const Vector3d at_m = uniform(random, 0.12, 0.3) * direction(random);
   const Vector3d size_m =
       uniform(random, 0.04, 0.12) * Vector3d(1, uniform(random, 0.2, 0.5), uniform(random, 0.2, 0.5));
-  Lattice rod = makeLattice(BodyShape::kBar, at_m, rotation(random), size_m, 7);
-  rod.permeability = uniform(random, 20, 200);
-  auto metal = std::make_shared<Scatterer>(solveLattices({rod}));
+  const Quaterniond attitude = rotation(random);
+  const double permeability = uniform(random, 20, 200);
+  const auto solve = [=](const Move& move) {
+    Lattice rod = makeLattice(BodyShape::kBar, at_m + move.by_m, move.turn * attitude, move.scale * size_m, 7);
+    rod.permeability = permeability;
+    return solveLattices({rod});
+  };
   return shareOf(
-      "off:ferrite_at_transmitter", "ferrite rod beside the transmitter", std::move(metal),
+      "off:ferrite_at_transmitter", "ferrite rod beside the transmitter", solve, true,
       {{"location_m", listed(at_m)}, {"material", "ferromagnetic"}, {"parameters", {{"size_m", listed(size_m)}}}});
 }
 

@@ -13,15 +13,9 @@ namespace {
 
 using nlohmann::json;
 
-struct Placed {
-  Drawn drawn;
-  double size = 1;
-  double rho = 0;
-};
-
 double rhoOf(const Alignment& alignment, const Drawn& drawn, double size) {
   World world;
-  drawn.apply(world, size);
+  drawn.apply(world, size, {});
   const double value = alignment.rho(alignment.whitened(world));
   return std::isfinite(value) ? value : 1e9;
 }
@@ -75,12 +69,6 @@ json describe(const Placed& placed) {
                  {"parameters", json::object()}};
   placed.drawn.describe(placed.size, effect);
   return effect;
-}
-
-World worldOf(const std::vector<Placed>& effects) {
-  World world;
-  for (const Placed& placed : effects) placed.drawn.apply(world, placed.size);
-  return world;
 }
 
 bool clash(const std::string& a, const std::string& b) {
@@ -247,7 +235,7 @@ const std::string& pickSignal(bool samples, Random& random) {
 }
 
 /// One session on one design, or nothing when the design does not carry the wished effect.
-std::optional<GeneratedSession> drawSession(const SessionWish& wish, Random& random) {
+std::optional<MadeSession> drawSession(const SessionWish& wish, Random& random) {
   // Nothing of the design and of what is written may depend on the shelf: it would be a label.
   const bool samples = uniform(random, 0, 1) < 0.25 || wish.samples;
   const bool knows = uniform(random, 0, 1) < 0.1;
@@ -283,15 +271,21 @@ std::optional<GeneratedSession> drawSession(const SessionWish& wish, Random& ran
                    {"rows", setup.rows.size()},
                    {"classes", classesOf(setup, alignment, placed, effects)},
                    {"oracle", {{"fraction", placed.empty() ? json(nullptr) : json(alignment.oracleFraction(gap))}}}};
-  return session;
+  return MadeSession{setup, std::move(placed), std::move(session)};
 }
 
 }  // namespace
 
-GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed) {
+World worldOf(const std::vector<Placed>& effects) {
+  World world;
+  for (const Placed& placed : effects) placed.drawn.apply(world, placed.size, {});
+  return world;
+}
+
+MadeSession makeSession(const SessionWish& wish, std::uint64_t seed) {
   Random random(seed);
   for (int design = 0; design < 50; ++design)
-    if (std::optional<GeneratedSession> session = drawSession(wish, random)) return *std::move(session);
+    if (std::optional<MadeSession> session = drawSession(wish, random)) return *std::move(session);
   throw std::runtime_error("no believable geometry reaches the wished strength; another seed is needed");
 }
 
@@ -299,6 +293,14 @@ std::vector<std::string> unforeseenIds() {
   std::vector<std::string> ids;
   for (const Kind& kind : unforeseenKinds()) ids.push_back(kind.id);
   return ids;
+}
+
+std::vector<std::uint64_t> sessionSeeds(std::uint64_t seed, std::size_t count) {
+  Random random(seed);
+  random.discard(count - 1);  // Drawn for the order of the shelves.
+  std::vector<std::uint64_t> seeds(count);
+  for (std::uint64_t& one : seeds) one = random();
+  return seeds;
 }
 
 std::vector<std::string> catalogueIds() {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "tests/blind/generate_effects.h"
 #include "tests/blind/plan_classes.h"
 #include "tests/blind/session.h"
 
@@ -30,9 +31,24 @@ struct SessionWish {
   std::string kind;             ///< of an unforeseen effect; "": drawn
 };
 
+/// A session with what it was made of.
+struct MadeSession {
+  Setup setup;
+  std::vector<Placed> effects;  ///< None on the shelves none and signals.
+  GeneratedSession tables;
+};
+
 /// Draws one session.
 /// @param seed of this session alone: the same seed gives the same bytes
-GeneratedSession generateSession(const SessionWish& wish, std::uint64_t seed);
+MadeSession makeSession(const SessionWish& wish, std::uint64_t seed);
+
+/// Seeds of the sessions of a set, in their order.
+/// @param seed of the set
+/// @param count number of sessions, at least 1
+std::vector<std::uint64_t> sessionSeeds(std::uint64_t seed, std::size_t count);
+
+/// What room, rig and electronics do with these effects, as drawn.
+World worldOf(const std::vector<Placed>& effects);
 
 /// Every effect of the catalogue, in order of name.
 std::vector<std::string> catalogueIds();

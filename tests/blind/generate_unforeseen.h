@@ -49,12 +49,8 @@ struct Story {
 };
 Drawn drawnOf(const Story& story, std::function<void(World&, double size)> apply);
 
-Drawn drawWheelchair(const Setup& setup, Random& random);
-Drawn drawLift(const Setup& setup, Random& random);
 Drawn drawDoor(const Setup& setup, Random& random);
 Drawn drawTouchingCarts(const Setup& setup, Random& random);
-Drawn drawBeatingNeighbour(const Setup& setup, Random& random);
-Drawn drawLightingLine(const Setup& setup, Random& random);
 Drawn drawCoiledCable(const Setup& setup, Random& random);
 Drawn drawPedestals(const Setup& setup, Random& random);
 Drawn drawCeilingGrid(const Setup& setup, Random& random);
@@ -62,9 +58,7 @@ Drawn drawBlind(const Setup& setup, Random& random);
 Drawn drawStepStool(const Setup& setup, Random& random);
 Drawn drawEddyTail(const Setup& setup, Random& random);
 
-Drawn drawSwellingPlank(const Setup& setup, Random& random);
 Drawn drawFoldedBoard(const Setup& setup, Random& random);
-Drawn drawSpacerBlocks(const Setup& setup, Random& random);
 Drawn drawEccentricWheel(const Setup& setup, Random& random);
 Drawn drawCreepingArm(const Setup& setup, Random& random);
 Drawn drawTautCable(const Setup& setup, Random& random);
@@ -80,12 +74,10 @@ Drawn drawRangeSwitch(const Setup& setup, Random& random);
 Drawn drawDeadZone(const Setup& setup, Random& random);
 Drawn drawCableLoop(const Setup& setup, Random& random);
 Drawn drawUnsettledFilter(const Setup& setup, Random& random);
-Drawn drawForeignMap(const Setup& setup, Random& random);
 Drawn drawMultiplexer(const Setup& setup, Random& random);
 Drawn drawSaggingSupply(const Setup& setup, Random& random);
 Drawn drawCoarseTable(const Setup& setup, Random& random);
 Drawn drawClippedCoordinate(const Setup& setup, Random& random);
-Drawn drawWarmCore(const Setup& setup, Random& random);
 Drawn drawBiasedCore(const Setup& setup, Random& random);
 Drawn drawPhaseSlip(const Setup& setup, Random& random);
 Drawn drawFusedCompass(const Setup& setup, Random& random);

@@ -60,26 +60,6 @@ double settled(double time_s, double constant_s) { return 1 - std::exp(-std::max
 
 }  // namespace
 
-/// Rain sets in: the plank with the holes takes up moisture and swells across its grain, hardly along it.
-Drawn drawSwellingPlank(const Setup& setup, Random& random) {
-  const Box box = boxOf(setup);
-  const int axis = box.anyLong(random, 2);
-  const double skew_rad = uniform(random, -0.3, 0.3);
-  const Vector3d across = turned(Vector3d(0, 0, skew_rad), Quaterniond::Identity()) * Vector3d::Unit(axis);
-  const Vector3d screwed_m = box.low_m + uniform(random, 0, 1) * (box.high_m - box.low_m);
-  const double constant_s = sceneOf(setup).duration_s * uniform(random, 0.2, 1.0);
-  const auto apply = [=](World& world, double size) {
-    world.rig.push_back([=](const Row& row, Vector3d& place_m, Quaterniond&) {
-      const double strain = size * settled(middleTime_s(row), constant_s);
-      place_m += strain * across.dot(row.place_m - screwed_m) * across;
-    });
-  };
-  const json parameters = {{"across", listed(across)}, {"screwed_m", listed(screwed_m)}, {"constant_s", constant_s}};
-  return drawnOf({"plank_swells_across_grain", "a plank swells across its grain while the air gets damp", "strain",
-                  1e-6, 1, parameters},
-                 apply);
-}
-
 /// The board folds for transport; its hinge does not open quite flat, so one wing rises.
 Drawn drawFoldedBoard(const Setup& setup, Random& random) {
   const Box box = boxOf(setup);
@@ -99,26 +79,6 @@ Drawn drawFoldedBoard(const Setup& setup, Random& random) {
   };
   return drawnOf({"hinged_board_not_flat", "one wing of a folding board stands up", "angle_rad", 1e-5, 1,
                   json{{"axis", axis}, {"hinge_jig_m", hinge_m}}},
-                 apply);
-}
-
-/// Heights are stacked from blocks of one, two and four layers; one block is thicker than its label, one thinner.
-Drawn drawSpacerBlocks(const Setup& setup, Random& random) {
-  const Lines layers = linesOf(setup, 2);
-  std::array<double, 5> share{};
-  for (double& one : share) one = normal(random);
-  share[0] = (share[0] < 0 ? -1 : 1) * uniform(random, 0.6, 1.2);
-  share[1] = (share[0] < 0 ? 1 : -1) * uniform(random, 0.3, 1.2);
-  const Vector3d lean = uniform(random, 0.0, 0.5) * level(random, Vector3d::UnitZ());
-  const auto apply = [=](World& world, double size) {
-    world.rig.push_back([=](const Row& row, Vector3d& place_m, Quaterniond&) {
-      const auto layer = static_cast<unsigned>(std::max(0, layers.nearest(row.place_m)));
-      for (std::size_t block = 0; block < share.size(); ++block)
-        if ((layer >> block & 1U) != 0) place_m += size * share[block] * (Vector3d::UnitZ() + lean);
-    });
-  };
-  return drawnOf({"spacer_blocks_of_odd_thickness", "blocks stacked in binary steps have wrong thicknesses",
-                  "thickness_m", 1e-6, 1, json{{"shares", share}, {"layers", setup.counts.z()}}},
                  apply);
 }
 
@@ -196,7 +156,7 @@ Drawn drawLooseHolder(const Setup& setup, Random& random) {
       pose.position_m -= loose_rad * thread_m * up;
     });
   };
-  return drawnOf({"holder_screw_backs_out", "the sensor's arm sinks ever more as its screw backs out", "angle_rad",
+  return drawnOf({"near:holder_screw_backs_out", "the sensor's arm sinks ever more as its screw backs out", "angle_rad",
                   1e-4, 2, json{{"arm_m", listed(arm_m)}, {"power", power}, {"thread_m", thread_m}}},
                  apply);
 }
@@ -256,7 +216,7 @@ Drawn drawSwayingTransmitter(const Setup& setup, Random& random) {
     });
   };
   const json parameters = {{"axis", listed(axis)}, {"period_s", period_s}, {"blowing", blowing}, {"phase", phase}};
-  return drawnOf({"fan_sways_hanging_transmitter", "the hanging transmitter leans while the ventilation blows",
+  return drawnOf({"near:fan_sways_hanging_transmitter", "the hanging transmitter leans while the ventilation blows",
                   "angle_rad", 1e-5, 1, parameters, ceiling_m},
                  apply);
 }
@@ -296,7 +256,7 @@ Drawn drawSecondPage(const Setup& setup, Random& random) {
     });
   };
   return drawnOf(
-      {"second_page_from_older_drawing", "later holes of the list follow an older drawing", "change_m", 1e-6, 0.5,
+      {"near:second_page_from_older_drawing", "later holes of the list follow an older drawing", "change_m", 1e-6, 0.5,
        json{{"order", listed(order)},
             {"page_ends_at", page},
             {"shift", listed(shift)},

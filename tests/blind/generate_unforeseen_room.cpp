@@ -19,12 +19,6 @@ Matrix3d framedTensor(Random& random) {
   return axes * along.asDiagonal() * axes.transpose();
 }
 
-std::vector<double> stops(Random& random, int count) {
-  std::vector<double> floors = {0};
-  for (int n = 1; n < count; ++n) floors.push_back(n % 2 == 0 ? 0.0 : uniformInt(random, 1, 3));
-  return floors;
-}
-
 /// Cells of a steel pedestal each, standing in squares under the places.
 Scatterer pedestals(const Scene& scene, const Vector3d& first, double depth_m, double pitch_m) {
   const Vector3d second = scene.up.cross(first);
@@ -90,46 +84,6 @@ Vector3d nearTransmitter(const Scene& scene, Random& random) {
 
 }  // namespace
 
-/// The operator sits in a steel wheelchair that rolls along with the hand, always at the same height and side.
-Drawn drawWheelchair(const Setup& setup, Random& random) {
-  const Scene scene = sceneOf(setup);
-  Vector3d side = level(random, scene.up);
-  if (side.dot(scene.middle_m) < 0) side = -side;
-  const double height_m = scene.middle_m.dot(scene.up) - uniform(random, 0.1, 0.4);
-  const double arm_m = uniform(random, 0.5, 0.7);
-  const Matrix3d tensor = framedTensor(random);
-  const auto apply = [=, up = scene.up](World& world, double size) {
-    world.signal.push_back([=](const Row&, const SolvedPose& pose, Matrix3d& couplings) {
-      Vector3d seat_m = pose.position_m + arm_m * side;
-      seat_m = keptAway(seat_m + (height_m - seat_m.dot(up)) * up, 0.35);
-      addField(pose, echo(seat_m, size * tensor, pose.position_m), couplings);
-    });
-  };
-  const json parameters = {{"side", listed(side)}, {"arm_m", arm_m}, {"height_m", height_m}};
-  return drawnOf({"operator_in_wheelchair", "a steel chair rolls along with the hand of the operator",
-                  "polarizability_m3", 1e-6, 0.3, parameters},
-                 apply);
-}
-
-/// A lift behind the wall is seldom far away; where it parks changes with every call.
-Drawn drawLift(const Setup& setup, Random& random) {
-  const Scene scene = sceneOf(setup);
-  const Vector3d at_m = beside(scene, level(random, scene.up), uniform(random, 0.8, 1.5));
-  const std::vector<double> calls_s = instants(random, scene, uniformInt(random, 2, 6));
-  const std::vector<double> floors = stops(random, static_cast<int>(calls_s.size()) + 1);
-  const Matrix3d tensor = flatTensor(scene.up, 1.0, uniform(random, 0.4, 0.7));
-  const auto apply = [=, up = scene.up](World& world, double size) {
-    world.signal.push_back([=](const Row& row, const SolvedPose& pose, Matrix3d& couplings) {
-      const auto stop = static_cast<std::size_t>(passed(calls_s, middleTime_s(row)));
-      const Vector3d car_m = at_m + 3.1 * floors[stop] * up;
-      addField(pose, echo(car_m, size * tensor, pose.position_m), couplings);
-    });
-  };
-  return drawnOf({"lift_car_parks_at_floors", "a lift car parks now here, now floors away", "polarizability_m3", 1e-4,
-                  100, json{{"calls_s", calls_s}, {"floors", floors}}, at_m},
-                 apply);
-}
-
 /// People pass through a steel door and leave it at another angle each time.
 Drawn drawDoor(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
@@ -148,7 +102,7 @@ Drawn drawDoor(const Setup& setup, Random& random) {
       addField(pose, echo(keptAway(hinge_m + 0.45 * leaf, 0.4), tensor, pose.position_m), couplings);
     });
   };
-  return drawnOf({"steel_door_left_ajar", "a steel door stands at another angle after each passage",
+  return drawnOf({"near:steel_door_left_ajar", "a steel door stands at another angle after each passage",
                   "polarizability_m3", 1e-5, 10, json{{"passages_s", passages_s}, {"angles_rad", angles_rad}}, hinge_m},
                  apply);
 }
@@ -172,50 +126,6 @@ Drawn drawTouchingCarts(const Setup& setup, Random& random) {
   const json parameters = {{"contact_ohm", contact_ohm}, {"contact_m", contact_m}, {"toward", listed(toward)}};
   return drawnOf({"hip_pushes_carts_into_contact", "two carts touch and close a loop while the operator reaches far",
                   "share_of_current", 1e-4, 100, parameters, at_m},
-                 apply);
-}
-
-/// Another tracker of the same make runs next door; its crystal differs so little that the two beat over minutes.
-Drawn drawBeatingNeighbour(const Setup& setup, Random& random) {
-  const Scene scene = sceneOf(setup);
-  const Vector3d at_m = beside(scene, direction(random), uniform(random, 0.5, 1.5));
-  const Vector3d moment = direction(random);
-  const Eigen::RowVector3d slots = direction(random).transpose();
-  const double period_s = scene.duration_s * uniform(random, 0.12, 0.6);
-  const double phase_rad = uniform(random, 0, 2 * kPi);
-  const auto apply = [=](World& world, double size) {
-    world.signal.push_back([=](const Row& row, const SolvedPose& pose, Matrix3d& couplings) {
-      const double beat = std::cos(2 * kPi * middleTime_s(row) / period_s + phase_rad);
-      addField(pose, size * beat * dipoleField(pose.position_m - at_m) * moment * slots, couplings);
-    });
-  };
-  const json parameters = {{"moment", listed(moment)}, {"period_s", period_s}, {"phase_rad", phase_rad}};
-  return drawnOf({"beating_neighbour_transmitter", "the transmitter next door beats slowly with this one",
-                  "moment_seen", 1e-5, 20, parameters, at_m},
-                 apply);
-}
-
-/// A line to rectifier-fed lamps carries a harmonic that the tracker, locked to the mains, takes for its own.
-Drawn drawLightingLine(const Setup& setup, Random& random) {
-  const Scene scene = sceneOf(setup);
-  const Vector3d toward = direction(random);
-  const Vector3d line = toward.unitOrthogonal();
-  const Vector3d at_m = beside(scene, toward, uniform(random, 0.4, 1.2));
-  const Eigen::RowVector3d slots = direction(random).transpose();
-  const std::vector<double> switched_s = instants(random, scene, uniformInt(random, 1, 4));
-  std::vector<double> load;
-  for (std::size_t n = 0; n <= switched_s.size(); ++n) load.push_back(uniform(random, 0.2, 1.0));
-  const auto apply = [=](World& world, double size) {
-    world.signal.push_back([=](const Row& row, const SolvedPose& pose, Matrix3d& couplings) {
-      const Vector3d from_m = pose.position_m - at_m;
-      const Vector3d off_m = from_m - from_m.dot(line) * line;
-      const double now = load[static_cast<std::size_t>(passed(switched_s, middleTime_s(row)))];
-      addField(pose, size * now / std::max(0.01, off_m.squaredNorm()) * line.cross(off_m) * slots, couplings);
-    });
-  };
-  const json parameters = {{"line", listed(line)}, {"load", load}, {"switched_s", switched_s}};
-  return drawnOf({"lighting_line_harmonic", "a straight supply line carries a harmonic in step with the carrier",
-                  "current_seen_per_m2", 1e-5, 50, parameters, at_m},
                  apply);
 }
 
@@ -243,7 +153,7 @@ Drawn drawPedestals(const Setup& setup, Random& random) {
   const Scatterer all = pedestals(scene, first, depth_m, pitch_m);
   const auto apply = [=](World& world, double size) { world.metal.emplace_back(size, all); };
   const json parameters = {{"depth_m", depth_m}, {"pitch_m", pitch_m}, {"first", listed(first)}};
-  return drawnOf({"raised_floor_pedestals", "steel pedestals of a raised floor under the places",
+  return drawnOf({"near:raised_floor_pedestals", "steel pedestals of a raised floor under the places",
                   "polarizability_each_m3", 1e-6, 0.3, parameters},
                  apply);
 }
@@ -254,7 +164,7 @@ Drawn drawCeilingGrid(const Setup& setup, Random& random) {
   const double height_m = uniform(random, 0.3, 0.6);
   const Scatterer all = ceilingLoops(scene, random, height_m, setup.carrier_hz);
   const auto apply = [=](World& world, double size) { world.metal.emplace_back(size, all); };
-  return drawnOf({"ceiling_grid_with_open_joints", "some squares of a hung ceiling's bars are closed loops",
+  return drawnOf({"near:ceiling_grid_with_open_joints", "some squares of a hung ceiling's bars are closed loops",
                   "share_of_current", 1e-4, 100, json{{"height_m", height_m}, {"closed", all.loops.size()}}},
                  apply);
 }
@@ -274,7 +184,7 @@ Drawn drawBlind(const Setup& setup, Random& random) {
     for (const Scatterer& one : slats) world.metal.emplace_back(size, one);
   };
   const json parameters = {{"first_s", first * scene.duration_s}, {"last_s", last * scene.duration_s}};
-  return drawnOf({"blind_lowered_slat_by_slat", "an aluminium blind comes down during the session",
+  return drawnOf({"near:blind_lowered_slat_by_slat", "an aluminium blind comes down during the session",
                   "polarizability_each_m3", 1e-7, 0.1, parameters, at_m},
                  apply);
 }
@@ -294,7 +204,7 @@ Drawn drawStepStool(const Setup& setup, Random& random) {
       addField(pose, echo(keptAway(at_m, 0.35), size * tensor, pose.position_m), couplings);
     });
   };
-  return drawnOf({"step_stool_for_high_places", "a steel stool stands there only while high places are measured",
+  return drawnOf({"near:step_stool_for_high_places", "a steel stool stands there only while high places are measured",
                   "polarizability_m3", 1e-6, 1, json{{"needed_above_jig_z_m", needed_m}}, at_m},
                  apply);
 }
@@ -315,8 +225,8 @@ Drawn drawEddyTail(const Setup& setup, Random& random) {
       addField(pose, echo(at_m, size * flatTensor(normal, -1.0, -0.2), pose.position_m) * next, couplings);
     });
   };
-  return drawnOf({"eddy_tail_in_next_slot", "eddy currents of one slot decay within the next ones", "polarizability_m3",
-                  1e-6, 3, json{{"normal", listed(normal)}, {"second_slot_share", again}}, at_m},
+  return drawnOf({"near:eddy_tail_in_next_slot", "eddy currents of one slot decay within the next ones",
+                  "polarizability_m3", 1e-6, 3, json{{"normal", listed(normal)}, {"second_slot_share", again}}, at_m},
                  apply);
 }
 

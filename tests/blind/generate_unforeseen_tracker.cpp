@@ -19,21 +19,6 @@ Vector3d cornerValue(std::uint64_t map, int a, int b, int c) {
   return normalVector(random);
 }
 
-/// Trilinear interpolation of the map's corners.
-Vector3d mapValue(std::uint64_t map, const Vector3d& at) {
-  const Vector3d low = at.array().floor();
-  const Vector3d part = at - low;
-  Vector3d sum = Vector3d::Zero();
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3i far(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-    double weight = 1;
-    for (int axis = 0; axis < 3; ++axis) weight *= far(axis) == 1 ? part(axis) : 1 - part(axis);
-    const Eigen::Vector3i cell = low.cast<int>() + far;
-    sum += weight * cornerValue(map, cell.x(), cell.y(), cell.z());
-  }
-  return sum;
-}
-
 double smoothStep(double x) { return 0.5 + 0.5 * std::tanh(x); }
 
 /// The tracker axis along which the places reach farthest, with a sign.
@@ -63,8 +48,8 @@ Drawn drawRangeSwitch(const Setup& setup, Random& random) {
         if (couplings.row(coil).norm() > levels(coil)) couplings.row(coil) *= std::exp(size * mismatch(coil));
     });
   };
-  return drawnOf({"amplifier_switches_range", "ranges of the receiver amplifiers do not match", "log_gain", 1e-5, 2,
-                  json{{"levels", listed(levels)}, {"mismatch", listed(mismatch)}}},
+  return drawnOf({"near:amplifier_switches_range", "ranges of the receiver amplifiers do not match", "log_gain", 1e-5,
+                  2, json{{"levels", listed(levels)}, {"mismatch", listed(mismatch)}}},
                  apply);
 }
 
@@ -113,25 +98,8 @@ Drawn drawUnsettledFilter(const Setup& setup, Random& random) {
       pose.position_m += lag * (cradle_m - pose.position_m);
     });
   };
-  return drawnOf({"adaptive_filter_not_settled_far_out", "far out the filter still remembers the cradle", "share_left",
-                  1e-6, 2, json{{"power", power}, {"usual_m", usual_m}}, cradle_m},
-                 apply);
-}
-
-/// The maker's correction map of the room where the tracker stood before is still switched on.
-Drawn drawForeignMap(const Setup& setup, Random& random) {
-  const std::uint64_t map = random();
-  const double spacing_m = std::max(0.25, setup.pitch_m * uniform(random, 1.0, 2.0));
-  const double turn_per_m = uniform(random, 0.5, 2.0);
-  const auto apply = [=](World& world, double size) {
-    world.report.push_back([=](const Row&, SolvedPose& pose) {
-      const Vector3d at = pose.position_m / spacing_m;
-      pose.orientation = turned(size * turn_per_m * mapValue(map + 1, at), pose.orientation);
-      pose.position_m += size * mapValue(map, at);
-    });
-  };
-  return drawnOf({"correction_map_of_another_room", "a correction map of another room is still switched on",
-                  "correction_m", 1e-6, 0.5, json{{"spacing_m", spacing_m}, {"turn_rad_per_m", turn_per_m}}},
+  return drawnOf({"near:adaptive_filter_not_settled_far_out", "far out the filter still remembers the cradle",
+                  "share_left", 1e-6, 2, json{{"power", power}, {"usual_m", usual_m}}, cradle_m},
                  apply);
 }
 
@@ -208,31 +176,8 @@ Drawn drawClippedCoordinate(const Setup& setup, Random& random) {
       if (beyond_m > 0) pose.position_m -= beyond_m * axis;
     });
   };
-  return drawnOf({"coordinate_clips_at_wall", "one coordinate is held at the wall of a set volume", "cut_m",
+  return drawnOf({"near:coordinate_clips_at_wall", "one coordinate is held at the wall of a set volume", "cut_m",
                   1e-4 * length_m, length_m, json{{"axis", listed(axis)}, {"outermost_m", outermost_m}}},
-                 apply);
-}
-
-/// Under the surgical lamp the ferrite core of the sensor gets warm and one coil gains.
-Drawn drawWarmCore(const Setup& setup, Random& random) {
-  const Scene scene = sceneOf(setup);
-  const Vector3d toward = direction(random);
-  const Vector3d beam = level(random, scene.up);
-  const Vector3d spot_m = scene.middle_m + uniform(random, 0.3, 1.0) * extent_m(scene, toward) * toward;
-  const double width_m = uniform(random, 0.25, 0.45);
-  const Vector3d coils(1, uniform(random, 0, 0.5), uniform(random, 0, 0.5));
-  const Vector3d shaft = (scene.up + 0.4 * beam).normalized();
-  const auto apply = [=](World& world, double size) {
-    world.signal.push_back([=](const Row&, const SolvedPose& pose, Matrix3d& couplings) {
-      const Vector3d off_m = pose.position_m - spot_m;
-      const double along_m = off_m.dot(shaft);
-      const double spread = (off_m.squaredNorm() - 0.9 * along_m * along_m) / (width_m * width_m);
-      const double warmth = std::exp(-0.5 * spread);
-      for (int coil = 0; coil < 3; ++coil) couplings.row(coil) *= std::exp(size * warmth * coils(coil));
-    });
-  };
-  return drawnOf({"ferrite_core_warms_under_lamp", "a coil gains where a lamp warms the sensor", "log_gain", 1e-5, 5,
-                  json{{"width_m", width_m}, {"coils", listed(coils)}, {"shaft", listed(shaft)}}, spot_m},
                  apply);
 }
 

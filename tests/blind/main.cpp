@@ -9,6 +9,9 @@
 #include "tests/blind/controls.h"
 #include "tests/blind/foretell.h"
 #include "tests/blind/generate.h"
+#include "tests/blind/next.h"
+#include "tests/blind/oracle.h"
+#include "tests/blind/replicate.h"
 #include "tests/blind/score.h"
 
 namespace {
@@ -20,6 +23,9 @@ with the simulator and the diagnosis: it has its own physics, its own pose solve
   generate   write sessions as node tables without any label, and seal the truth (SHA-256)
   answer     run `fieldtrue-cli diagnose` on them; each answer is written once
   foretell   simulate what the diagnosis found at places that no table held
+  oracle     fit the parameters of the true effects to each recording, and put them to the same test
+  replicate  have small sessions of one effect diagnosed with replicates
+  next       make the measurement that undecided answers suggest, and random ones, and diagnose again
   score      open the seal and print the scoreboard
   controls   make negative controls of a sealed set: shuffled, wrong floor, mirrored, reversed in time
 
@@ -79,6 +85,49 @@ fitted to the same rows. Writes DIR/foretold.json, which score reads.
 Example: fieldtrue-blind foretell --in set --jobs 2
 )";
 
+constexpr const char* kOracleHelp =
+    R"(Fits the true effects of every session (right kinds, from their true parameters on) and its alignment to the recorded
+rows, by least squares with the generator's own physics, and compares what that foretells at the 200 sealed places with
+the sealed poses. So far these readings could take away what the effect does: score sets the reports against it.
+Writes DIR/oracle.json; what is in it already is left, so that a run that was stopped can be started again.
+
+  --in DIR         sealed set, of this very build of fieldtrue-blind: its sessions are made again from the seed
+  --jobs J         sessions side by side; default 1
+  --from A --to B  only sessions A to B, counted from 1: processes can share a set
+
+Example: fieldtrue-blind oracle --in set --jobs 2
+)";
+
+constexpr const char* kReplicateHelp =
+    R"(Runs `fieldtrue-cli diagnose --replicates M` on the first sessions of one effect and at most 100 places, each in a folder
+of its own that holds nothing but its tables, and keeps in how many replicates the same was named. score compares the
+mean of these shares with how often what was named is the truth. The program makes replicates under its runner-up too;
+they are not used. Writes DIR/replicated.json; what is in it already is left.
+
+  --in DIR          sealed set
+  --cli PATH        the program to run; default fieldtrue-cli beside this program
+  --sessions N      how many sessions at most; default 60
+  --replicates M    of each; default 20
+  --jobs J          diagnoses side by side, one thread each; default 1
+
+Example: fieldtrue-blind replicate --in set --sessions 60 --jobs 2
+)";
+
+constexpr const char* kNextHelp =
+    R"(Where an answer leaves the cause open (several in the first candidate's class, or less than 0.9 for it) and its sentence
+on the next measurement asks for further rows, they are made in the session's own world, with the same rig, seating and
+scatter, and put behind its table; beside it as many rows at random places, up to one step outside the grid. Both tables
+are diagnosed. score compares how large the true cause's intervals are then, how open the cause still is, and how often
+it is named right. Writes DIR/next.json; what is in it already is left.
+
+  --in DIR         answered set, of this very build of fieldtrue-blind: its sessions are made again from the seed
+  --cli PATH       the program to run; default fieldtrue-cli beside this program
+  --sessions N     how many sessions with one effect or several at most; default 150
+  --jobs J         sessions side by side; default 1
+
+Example: fieldtrue-blind next --in set --sessions 150 --jobs 2
+)";
+
 constexpr const char* kScoreHelp =
     R"(Checks truth and answers against their hashes and prints every figure with its 95 % interval (Wilson for shares,
 bootstrap otherwise), its target where there is one, and the confusion matrix. What was not answered counts as wrong.
@@ -108,11 +157,16 @@ struct Command {
   int (*run)(std::span<const std::string>);
 };
 
-constexpr Command kCommands[] = {{"generate", kGenerateHelp, blind::runGenerate},
-                                 {"answer", kAnswerHelp, blind::runAnswer},
-                                 {"foretell", kForetellHelp, blind::runForetell},
-                                 {"score", kScoreHelp, blind::runScore},
-                                 {"controls", kControlsHelp, blind::runControls}};
+constexpr Command kCommands[] = {
+    {"generate", kGenerateHelp, blind::runGenerate},
+    {"answer", kAnswerHelp, blind::runAnswer},
+    {"foretell", kForetellHelp, blind::runForetell},
+    {"oracle", kOracleHelp, blind::runOracle},
+    {"replicate", kReplicateHelp, blind::runReplicate},
+    {"next", kNextHelp, blind::runNext},
+    {"score", kScoreHelp, blind::runScore},
+    {"controls", kControlsHelp, blind::runControls},
+};
 
 bool isHelp(const std::string& word) { return word == "--help" || word == "-h"; }
 
@@ -137,8 +191,9 @@ int main(int argc, char** argv) {
       return 1;
     }
   }
-  std::cerr << "'" << arguments.front()
-            << "' is no command of fieldtrue-blind; it has generate, answer, foretell, score and controls (--help "
-               "tells more)\n";
+  std::string names;
+  for (const Command& command : kCommands) names += std::string(names.empty() ? "" : ", ") + command.name;
+  std::cerr << "'" << arguments.front() << "' is no command of fieldtrue-blind; it has " << names
+            << " (--help tells more)\n";
   return 2;
 }

@@ -136,13 +136,16 @@ Answer answerOf(const std::filesystem::path& path, const json* record) {
   return answer;
 }
 
-/// What `foretell` found, by file; nothing where it did not run.
-std::map<std::string, json> foretoldIn(const std::filesystem::path& folder) {
-  std::map<std::string, json> foretold;
-  if (!std::filesystem::exists(folder / "foretold.json")) return foretold;
-  const json document = documentOf(folder / "foretold.json");
-  for (const json& entry : listAt(document, "sessions")) foretold[wordAt(entry, "file")] = entry;
-  return foretold;
+/// Documents with an entry a session that score reads.
+constexpr const char* kResults[] = {"foretold", "oracle", "replicated", "next"};
+
+/// Entries of a document of the set, by file; nothing where the command that writes it did not run.
+std::map<std::string, json> entriesIn(const std::filesystem::path& path) {
+  std::map<std::string, json> entries;
+  if (!std::filesystem::exists(path)) return entries;
+  const json document = documentOf(path);
+  for (const json& entry : listAt(document, "sessions")) entries[wordAt(entry, "file")] = entry;
+  return entries;
 }
 
 /// Share of the squares at the start that is left, in position.
@@ -273,16 +276,19 @@ std::vector<Session> sessionsOf(const json& truth, const std::filesystem::path& 
   if (std::filesystem::exists(folder / "answers.json")) records = documentOf(folder / "answers.json");
   std::map<std::string, const json*> record_of;
   for (const json& record : listAt(records, "sessions")) record_of[wordAt(record, "file")] = &record;
-  const std::map<std::string, json> foretold = foretoldIn(folder);
+  std::map<std::string, std::map<std::string, json>> entries;
+  for (const char* name : kResults) entries[name] = entriesIn(folder / (std::string(name) + ".json"));
   std::vector<Session> sessions;
   for (const json& object : listAt(truth, "sessions")) {
     Session session = sessionOf(object, sessions.size());
     const auto record = record_of.find(session.file);
     session.answer =
         answerOf(folder / (session.file + ".gap.json"), record == record_of.end() ? nullptr : record->second);
-    if (const auto found = foretold.find(session.file); found != foretold.end()) {
-      session.answer.left_inside = leftOf(found->second, "inside");
-      session.answer.left_outside = leftOf(found->second, "outside");
+    for (const auto& [name, of_file] : entries)
+      if (const auto found = of_file.find(session.file); found != of_file.end()) session.results[name] = found->second;
+    if (const auto foretold = session.results.find("foretold"); foretold != session.results.end()) {
+      session.answer.left_inside = leftOf(foretold->second, "inside");
+      session.answer.left_outside = leftOf(foretold->second, "outside");
     }
     sessions.push_back(std::move(session));
   }

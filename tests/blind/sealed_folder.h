@@ -89,6 +89,7 @@ struct Session {
   std::vector<std::vector<std::string>> own_classes;  ///< By the physics of the generator; empty when not stated.
   std::optional<double> oracle_fraction;
   Answer answer;
+  std::map<std::string, nlohmann::json> results;  ///< Entries of oracle.json and its like, by the document's name.
 };
 
 /// Sessions of a truth document, each with its answer from the folder.

@@ -72,12 +72,15 @@ double meanOf(std::span<const double> values) {
 
 Interval bootstrap(std::span<const double> values, const Statistic& statistic) { return resampled(values, statistic); }
 
-Interval pooledShare(std::span<const Tally> sessions) {
-  const auto share = [](std::span<const Tally> some) {
+Interval ratioOfSums(std::span<const Tally> sessions) {
+  return resampled(sessions, [](std::span<const Tally> some) {
     Tally sum;
     for (const Tally& one : some) sum = {sum.hits + one.hits, sum.count + one.count};
     return sum.hits / sum.count;
-  };
+  });
+}
+
+Interval pooledShare(std::span<const Tally> sessions) {
   std::vector<Tally> counted;
   double count = 0.0;
   for (const Tally& one : sessions) {
@@ -85,7 +88,7 @@ Interval pooledShare(std::span<const Tally> sessions) {
     counted.push_back(one);
     count += one.count;
   }
-  Interval interval = resampled(std::span<const Tally>(counted), share);
+  Interval interval = ratioOfSums(counted);
   interval.count = static_cast<std::size_t>(count);
   return interval;
 }

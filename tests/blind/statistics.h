@@ -47,6 +47,10 @@ struct Tally {
 /// @return count is that of things, not of sessions
 Interval pooledShare(std::span<const Tally> sessions);
 
+/// Sum of the hits over the sum of the counts, bootstrapped by session; counts may be any number.
+/// @return count is that of sessions
+Interval ratioOfSums(std::span<const Tally> sessions);
+
 /// Mean squared difference between the stated probability and what happened (Brier 1950), bootstrapped.
 Interval brierScore(std::span<const Forecast> forecasts);
 
