@@ -10,15 +10,6 @@ Matrix3d couplingsAt(const SolvedPose& pose) {
   return pose.orientation.toRotationMatrix().transpose() * dipoleField(pose.position_m);
 }
 
-/// A value of the map in one corner, the same whenever it is asked for.
-Vector3d cornerValue(std::uint64_t map, int a, int b, int c) {
-  const auto mixed = map + 0x9e3779b97f4a7c15ULL * static_cast<std::uint64_t>(a + 512) +
-                     0xbf58476d1ce4e5b9ULL * static_cast<std::uint64_t>(b + 512) +
-                     0x94d049bb133111ebULL * static_cast<std::uint64_t>(c + 512);
-  Random random(mixed);
-  return normalVector(random);
-}
-
 double smoothStep(double x) { return 0.5 + 0.5 * std::tanh(x); }
 
 /// The tracker axis along which the places reach farthest, with a sign.
