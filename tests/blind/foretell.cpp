@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "tests/blind/bare_alignment.h"
+#include "tests/blind/batch.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/session_table.h"
 #include "tests/blind/sha256.h"
-#include "tests/blind/side_by_side.h"
 #include "tests/blind/subprocess.h"
 #include "tests/blind/temporary_folder.h"
 #include "tests/blind/unseen_places.h"
@@ -22,25 +22,7 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-struct Trial {
-  fs::path folder;
-  fs::path cli;
-  std::size_t jobs = 1;
-};
-
-Trial trialOf(std::span<const std::string> words) {
-  static constexpr std::string_view kWithValue[] = {"--in", "--cli", "--jobs"};
-  const auto options = optionsOf(words, "foretell", kWithValue, {});
-  if (options.count("--in") == 0) throw std::invalid_argument("foretell: --in DIR is needed");
-  Trial trial{options.at("--in"), fs::read_symlink("/proc/self/exe").parent_path() / "fieldtrue-cli", 1};
-  if (options.count("--cli") > 0) trial.cli = fs::absolute(options.at("--cli"));
-  if (options.count("--jobs") > 0) {
-    const double jobs = numberIn(options.at("--jobs"));
-    if (!(jobs >= 1.0 && jobs <= 1000.0)) throw std::invalid_argument("foretell: --jobs needs a number from 1 to 1000");
-    trial.jobs = static_cast<std::size_t>(jobs);
-  }
-  return trial;
-}
+constexpr const char* kForetoldSchema = "fieldtrue.blind-foretold/1";
 
 /// The sealed places as a plan, without the poses that were sealed with them. Earlier times come first: a plan is
 /// walked.
@@ -85,63 +67,60 @@ std::vector<SolvedPose> byPlace(const SessionTable& unseen, const SessionTable& 
   return poses;
 }
 
-json foretold(const Trial& trial, const json& session, const std::string& scene_sha256) {
+json foretold(const Batch& batch, const json& session, const std::string& scene_sha256) {
   const std::string file = session.at("file").get<std::string>();
   json entry = {{"file", file}};
-  const fs::path scene = trial.folder / (file + ".scene.json");
+  const fs::path scene = batch.folder / (file + ".scene.json");
   if (sha256Hex(textOf(scene)) != scene_sha256)
     throw std::runtime_error(scene.string() + " was changed after it was answered");
-  const SessionTable unseen = sealedPlaces(trial.folder, session);
+  const SessionTable unseen = sealedPlaces(batch.folder, session);
   const TemporaryFolder desk;
   replaceFile(desk.path() / "unseen.plan.json", planOf(unseen, byTime(unseen)).dump());
-  const Finished run = runProgram({trial.cli.string(), "simulate", "--exact", "--threads", "1", "--scene",
+  const Finished run = runProgram({batch.cli.string(), "simulate", "--exact", "--threads", "1", "--scene",
                                    scene.string(), "--plan", (desk.path() / "unseen.plan.json").string(), "--nodes",
                                    (desk.path() / "foretold.nodes.csv").string()});
   if (run.exit_status != 0) {
     entry["trouble"] = "simulate ended with status " + std::to_string(run.exit_status);
     return entry;
   }
-  entry.update(comparedWithSealed(readTable(trial.folder / (file + ".nodes.csv")), unseen,
+  entry.update(comparedWithSealed(readTable(batch.folder / (file + ".nodes.csv")), unseen,
                                   byPlace(unseen, readTable(desk.path() / "foretold.nodes.csv"))));
   return entry;
 }
 
-/// Every session that has an answer, with the hash of its scene.
-std::vector<std::pair<json, std::string>> answeredSessions(const Trial& trial) {
-  const json truth = openSealed(trial.folder);
-  const json answers = documentOf(trial.folder / "answers.json");
+/// Hash of each session's scene that was answered here; what was kept from elsewhere has been foretold there.
+std::map<std::string, std::string> scenesIn(const fs::path& folder) {
   std::map<std::string, std::string> scene_of;
+  const json answers = documentOf(folder / "answers.json");
   for (const json& record : answers.at("sessions"))
     if (record.contains("scene_sha256")) scene_of[record.at("file")] = record.at("scene_sha256");
-  std::vector<std::pair<json, std::string>> sessions;
-  for (const json& session : truth.at("sessions")) {
-    const auto scene = scene_of.find(session.at("file").get<std::string>());
-    if (scene != scene_of.end()) sessions.emplace_back(session, scene->second);
-  }
-  if (sessions.empty()) throw std::runtime_error(trial.folder.string() + " holds no answers; run answer first");
-  return sessions;
-}
-
-json foretellAll(const Trial& trial) {
-  const auto sessions = answeredSessions(trial);
-  std::vector<json> entries(sessions.size());
-  const auto name_of = [&](std::size_t i) { return sessions[i].first.at("file").get<std::string>(); };
-  sideBySide(trial.jobs, sessions.size(), name_of,
-             [&](std::size_t i) { entries[i] = foretold(trial, sessions[i].first, sessions[i].second); });
-  return {{"schema", "fieldtrue.blind-foretold/1"}, {"sessions", entries}};
+  return scene_of;
 }
 
 }  // namespace
 
 int runForetell(std::span<const std::string> words) {
+  static constexpr std::string_view kWithValue[] = {"--in", "--cli", "--jobs"};
   return statusOf([&] {
-    const Trial trial = trialOf(words);
-    const json all = foretellAll(trial);
-    replaceFile(trial.folder / "foretold.json", all.dump(1));
-    const auto& entries = all.at("sessions");
+    const Batch batch = batchOf(optionsOf(words, "foretell", kWithValue, {}), "foretell");
+    needProgram(batch);
+    const std::map<std::string, std::string> scene_of = scenesIn(batch.folder);
+    std::vector<json> sessions;
+    const json truth = openSealed(batch.folder);
+    for (const json& session : truth.at("sessions"))
+      if (scene_of.count(session.at("file")) > 0) sessions.push_back(session);
+    if (sessions.empty()) throw std::runtime_error(batch.folder.string() + " holds no answers; run answer first");
+    const auto hash_of = [&](const json& session) {
+      return sha256Hex(scene_of.at(session.at("file")) + session.at("unseen_sha256").get<std::string>());
+    };
+    const auto make = [&](const json& session) { return foretold(batch, session, scene_of.at(session.at("file"))); };
+    const std::size_t made =
+        ResultFile(batch.folder / "foretold.json", kForetoldSchema).fill(batch.jobs, sessions, hash_of, make);
+    const json entries = documentOf(batch.folder / "foretold.json").at("sessions");
     const auto failed =
         std::count_if(entries.begin(), entries.end(), [](const json& entry) { return entry.contains("trouble"); });
-    std::cout << entries.size() << " scenes put to the test, " << failed << " of them could not be simulated\n";
+    std::cout << made << " scenes put to the test, " << failed << " of all " << entries.size()
+              << " could not be simulated\n";
   });
 }
 

@@ -9,6 +9,7 @@
 #include "tests/blind/controls.h"
 #include "tests/blind/foretell.h"
 #include "tests/blind/generate.h"
+#include "tests/blind/kept.h"
 #include "tests/blind/next.h"
 #include "tests/blind/oracle.h"
 #include "tests/blind/replicate.h"
@@ -26,6 +27,8 @@ with the simulator and the diagnosis: it has its own physics, its own pose solve
   oracle     fit the parameters of the true effects to each recording, and put them to the same test
   replicate  have small sessions of one effect diagnosed with replicates
   next       make the measurement that undecided answers suggest, and random ones, and diagnose again
+  keep       write what score reads of the answers, in parts of 100 sessions, to be kept for good
+  restore    put kept parts back into a set that was drawn again
   score      open the seal and print the scoreboard
   controls   make negative controls of a sealed set: shuffled, wrong floor, mirrored, reversed in time
 
@@ -128,6 +131,28 @@ it is named right. Writes DIR/next.json; what is in it already is left.
 Example: fieldtrue-blind next --in set --sessions 150 --jobs 2
 )";
 
+constexpr const char* kKeepHelp =
+    R"(Writes FOLDER/part_NN.json for every hundred sessions that are answered and foretold, with what score reads of each
+report, the hashes of the whole report and scene, and the engine's commit; and FOLDER/oracle.json and so on, as far as they
+are. A part is never written again. So a set can be answered on different days and machines, and scored from what is kept.
+
+  --in DIR         answered set
+  --kept FOLDER    where parts are kept, such as tests/blind/results/NAME
+  --engine ID      commit of the program that answered, 40 hexadecimal digits
+
+Example: fieldtrue-blind keep --in set --kept tests/blind/results/first --engine $(git rev-parse HEAD)
+)";
+
+constexpr const char* kRestoreHelp =
+    R"(Puts what `keep` wrote back into a set that was drawn again from its seed; sessions that are answered in it already stay
+as they are. answer and foretell then go on with the others, and score needs nothing else.
+
+  --in DIR         sealed set
+  --kept FOLDER    where its parts are kept
+
+Example: fieldtrue-blind restore --in set --kept tests/blind/results/first
+)";
+
 constexpr const char* kScoreHelp =
     R"(Checks truth and answers against their hashes and prints every figure with its 95 % interval (Wilson for shares,
 bootstrap otherwise), its target where there is one, and the confusion matrix. What was not answered counts as wrong.
@@ -164,6 +189,8 @@ constexpr Command kCommands[] = {
     {"oracle", kOracleHelp, blind::runOracle},
     {"replicate", kReplicateHelp, blind::runReplicate},
     {"next", kNextHelp, blind::runNext},
+    {"keep", kKeepHelp, blind::runKeep},
+    {"restore", kRestoreHelp, blind::runRestore},
     {"score", kScoreHelp, blind::runScore},
     {"controls", kControlsHelp, blind::runControls},
 };

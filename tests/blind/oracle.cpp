@@ -42,7 +42,8 @@ std::vector<json> withEffects(const json& truth, std::size_t from, std::size_t t
   std::vector<json> kept;
   for (std::size_t n = from; n <= std::min(to, sessions.size()); ++n) {
     const std::string shelf = sessions[n - 1].at("shelf").get<std::string>();
-    if (shelf == "single" || shelf == "pairs" || shelf == "off") kept.push_back(sessions[n - 1]);
+    if (shelf == "single" || shelf == "pairs" || shelf == "off" || shelf == "unforeseen")
+      kept.push_back(sessions[n - 1]);
   }
   if (kept.empty())
     throw std::runtime_error("sessions " + std::to_string(from) + " to " +

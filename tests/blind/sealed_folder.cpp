@@ -162,11 +162,11 @@ Session sessionOf(const json& object, std::size_t index) {
   session.file = wordAt(object, "file");
   session.shelf = wordAt(object, "shelf");
   session.control = wordAt(object, "control");
-  static constexpr std::string_view kShelves[] = {"none", "single", "pairs", "off", "signals"};
+  static constexpr std::string_view kShelves[] = {"none", "single", "pairs", "off", "unforeseen", "signals"};
   if (session.file.empty() || !isAmong(kShelves, session.shelf)) {
     throw std::runtime_error("truth.json, session " + std::to_string(index + 1) + " ('" + session.file +
-                             "'): needs a file and a shelf none, single, pairs, off or signals, got '" + session.shelf +
-                             "'");
+                             "'): needs a file and a shelf none, single, pairs, off, unforeseen or signals, got '" +
+                             session.shelf + "'");
   }
   for (const json& effect : listAt(object, "effects")) session.effects.push_back(trueEffectOf(effect));
   if (session.shelf != "none" && session.effects.empty())
