@@ -42,21 +42,42 @@ json membersOf(const json& object, std::initializer_list<const char*> keys) {
   return some;
 }
 
-json reducedCause(const json& cause, bool is_first) {
-  json reduced = membersOf(cause, {"effect", "class", "probability"});
+/// A candidate; the first one with all that its parameters are said to be.
+json reducedCandidate(const json& cause, bool is_first) {
+  json reduced = membersOf(cause, {"effect", "probability"});
   if (!is_first) return reduced;
-  reduced.update(membersOf(cause, {"location_m"}));
+  reduced.update(membersOf(cause, {"class", "location_m"}));
   if (!cause.contains("parameters") || !cause.at("parameters").is_object()) return reduced;
   for (const auto& [name, parameter] : cause.at("parameters").items())
     if (parameter.is_object()) reduced["parameters"][name] = membersOf(parameter, {"value", "low90", "high90"});
   return reduced;
 }
 
-json reducedCauses(const json& report, const char* key, bool tells_first) {
-  json causes = json::array();
-  for (const json& cause : report.value(key, json::array()))
-    causes.push_back(reducedCause(cause, tells_first && causes.empty()));
-  return causes;
+/// Those that are of any account: the first, and the others down to 1 in 1000.
+json reducedCandidates(const json& report) {
+  constexpr double kOfAccount = 1e-3;
+  const json all = report.value("candidates", json::array());
+  json candidates = json::array();
+  for (const json& candidate : all)
+    if (candidates.empty() || candidate.value("probability", 0.0) >= kOfAccount)
+      candidates.push_back(reducedCandidate(candidate, candidates.empty()));
+  return candidates;
+}
+
+/// Entries of a list that name an effect, with nothing but its name.
+json namesIn(const json& report, const char* key) {
+  const json all = report.value(key, json::array());
+  json names = json::array();
+  for (const json& one : all)
+    if (!one.value("effect", "").empty()) names.push_back(membersOf(one, {"effect"}));
+  return names;
+}
+
+json reducedForetold(const json& entry) {
+  json reduced = membersOf(entry, {"trouble"});
+  for (const char* where : {"inside", "outside"})
+    if (entry.contains(where)) reduced[where] = membersOf(entry.at(where), {"start_m2", "after_m2"});
+  return reduced;
 }
 
 Entries entriesOf(const fs::path& path) {
@@ -95,7 +116,7 @@ json keptSession(const fs::path& set, const json& record, const json* foretold) 
     session["report"] = reducedReport(json::parse(text));
   }
   if (record.contains("scene_sha256")) session["scene_sha256"] = record.at("scene_sha256");
-  if (foretold != nullptr) session["foretold"] = *foretold;
+  if (foretold != nullptr) session["foretold"] = reducedForetold(*foretold);
   return rounded(session);
 }
 
@@ -156,11 +177,9 @@ fs::path folderIn(const std::map<std::string, std::string>& options, const std::
 
 json reducedReport(const json& report) {
   json reduced = membersOf(report, {"verdict"});
-  reduced["candidates"] = reducedCauses(report, "candidates", true);
-  reduced["selected"] = reducedCauses(report, "selected", false);
-  reduced["findings"] = json::array();
-  for (const json& finding : report.value("findings", json::array()))
-    if (!finding.value("effect", "").empty()) reduced["findings"].push_back(membersOf(finding, {"effect"}));
+  reduced["candidates"] = reducedCandidates(report);
+  reduced["selected"] = namesIn(report, "selected");
+  reduced["findings"] = namesIn(report, "findings");
   if (report.contains("remaining"))
     reduced["remaining"] =
         membersOf(report.at("remaining"), {"fraction_of_start", "fraction_low90", "fraction_high90"});
@@ -203,7 +222,9 @@ std::size_t restoreParts(const fs::path& set, const fs::path& folder) {
     for (const json& session : document.at("sessions")) {
       if (answered.count(session.at("file")) > 0) continue;
       records[session.at("file")] = recordOf(set, session);
-      if (session.contains("foretold")) foretold[session.at("file")] = session.at("foretold");
+      if (!session.contains("foretold")) continue;
+      json& entry = foretold[session.at("file")] = session.at("foretold");
+      entry["file"] = session.at("file");
     }
   }
   const std::size_t restored = records.size();
