@@ -15,10 +15,6 @@ namespace {
 
 using nlohmann::json;
 
-bool isAmong(std::span<const std::string_view> keys, std::string_view key) {
-  return std::find(keys.begin(), keys.end(), key) != keys.end();
-}
-
 const json* member(const json& object, const char* key) {
   if (!object.is_object()) return nullptr;
   const auto found = object.find(key);
@@ -159,11 +155,11 @@ Session sessionOf(const json& object, std::size_t index) {
   session.file = wordAt(object, "file");
   session.shelf = wordAt(object, "shelf");
   session.control = wordAt(object, "control");
-  static constexpr std::string_view kShelves[] = {"none", "single", "pairs", "off", "signals"};
+  static constexpr std::string_view kShelves[] = {"none", "single", "pairs", "off", "unforeseen", "signals"};
   if (session.file.empty() || !isAmong(kShelves, session.shelf)) {
     throw std::runtime_error("truth.json, session " + std::to_string(index + 1) + " ('" + session.file +
-                             "'): needs a file and a shelf none, single, pairs, off or signals, got '" + session.shelf +
-                             "'");
+                             "'): needs a file and a shelf none, single, pairs, off, unforeseen or signals, got '" +
+                             session.shelf + "'");
   }
   for (const json& effect : listAt(object, "effects")) session.effects.push_back(trueEffectOf(effect));
   if (session.shelf != "none" && session.effects.empty())
@@ -180,6 +176,10 @@ Session sessionOf(const json& object, std::size_t index) {
 }
 
 }  // namespace
+
+bool isAmong(std::span<const std::string_view> words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
 
 std::map<std::string, std::string> optionsOf(std::span<const std::string> words, std::string_view command,
                                              std::span<const std::string_view> with_value,
@@ -281,6 +281,7 @@ std::vector<Session> sessionsOf(const json& truth, const std::filesystem::path& 
     session.answer =
         answerOf(folder / (session.file + ".gap.json"), record == record_of.end() ? nullptr : record->second);
     if (const auto found = foretold.find(session.file); found != foretold.end()) {
+      session.answer.cannot_be_simulated = member(found->second, "trouble") != nullptr;
       session.answer.left_inside = leftOf(found->second, "inside");
       session.answer.left_outside = leftOf(found->second, "outside");
     }
