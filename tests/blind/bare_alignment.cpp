@@ -33,12 +33,6 @@ SolvedPose poseIn(const SessionTable& table, const std::vector<std::string>& row
   return pose;
 }
 
-double statedNumber(const SessionTable& table, const std::string& key, double otherwise) {
-  for (const std::string& line : table.metadata)
-    if (line.rfind("# " + key + ": ", 0) == 0) return numberIn(line.substr(key.size() + 4));
-  return otherwise;
-}
-
 bool states(const SessionTable& table, const std::string& line) {
   for (const std::string& other : table.metadata)
     if (other == line) return true;

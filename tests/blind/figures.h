@@ -11,13 +11,20 @@
 
 namespace blind {
 
-/// What a figure should reach, and how far beyond it the end of the interval may lie.
+/// What a figure should reach: met where the 95 % interval reaches it and the figure itself is short by no more than
+/// the allowance.
 struct Target {
-  enum class Kind { kAtLeast, kAtMost, kBetween, kValueAtMost };
+  enum class Kind {
+    kAtLeast,
+    kAtMost,
+    kBetween,
+    kSurelyAtMost,  ///< The figure at most `value`, the end of its interval at most `upper`.
+    kValueAtMost    ///< The figure itself, whatever its interval.
+  };
   Kind kind = Kind::kAtLeast;
   double value = 0.0;
-  double upper = 0.0;      ///< Of kBetween.
-  double allowance = 0.0;  ///< In the figure's unit; kValueAtMost compares the figure itself and ignores it.
+  double upper = 0.0;      ///< Of kBetween and kSurelyAtMost.
+  double allowance = 0.0;  ///< In the figure's unit, where an interval decides.
 };
 
 /// One row of the scoreboard.
@@ -30,7 +37,7 @@ struct Figure {
   std::optional<Target> target;
 };
 
-/// By how much a figure misses its target, 0 when it is met.
+/// How far a figure is from a target that it misses, 0 when it is met.
 /// @return nothing without a target or when nothing was counted
 std::optional<double> missedBy(const Figure& figure);
 

@@ -2,12 +2,18 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
+#include <span>
 
 namespace blind {
 namespace {
 
 constexpr std::array<std::string_view, 3> kFloorEffects = {"range_noise", "correlated_samples", "quantization"};
+constexpr std::array<std::string_view, 5> kSignalEffects = {"range_noise", "correlated_samples", "quantization",
+                                                            "mains_interference", "hemisphere_flip"};
+constexpr std::array<std::string_view, 5> kMetal = {"compact_metal", "closed_loop", "finite_plate", "metal_plane",
+                                                    "metal_moved"};
+
+bool isUnnamed(std::string_view effect) { return effect.rfind("unnamed_", 0) == 0; }
 
 std::string labelOf(const Session& session, std::string_view effect) {
   std::vector<std::string> ids = classOf(session, effect);
@@ -18,9 +24,8 @@ std::string labelOf(const Session& session, std::string_view effect) {
 }
 
 const NamedCause* rightCandidate(const Session& session) {
-  if (!session.answer.is_answered || session.answer.candidates.empty()) return nullptr;
-  const NamedCause& first = session.answer.candidates.front();
-  return isRight(session, first.effect) ? &first : nullptr;
+  const NamedCause* first = firstCandidate(session);
+  return first != nullptr && isRight(session, first->effect) ? first : nullptr;
 }
 
 bool holds(const AnsweredParameter& parameter, double truth) {
@@ -39,16 +44,32 @@ bool areAlike(const Session& session, std::string_view a, std::string_view b) {
   return labelOf(session, a) == labelOf(session, b);
 }
 
+const NamedCause* firstCandidate(const Session& session) {
+  if (!session.answer.is_answered) return nullptr;
+  for (const NamedCause& candidate : session.answer.candidates)
+    if (!isUnnamed(candidate.effect)) return &candidate;
+  return nullptr;
+}
+
 std::string firstNamed(const Session& session) {
   if (!session.answer.is_answered) return "";
-  if (isSilent(session) || session.answer.candidates.empty()) return "none";
-  return session.answer.candidates.front().effect;
+  const NamedCause* first = firstCandidate(session);
+  return isSilent(session) || first == nullptr ? "none" : first->effect;
+}
+
+std::vector<const NamedCause*> namedCauses(const Session& session) {
+  std::vector<const NamedCause*> named;
+  const Answer& answer = session.answer;
+  if (!answer.is_answered || (answer.verdict != "explained" && answer.verdict != "partly_explained")) return named;
+  for (const NamedCause& cause : answer.selected)
+    if (!isUnnamed(cause.effect)) named.push_back(&cause);
+  return named;
 }
 
 std::string firstSelected(const Session& session) {
   if (!session.answer.is_answered) return "";
-  if (isSilent(session) || session.answer.selected.empty()) return "none";
-  return session.answer.selected.front().effect;
+  const auto named = namedCauses(session);
+  return named.empty() ? "none" : named.front()->effect;
 }
 
 bool isRight(const Session& session, std::string_view named) {
@@ -64,11 +85,25 @@ bool isAbstention(const Session& session) {
 
 bool isSilent(const Session& session) { return session.answer.is_answered && session.answer.verdict == "no_gap"; }
 
+bool isOutsideCatalogue(const Session& session) { return session.shelf == "off" || session.shelf == "unforeseen"; }
+
 bool namesCause(const Session& session) {
-  if (!session.answer.is_answered || isSilent(session) || session.answer.verdict == "unexplained") return false;
-  return std::any_of(session.answer.selected.begin(), session.answer.selected.end(), [](const NamedCause& cause) {
-    return std::find(kFloorEffects.begin(), kFloorEffects.end(), cause.effect) == kFloorEffects.end();
+  const auto named = namedCauses(session);
+  return std::any_of(named.begin(), named.end(),
+                     [](const NamedCause* cause) { return !isAmong(kSignalEffects, cause->effect); });
+}
+
+bool namesOtherCause(const Session& session) {
+  const auto named = namedCauses(session);
+  return std::any_of(named.begin(), named.end(), [&](const NamedCause* cause) {
+    return !isAmong(kSignalEffects, cause->effect) && !isRight(session, cause->effect);
   });
+}
+
+bool namesMetal(const Session& session) {
+  const auto named = namedCauses(session);
+  return std::any_of(named.begin(), named.end(),
+                     [](const NamedCause* cause) { return isAmong(kMetal, cause->effect); });
 }
 
 std::set<std::string> trueClasses(const Session& session) {
@@ -79,16 +114,13 @@ std::set<std::string> trueClasses(const Session& session) {
 
 std::set<std::string> selectedClasses(const Session& session) {
   std::set<std::string> labels;
-  if (!session.answer.is_answered || isSilent(session)) return labels;
   const auto is_true = [&](const std::string& id) {
     return std::any_of(session.effects.begin(), session.effects.end(), [&](const auto& e) { return e.id == id; });
   };
-  for (const NamedCause& cause : session.answer.selected) {
+  for (const NamedCause* cause : namedCauses(session))
     // The readings of every session are filtered, some quantised: to say so is neither asked for nor wrong.
-    const bool is_of_signal =
-        std::find(kFloorEffects.begin(), kFloorEffects.end(), cause.effect) != kFloorEffects.end();
-    if (!is_of_signal || is_true(cause.effect)) labels.insert(labelOf(session, cause.effect));
-  }
+    if (!isAmong(kFloorEffects, cause->effect) || is_true(cause->effect))
+      labels.insert(labelOf(session, cause->effect));
   return labels;
 }
 
@@ -106,6 +138,15 @@ double firstProbability(const Session& session) {
     if (areAlike(session, candidate.effect, session.answer.candidates.front().effect))
       probability += candidate.probability;
   return std::min(1.0, probability);
+}
+
+std::optional<Forecast> forecastOf(const Session& session) {
+  if (!session.answer.is_answered) return Forecast{1.0, false};
+  if (session.answer.candidates.empty()) return std::nullopt;
+  const std::string& first = session.answer.candidates.front().effect;
+  const bool is_left_open = isOutsideCatalogue(session) && isUnnamed(first);
+  const bool is_of_signal = session.shelf == "signals" && first == "none" && isFound(session);
+  return Forecast{firstProbability(session), is_left_open || is_of_signal || isRight(session, first)};
 }
 
 std::optional<double> locationError(const Session& session) {
@@ -130,6 +171,7 @@ std::optional<double> shrinkage(const Session& session) {
 std::optional<double> foretoldShrinkage(const Session& session, bool is_inside) {
   const Answer& answer = session.answer;
   if (!answer.is_answered || isSilent(session) || answer.verdict == "unexplained") return 0.0;
+  if (answer.cannot_be_simulated) return 0.0;
   const auto& left = is_inside ? answer.left_inside : answer.left_outside;
   if (!left) return std::nullopt;
   return 1.0 - *left;
@@ -137,20 +179,20 @@ std::optional<double> foretoldShrinkage(const Session& session, bool is_inside) 
 
 std::optional<bool> leftIsCovered(const Session& session) {
   const Answer& answer = session.answer;
-  if (answer.selected.empty() || !answer.left_inside || !answer.remaining_low90 || !answer.remaining_high90)
+  if (namedCauses(session).empty() || !answer.left_inside || !answer.remaining_low90 || !answer.remaining_high90)
     return std::nullopt;
   return *answer.remaining_low90 <= *answer.left_inside && *answer.left_inside <= *answer.remaining_high90;
 }
 
 std::optional<double> leftWidth(const Session& session) {
   const Answer& answer = session.answer;
-  if (answer.selected.empty() || !answer.remaining_low90 || !answer.remaining_high90) return std::nullopt;
+  if (namedCauses(session).empty() || !answer.remaining_low90 || !answer.remaining_high90) return std::nullopt;
   return *answer.remaining_high90 - *answer.remaining_low90;
 }
 
 std::optional<double> leftStatedOff(const Session& session) {
   const Answer& answer = session.answer;
-  if (answer.selected.empty() || !answer.left_inside || !answer.remaining_fraction) return std::nullopt;
+  if (namedCauses(session).empty() || !answer.left_inside || !answer.remaining_fraction) return std::nullopt;
   return *answer.remaining_fraction - *answer.left_inside;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/blind/sealed_folder.h"
+#include "tests/blind/statistics.h"
 
 namespace blind {
 
@@ -13,9 +14,15 @@ namespace blind {
 std::vector<std::string> classOf(const Session& session, std::string_view effect);
 bool areAlike(const Session& session, std::string_view a, std::string_view b);
 
-/// The effect answered first: candidates[0], `none` when the verdict is no_gap, "" when there is no answer.
+/// The first candidate that is an effect, `none` among them; a field without a name is not.
+/// @return null where there is none
+const NamedCause* firstCandidate(const Session& session);
+/// Its effect, `none` when there is none or the verdict is no_gap, "" when there is no answer.
 std::string firstNamed(const Session& session);
-/// The effect selected first, `none` when nothing is selected or the verdict is no_gap, "" when there is no answer.
+/// What is named: the selected effects of an answer that explains a gap or a part of it, without fields that have no
+/// name.
+std::vector<const NamedCause*> namedCauses(const Session& session);
+/// The effect named first, `none` when nothing is, "" when there is no answer.
 std::string firstSelected(const Session& session);
 /// Whether a named effect is in the class of one of the session's true effects, or is `none` where there is none.
 bool isRight(const Session& session, std::string_view named);
@@ -24,8 +31,14 @@ bool isRight(const Session& session, std::string_view named);
 bool isAbstention(const Session& session);
 /// Answered no_gap.
 bool isSilent(const Session& session);
-/// A cause was named where there is none to name: explained or partly explained by anything but the noise floor.
+/// The truth is none of the catalogue's effects.
+bool isOutsideCatalogue(const Session& session);
+/// A cause was named that is no effect of the signal.
 bool namesCause(const Session& session);
+/// The same of a cause that is not in the class of a true effect.
+bool namesOtherCause(const Session& session);
+/// A body of metal in the room was named.
+bool namesMetal(const Session& session);
 
 /// Classes, one label each, of the session's true effects and of those the answer selected.
 std::set<std::string> trueClasses(const Session& session);
@@ -35,6 +48,10 @@ bool isFound(const Session& session);
 
 /// Probability stated of the first candidate and of all that the design cannot tell from it.
 double firstProbability(const Session& session);
+/// That probability and whether the first candidate is right: in the truth's class; a field without a name where the
+/// truth is outside the catalogue; `none` where an effect of the signal was found. No answer is sure and wrong.
+/// @return nothing for an answer without candidates
+std::optional<Forecast> forecastOf(const Session& session);
 
 /// Distance of the first candidate's place from the true one.
 /// @return metres; nothing unless a right candidate and the truth both have a place
@@ -47,8 +64,8 @@ std::optional<double> relativeShrinkage(const Session& session);
 /// @return nothing where there is no effect to shrink
 std::optional<double> shrinkage(const Session& session);
 
-/// Share of the excess at places that no table held which the answer's scene takes away, uncapped; 0 where there is no
-/// answer, no gap or no explanation.
+/// Share of the mean squared excess at places that no table held which the answer's scene takes away, uncapped; 0 where
+/// there is no answer, no gap or no explanation, and where the scene could not be simulated.
 /// @return nothing where `foretell` did not run
 std::optional<double> foretoldShrinkage(const Session& session, bool is_inside);
 /// Whether the stated interval of what is left holds what `foretell` found left inside.

@@ -30,7 +30,7 @@ with the simulator and the diagnosis: it has its own physics, its own pose solve
   keep       write what score reads of the answers, in parts of 100 sessions, to be kept for good
   restore    put kept parts back into a set that was drawn again
   score      open the seal and print the scoreboard
-  controls   make negative controls of a sealed set: shuffled, wrong floor, mirrored, reversed in time
+  controls   make negative controls of a sealed set: no effect, or nothing that could be named
 
 A whole round:
   fieldtrue-blind generate --seed 7 --sessions 40 --levels --out set
@@ -166,14 +166,22 @@ Example: fieldtrue-blind score --in set --controls set_controls --markdown score
 )";
 
 constexpr const char* kControlsHelp =
-    R"(Makes negative controls of a sealed set, sealed themselves: places shuffled among the nodes, stated noise and
-tolerances 20 % too large or too small, mirrored readings, time reversed. None of them may be given a cause.
+    R"(Makes negative controls of a sealed set, sealed themselves.
+From sessions without an effect, which must show no gap: stated noise and tolerances 20 % too large (floor_+20%) or too
+small (floor_-20%, here a gap may be seen, but no cause), time reversed (time_reversed); red noise over the session in
+place of white, of the same scatter (red_noise); no tolerance of the jig stated (tolerance_absent), or half of the true
+one (tolerance_half, here a gap may be seen, but no cause).
+From sessions with one effect, which must not be given a cause: places shuffled among the nodes (shuffled), readings
+mirrored (mirrored), readings beside the places of another session (other_truth), residuals of the alignment exchanged
+among rows of like range (residuals_permuted).
+From sessions with an effect in time, which may be given no other cause: time reversed (drift_reversed).
 
-  --in DIR         sealed set
-  --out DIR        folder to write; must not hold a set already
-  --count N        of each kind; default 20
+  --in DIR           sealed set
+  --out DIR          folder to write; must not hold a set already
+  --count N          of each kind; default 20
+  --effect-free M    of red_noise, tolerance_absent and tolerance_half; default N
 
-Example: fieldtrue-blind controls --in set --out set_controls --count 40
+Example: fieldtrue-blind controls --in set --out set_controls --count 40 --effect-free 300
 )";
 
 struct Command {

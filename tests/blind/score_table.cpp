@@ -24,6 +24,8 @@ std::string targetText(const Figure& figure) {
       return "at least " + value;
     case Target::Kind::kBetween:
       return value + " to " + number(figure.target->upper, figure.unit);
+    case Target::Kind::kSurelyAtMost:
+      return "at most " + value + ", interval up to " + number(figure.target->upper, figure.unit);
     case Target::Kind::kAtMost:
     case Target::Kind::kValueAtMost:
       break;

@@ -15,10 +15,6 @@ namespace {
 
 using nlohmann::json;
 
-bool isAmong(std::span<const std::string_view> keys, std::string_view key) {
-  return std::find(keys.begin(), keys.end(), key) != keys.end();
-}
-
 const json* member(const json& object, const char* key) {
   if (!object.is_object()) return nullptr;
   const auto found = object.find(key);
@@ -184,6 +180,10 @@ Session sessionOf(const json& object, std::size_t index) {
 
 }  // namespace
 
+bool isAmong(std::span<const std::string_view> words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
 std::map<std::string, std::string> optionsOf(std::span<const std::string> words, std::string_view command,
                                              std::span<const std::string_view> with_value,
                                              std::span<const std::string_view> flags) {
@@ -287,6 +287,7 @@ std::vector<Session> sessionsOf(const json& truth, const std::filesystem::path& 
     for (const auto& [name, of_file] : entries)
       if (const auto found = of_file.find(session.file); found != of_file.end()) session.results[name] = found->second;
     if (const auto foretold = session.results.find("foretold"); foretold != session.results.end()) {
+      session.answer.cannot_be_simulated = member(foretold->second, "trouble") != nullptr;
       session.answer.left_inside = leftOf(foretold->second, "inside");
       session.answer.left_outside = leftOf(foretold->second, "outside");
     }

@@ -13,6 +13,8 @@
 
 namespace blind {
 
+bool isAmong(std::span<const std::string_view> words, std::string_view word);
+
 /// `--key value` and bare `--key` of a command; the command's own name may stand first.
 /// @error std::invalid_argument when a word is neither in `with_value` nor in `flags`, or a value is missing
 std::map<std::string, std::string> optionsOf(std::span<const std::string> words, std::string_view command,
@@ -73,6 +75,7 @@ struct Answer {
   std::vector<std::string> findings;  ///< Effects named in findings.
   std::optional<double> remaining_fraction;
   std::optional<double> remaining_low90, remaining_high90;
+  bool cannot_be_simulated = false;                 ///< The scene it left, by `foretell`.
   std::optional<double> left_inside, left_outside;  ///< Excess that `foretell` found left of its start, in squares.
 };
 

@@ -96,6 +96,12 @@ double numberIn(const std::string& field) {
   return value;
 }
 
+double statedNumber(const SessionTable& table, const std::string& key, double otherwise) {
+  for (const std::string& line : table.metadata)
+    if (line.rfind("# " + key + ": ", 0) == 0) return numberIn(line.substr(key.size() + 4));
+  return otherwise;
+}
+
 void shufflePlaces(SessionTable& nodes, std::uint64_t seed) {
   std::vector<std::size_t> moved;
   for (const char* name : {"x_true_m", "y_true_m", "z_true_m"}) moved.push_back(nodes.neededColumn(name));

@@ -28,6 +28,9 @@ std::string exactText(double value);
 /// @error std::runtime_error when the field is no number
 double numberIn(const std::string& field);
 
+/// What a metadata line `# key: number` states.
+double statedNumber(const SessionTable& table, const std::string& key, double otherwise);
+
 /// Puts the places' true positions and grid indices in another order; orientations and what was tracked stay.
 void shufflePlaces(SessionTable& nodes, std::uint64_t seed);
 /// Multiplies the stated jig tolerances.
