@@ -67,6 +67,10 @@ void addUnforeseen(std::vector<Figure>& figures, const Sessions& single, const S
                         {std::nullopt, std::nullopt, atLeast(0.85), atLeast(0.90)});
   section.addByStrength("a body of metal named", "share", unforeseen, by_kind(names_metal),
                         {std::nullopt, atMost(0.25), atMost(0.15), atMost(0.10)});
+  const Sessions unnamed = where(
+      unforeseen, [](const Session& session) { return !session.effects.front().id.starts_with("unforeseen:near:"); });
+  section.addByStrength("the same, kinds that no text of the project comes near", "share", unnamed,
+                        by_kind(isAbstention));
   for (const std::string& kind : firstIds(unforeseen)) {
     const Sessions strong = fromStrength(ofFirstId(unforeseen, kind), 1.4);
     section.add("so called from rho 1.4 up, by kind", kind, "share", shareOf(strong, isAbstention));
