@@ -67,12 +67,17 @@ std::vector<SolvedPose> byPlace(const SessionTable& unseen, const SessionTable& 
   return poses;
 }
 
-json foretold(const Batch& batch, const json& session, const std::string& scene_sha256) {
-  const std::string file = session.at("file").get<std::string>();
-  json entry = {{"file", file}};
-  const fs::path scene = batch.folder / (file + ".scene.json");
+/// @error std::runtime_error where the scene is not the one that was answered
+fs::path sceneAsAnswered(const Batch& batch, const json& session, const std::string& scene_sha256) {
+  const fs::path scene = batch.folder / (session.at("file").get<std::string>() + ".scene.json");
   if (sha256Hex(textOf(scene)) != scene_sha256)
     throw std::runtime_error(scene.string() + " was changed after it was answered");
+  return scene;
+}
+
+json foretold(const Batch& batch, const json& session, const fs::path& scene) {
+  const std::string file = session.at("file").get<std::string>();
+  json entry = {{"file", file}};
   const SessionTable unseen = sealedPlaces(batch.folder, session);
   const TemporaryFolder desk;
   replaceFile(desk.path() / "unseen.plan.json", planOf(unseen, byTime(unseen)).dump());
@@ -110,10 +115,13 @@ int runForetell(std::span<const std::string> words) {
     for (const json& session : truth.at("sessions"))
       if (scene_of.count(session.at("file")) > 0) sessions.push_back(session);
     if (sessions.empty()) throw std::runtime_error(batch.folder.string() + " holds no answers; run answer first");
-    const auto hash_of = [&](const json& session) {
-      return sha256Hex(scene_of.at(session.at("file")) + session.at("unseen_sha256").get<std::string>());
+    const auto scene_for = [&](const json& session) {
+      return sceneAsAnswered(batch, session, scene_of.at(session.at("file")));
     };
-    const auto make = [&](const json& session) { return foretold(batch, session, scene_of.at(session.at("file"))); };
+    const auto hash_of = [&](const json& session) {
+      return sha256Hex(sha256Hex(textOf(scene_for(session))) + session.at("unseen_sha256").get<std::string>());
+    };
+    const auto make = [&](const json& session) { return foretold(batch, session, scene_for(session)); };
     const std::size_t made =
         ResultFile(batch.folder / "foretold.json", kForetoldSchema).fill(batch.jobs, sessions, hash_of, make);
     const json entries = documentOf(batch.folder / "foretold.json").at("sessions");
