@@ -43,11 +43,15 @@ class Selector {
     const TriedEffect* next = &first;
     std::vector<TriedEffect> following;
     while (next != nullptr && !control_.stop.stop_requested()) {
-      add(*next, selection);
-      if (selection.ways.size() > 1) {
-        exchange(selection);
-        prune(selection);
+      EffectSelection grown = selection;
+      add(*next, grown);
+      if (grown.ways.size() > 1) {
+        exchange(grown);
+        prune(grown);
+        // What is added on an estimate can be dropped again once it is fitted, and would be added again for ever.
+        if (!(priceOf(grown) < priceOf(selection))) break;
       }
+      selection = std::move(grown);
       if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
       following = search_.rank(selection.model, control_);
       next = firstWorth(following, options_.least_gain_more);
@@ -76,6 +80,11 @@ class Selector {
     if (selection.ways.size() == 1) takeOver(selection);
     selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
     return selection;
+  }
+
+  /// What growing lowers: the criterion, and for each effect what it must at least be worth.
+  double priceOf(const EffectSelection& selection) const {
+    return search_.bicOf(selection.model.model) + options_.least_gain_more * static_cast<double>(selection.ways.size());
   }
 
   void add(const TriedEffect& tried, EffectSelection& selection) const {

@@ -10,6 +10,7 @@
 #include "calib/identify/physics_fit.h"
 #include "calib/simulation/simulator.h"
 #include "tests/calib/correctors/fit_fixtures.h"
+#include "tests/support/bent_room.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -135,6 +136,20 @@ class PhysicsResidualTest : public QObject {
       QVERIFY((*ours)->displacement_m(p_m) == (*plain)->displacement_m(p_m));
       QVERIFY((*ours)->uncertainty_m(p_m) == (*plain)->uncertainty_m(p_m));
     }
+  }
+
+  /// In bends of no physics effects are added, found wanting once the others are fitted again, and dropped: the search
+  /// must come to an end there too, in diagnoses as in fits.
+  void endsWhereNoPhysicsBends_data() {
+    QTest::addColumn<std::uint32_t>("seed");
+    for (const std::uint32_t seed : {3U, 7U}) QTest::addRow("places drawn with %u", seed) << seed;
+  }
+  void endsWhereNoPhysicsBends() {
+    QFETCH(std::uint32_t, seed);
+    const CalibrationTable table = bentRoom(120, seed);
+    const auto ours = fitPosition("physics_residual", calibration::makeFitData(table.nodes, table.metadata, {}));
+    FT_VERIFY_OK(ours);
+    FT_VERIFY_MATCH(holdsAll((*ours)->note(), {"No scene"}));
   }
 
   /// The simulator is the forward direction, solved by another path than the inversion.
