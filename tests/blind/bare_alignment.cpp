@@ -23,9 +23,9 @@ struct AlignedRow {
 SolvedPose poseIn(const SessionTable& table, const std::vector<std::string>& row, const std::string& suffix) {
   const auto number = [&](const std::string& name) { return numberIn(row[table.neededColumn(name + suffix)]); };
   SolvedPose pose;
-  const std::string unit = "_m";
+  const std::string ending = suffix + "_m";
   for (int axis = 0; axis < 3; ++axis)
-    pose.position_m[axis] = numberIn(row[table.neededColumn(std::string(1, "xyz"[axis]) + suffix + unit)]);
+    pose.position_m[axis] = numberIn(row[table.neededColumn(std::string(1, "xyz"[axis]).append(ending))]);
   if (table.column("qw" + suffix)) {
     pose.orientation = Quaterniond(number("qw"), number("qx"), number("qy"), number("qz"));
     pose.orientation.normalize();
