@@ -184,7 +184,7 @@ void BlindOracleTest::recordedRowsAreFittedNoWorseThanByTheTruth() {
   double oracle = 0, known = 0;
   constexpr int kSessions = 16;
   for (int n = 0; n < kSessions; ++n) {
-    const MadeSession made = makeSession({"single", 1.4, false, 80, ""}, static_cast<std::uint64_t>(100 + n));
+    const MadeSession made = makeSession({"single", 1.4, false, 80, ""}, 100U + static_cast<std::uint64_t>(n));
     replaceFile(path / "nodes.csv", made.tables.nodes_csv);
     replaceFile(path / "unseen.csv", made.tables.unseen_csv);
     const json entry = oracleOf(made, readTable(path / "nodes.csv"), readTable(path / "unseen.csv"));

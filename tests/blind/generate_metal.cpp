@@ -85,7 +85,7 @@ Body drawBody(const Setup& setup, Random& random, const Vector3d& center_m, doub
 }
 
 /// Place and attitude may change, and where `has_size` is set, the logarithm of the size.
-Drawn shareOf(std::string id, std::string kind, Solve solve, bool has_size, json fixed) {
+Drawn shareOf(std::string id, std::string kind, const Solve& solve, bool has_size, json fixed) {
   Drawn drawn{std::move(id), std::move(kind), 0.15, 1.0, nullptr, nullptr, {0.1, 0.1, 0.1, 0.3, 0.3, 0.3}};
   if (has_size) drawn.scales.push_back(0.2);
   drawn.apply = [solve, has_size, as_drawn = std::make_shared<Scatterer>(solve(Move()))](World& world, double share,
