@@ -1,7 +1,6 @@
 #include "tests/blind/answer.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,6 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "tests/blind/file_lock.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/sha256.h"
 #include "tests/blind/temporary_folder.h"
@@ -61,21 +61,6 @@ struct Running {
   std::string file;
   Clock::time_point start;
   std::unique_ptr<Desk> desk;
-};
-
-/// Held while answers.json is read and replaced, so that processes sharing a set do not lose each other's records.
-class RecordLock {
- public:
-  explicit RecordLock(const fs::path& folder)
-      : file_(::open((folder / "answers.lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644)) {
-    if (file_ < 0 || ::flock(file_, LOCK_EX) != 0) throw std::runtime_error("cannot lock " + folder.string());
-  }
-  ~RecordLock() { ::close(file_); }
-  RecordLock(const RecordLock&) = delete;
-  RecordLock& operator=(const RecordLock&) = delete;
-
- private:
-  int file_;
 };
 
 double positiveNumber(const std::string& option, const std::string& text) {
@@ -161,7 +146,7 @@ void recordAnswer(const Request& request, const Running& done, double seconds, i
     fs::remove(report);
     fs::remove(scene);
   }
-  const RecordLock lock(request.folder);
+  const FileLock lock(request.folder / "answers.lock");
   json records = recordsIn(request.folder);
   json& list = records["sessions"];
   const auto old =

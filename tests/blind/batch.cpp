@@ -1,14 +1,14 @@
 #include "tests/blind/batch.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
+#include <iostream>
 #include <mutex>
 #include <stdexcept>
 
+#include "tests/blind/file_lock.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/side_by_side.h"
 
@@ -17,20 +17,6 @@ namespace {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
-
-/// Held while a document is read and replaced.
-class FileLock {
- public:
-  explicit FileLock(const fs::path& path) : file_(::open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644)) {
-    if (file_ < 0 || ::flock(file_, LOCK_EX) != 0) throw std::runtime_error("cannot lock " + path.string());
-  }
-  ~FileLock() { ::close(file_); }
-  FileLock(const FileLock&) = delete;
-  FileLock& operator=(const FileLock&) = delete;
-
- private:
-  int file_;
-};
 
 std::string fileOf(const json& session) { return session.at("file").get<std::string>(); }
 
@@ -60,6 +46,12 @@ Batch batchOf(const std::map<std::string, std::string>& options, const std::stri
 void needProgram(const Batch& batch) {
   if (::access(batch.cli.c_str(), X_OK) != 0)
     throw std::runtime_error("cannot run " + batch.cli.string() + "; name the program with --cli PATH");
+}
+
+void tellMade(std::size_t made, std::size_t asked, const std::string& what) {
+  std::cout << made << " sessions " << what;
+  if (made < asked) std::cout << "; " << asked - made << " had been before";
+  std::cout << "\n";
 }
 
 ResultFile::ResultFile(fs::path path, std::string schema) : path_(std::move(path)), schema_(std::move(schema)) {}

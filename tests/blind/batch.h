@@ -27,6 +27,9 @@ Batch batchOf(const std::map<std::string, std::string>& options, const std::stri
 /// @error std::runtime_error when fieldtrue-cli cannot be run
 void needProgram(const Batch& batch);
 
+/// Prints how many sessions were worked on and, where there are such, how many had been before.
+void tellMade(std::size_t made, std::size_t asked, const std::string& what);
+
 /// A document of a set with an entry a session, each with the hash of what it was made from. Processes can share it.
 class ResultFile {
  public:

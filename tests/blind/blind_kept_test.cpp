@@ -82,6 +82,10 @@ class BlindKeptTest : public QObject {
   void keepsWholeParts();
   /// A set drawn again with what was kept scores as the answers themselves did, and its parts can be gone on with.
   void scoresWhatIsKeptAsTheAnswers();
+  /// An answer that leaves its cause open keeps the sentence that `next` measures by; a sure one does not.
+  void keepsTheSuggestionOfOpenAnswers();
+  /// Controls have no sealed places: answered, they are kept.
+  void keepsControlsThatAreNotForetold();
   /// Another set's parts, another engine's, a changed report.
   void refusesWhatIsAnothers();
 };
@@ -119,6 +123,29 @@ void BlindKeptTest::scoresWhatIsKeptAsTheAnswers() {
   const json second = documentOf(kept_again / "part_01.json").at("sessions").at(5);
   QCOMPARE(QString::fromStdString(second.at("report_sha256")), QString::fromStdString(first.at("report_sha256")));
   QCOMPARE(QString::fromStdString(second.at("report").dump()), QString::fromStdString(first.at("report").dump()));
+}
+
+void BlindKeptTest::keepsTheSuggestionOfOpenAnswers() {
+  const json sentence = {{"text", "Turn the sensor at three places."}, {"separates", {"a", "b"}}};
+  json report = reportOf(1);
+  report["next_measurement"] = sentence;
+  QVERIFY(!reducedReport(report).contains("next_measurement"));
+  report["candidates"][0]["probability"] = 0.6;
+  QCOMPARE(QString::fromStdString(reducedReport(report).at("next_measurement").at("text")),
+           QString("Turn the sensor at three places."));
+}
+
+void BlindKeptTest::keepsControlsThatAreNotForetold() {
+  const QTemporaryDir folder;
+  const fs::path set = folder.path().toStdString() + "/set", kept = folder.path().toStdString() + "/kept";
+  makeSet(set, 10);
+  answerSome(set, 10);
+  fs::remove(set / "foretold.json");
+  QCOMPARE(keepParts(set, kept, kEngine), 0U);
+  json truth = openSealed(set);
+  for (json& session : truth["sessions"]) session["control"] = "shuffled";
+  sealTruth(set, truth);
+  QCOMPARE(keepParts(set, kept, kEngine), 1U);
 }
 
 void BlindKeptTest::refusesWhatIsAnothers() {

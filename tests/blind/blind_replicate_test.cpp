@@ -1,6 +1,8 @@
+#include <QElapsedTimer>
 #include <QTemporaryDir>
 #include <QTest>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 
 #include "tests/blind/diagnosis_run.h"
@@ -8,6 +10,7 @@
 #include "tests/blind/replicate.h"
 #include "tests/blind/replicate_figures.h"
 #include "tests/blind/sealed_folder.h"
+#include "tests/blind/subprocess.h"
 #include "tests/support/test_main.h"
 
 using namespace blind;
@@ -45,7 +48,19 @@ class BlindReplicateTest : public QObject {
   void onlyOneEffectIsReplicated();
   void aFailedDiagnosisIsToldApart();
   void figuresByHand();
+  /// A program that comes to no end is ended, and what it had printed is kept.
+  void whatTakesForEverIsEnded();
 };
+
+void BlindReplicateTest::whatTakesForEverIsEnded() {
+  QElapsedTimer timer;
+  timer.start();
+  const Finished ended = runProgram({"/bin/sh", "-c", "echo begun; exec sleep 600"}, 1.0);
+  QVERIFY(timer.elapsed() < 300'000);
+  QCOMPARE(ended.exit_status, 128 + SIGKILL);
+  QCOMPARE(QString::fromStdString(ended.output), QString("begun\n"));
+  QCOMPARE(runProgram({"/bin/sh", "-c", "exit 3"}, 600.0).exit_status, 3);
+}
 
 void BlindReplicateTest::replicatesAreAskedForAndKept() {
   const QTemporaryDir holder;

@@ -8,6 +8,9 @@ namespace blind {
 
 namespace fs = std::filesystem;
 
+/// Replicates alone may take ten minutes.
+constexpr double kDiagnosisLimit_s = 1200.0;
+
 Recording recordingOf(const fs::path& folder, const std::string& file) {
   const fs::path samples = folder / (file + ".samples.csv");
   return {textOf(folder / (file + ".nodes.csv")), fs::exists(samples) ? textOf(samples) : ""};
@@ -25,7 +28,7 @@ nlohmann::json diagnosed(const fs::path& cli, const Recording& recording, const 
     words.insert(words.end(), {"--samples", samples.string()});
   }
   words.insert(words.end(), more.begin(), more.end());
-  const bool is_done = runProgram(words).exit_status == 0 && fs::exists(report);
+  const bool is_done = runProgram(words, kDiagnosisLimit_s).exit_status == 0 && fs::exists(report);
   return is_done ? documentOf(report) : nlohmann::json(nullptr);
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/blind/next.h"
 #include "tests/blind/sealed_folder.h"
 #include "tests/blind/sha256.h"
 
@@ -120,14 +121,16 @@ json keptSession(const fs::path& set, const json& record, const json* foretold) 
   return rounded(session);
 }
 
-/// @return none while a session of the part has no answer, or a scene that was not foretold
+/// @return null while a session of the part has no answer, or a scene that was not foretold: controls have no places
+/// for it
 json keptPart(const fs::path& set, std::span<const json> sessions, const Entries& records, const Entries& foretold) {
   json kept = json::array();
   for (const json& session : sessions) {
     const auto record = records.find(session.at("file"));
     if (record == records.end()) return nullptr;
     const auto found = foretold.find(session.at("file"));
-    if (record->second.contains("scene_sha256") && found == foretold.end()) return nullptr;
+    const bool can_be_foretold = record->second.contains("scene_sha256") && !session.contains("control");
+    if (can_be_foretold && found == foretold.end()) return nullptr;
     kept.push_back(keptSession(set, record->second, found == foretold.end() ? nullptr : &found->second));
   }
   return kept;
@@ -180,6 +183,9 @@ json reducedReport(const json& report) {
   reduced["candidates"] = reducedCandidates(report);
   reduced["selected"] = namesIn(report, "selected");
   reduced["findings"] = namesIn(report, "findings");
+  // `next` reads the sentence as an operator would.
+  if (report.contains("next_measurement") && leavesOpen(report))
+    reduced["next_measurement"] = membersOf(report.at("next_measurement"), {"text"});
   if (report.contains("remaining"))
     reduced["remaining"] =
         membersOf(report.at("remaining"), {"fraction_of_start", "fraction_low90", "fraction_high90"});

@@ -10,7 +10,7 @@ namespace blind {
 /// Sessions of a part.
 inline constexpr std::size_t kPart = 100;
 
-/// What score reads of a report, and nothing else of it; numbers to six digits.
+/// What score and next read of a report, and nothing else of it; numbers to six digits.
 nlohmann::json reducedReport(const nlohmann::json& report);
 
 /// Writes every whole part of a set that is answered and foretold and not kept yet, as FOLDER/part_NN.json, and what
@@ -22,7 +22,7 @@ std::size_t keepParts(const std::filesystem::path& set, const std::filesystem::p
 
 /// Puts what a folder keeps back into the set, where nothing of it is answered yet.
 /// @return how many sessions were put back
-/// @error std::runtime_error where the folder keeps another set, or a part was changed
+/// @error std::runtime_error where the folder keeps another set
 std::size_t restoreParts(const std::filesystem::path& set, const std::filesystem::path& folder);
 
 /// Commands `keep` and `restore`. @return the status, see --help

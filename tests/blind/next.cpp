@@ -1,6 +1,5 @@
 #include "tests/blind/next.h"
 
-#include <iostream>
 #include <map>
 #include <stdexcept>
 
@@ -58,13 +57,14 @@ Recording extended(const MadeSession& made, const Recording& recording, const st
           has_samples ? recording.samples_csv + bodyOf(more.samples_csv) : ""};
 }
 
-/// What score needs of a report: causes, probabilities and widths of 90 % intervals.
+/// What score needs of a report: causes, probabilities and widths of 90 % intervals, those that the report tells.
 json causesIn(const json& report) {
   if (report.is_null()) return nullptr;
   json causes = json::array();
   for (const json& candidate : report.at("candidates")) {
     json widths = json::object();
-    for (const auto& [name, parameter] : candidate.at("parameters").items())
+    const json parameters = candidate.value("parameters", json::object());
+    for (const auto& [name, parameter] : parameters.items())
       if (parameter.at("low90").is_number() && parameter.at("high90").is_number())
         widths[name] = parameter.at("high90").get<double>() - parameter.at("low90").get<double>();
     causes.push_back({{"effect", candidate.at("effect")},
@@ -122,9 +122,7 @@ int runNext(std::span<const std::string> words) {
     };
     const std::size_t made =
         ResultFile(batch.folder / "next.json", kNextSchema).fill(batch.jobs, sessions, made_from, make);
-    std::cout << made << " sessions measured further";
-    if (made < sessions.size()) std::cout << "; " << sessions.size() - made << " had been before";
-    std::cout << "\n";
+    tellMade(made, sessions.size(), "measured further");
   });
 }
 

@@ -1,7 +1,6 @@
 #include "tests/blind/oracle.h"
 
 #include <algorithm>
-#include <iostream>
 #include <stdexcept>
 
 #include "tests/blind/bare_alignment.h"
@@ -87,9 +86,7 @@ int runOracle(std::span<const std::string> words) {
     };
     const std::size_t fitted =
         ResultFile(batch.folder / "oracle.json", kOracleSchema).fill(batch.jobs, sessions, made_from, make);
-    std::cout << fitted << " sessions fitted with their true effects";
-    if (fitted < sessions.size()) std::cout << "; " << sessions.size() - fitted << " had been fitted before";
-    std::cout << "\n";
+    tellMade(fitted, sessions.size(), "fitted with their true effects");
   });
 }
 

@@ -1,6 +1,5 @@
 #include "tests/blind/replicate.h"
 
-#include <iostream>
 #include <set>
 #include <stdexcept>
 
@@ -69,9 +68,7 @@ int runReplicate(std::span<const std::string> words) {
     };
     const std::size_t made =
         ResultFile(batch.folder / "replicated.json", kReplicatedSchema).fill(batch.jobs, sessions, made_from, make);
-    std::cout << made << " sessions diagnosed with " << wanted << " replicates";
-    if (made < sessions.size()) std::cout << "; " << sessions.size() - made << " had been before";
-    std::cout << "\n";
+    tellMade(made, sessions.size(), "diagnosed with " + wanted + " replicates");
   });
 }
 

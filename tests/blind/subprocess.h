@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@ struct Finished {
 
 /// Runs a program to its end; its standard error is dropped. May be called from several threads at once.
 /// @param words path of the program, then its arguments
-Finished runProgram(const std::vector<std::string>& words);
+/// @param limit_s after so long it is killed; none: it may take for ever
+Finished runProgram(const std::vector<std::string>& words, std::optional<double> limit_s = std::nullopt);
 
 }  // namespace blind

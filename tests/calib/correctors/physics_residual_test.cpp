@@ -139,7 +139,7 @@ class PhysicsResidualTest : public QObject {
   }
 
   /// In bends of no physics effects are added, found wanting once the others are fitted again, and dropped: the search
-  /// must come to an end there too, in diagnoses as in fits.
+  /// for a scene, which is that of a diagnosis, must come to an end there too.
   void endsWhereNoPhysicsBends_data() {
     QTest::addColumn<std::uint32_t>("seed");
     for (const std::uint32_t seed : {3U, 7U}) QTest::addRow("places drawn with %u", seed) << seed;
