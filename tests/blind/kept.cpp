@@ -141,7 +141,7 @@ void keepOthers(const fs::path& set, const fs::path& folder, const json& head) {
     const std::string file = std::string(name) + ".json";
     if (!fs::exists(set / file)) continue;
     json document = head;
-    document["document"] = rounded(documentOf(set / file));
+    document["document"] = documentOf(set / file);
     const std::string text = document.dump() + "\n";
     const bool keeps_more = fs::exists(folder / file) &&
                             ofThisSet(folder / file, head.at("truth_sha256")).at("document").at("sessions").size() >

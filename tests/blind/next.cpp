@@ -39,6 +39,17 @@ std::vector<json> openSessions(const fs::path& folder, const json& truth, std::s
   return open;
 }
 
+/// Hash of each report as it was answered, also where only a part of it is kept.
+std::map<std::string, std::string> wholeReports(const fs::path& folder) {
+  const json answers = documentOf(folder / "answers.json");
+  std::map<std::string, std::string> sha_of;
+  for (const json& record : answers.at("sessions"))
+    if (record.contains("answer_sha256"))
+      sha_of[record.at("file")] =
+          record.contains("report_sha256") ? record.at("report_sha256") : record.at("answer_sha256");
+  return sha_of;
+}
+
 /// A table's rows without metadata and header.
 std::string bodyOf(const std::string& csv) {
   std::size_t at = 0;
@@ -111,11 +122,11 @@ int runNext(std::span<const std::string> words) {
       throw std::runtime_error(batch.folder.string() + " holds no answers; run answer first");
     const std::vector<json> sessions = openSessions(batch.folder, truth, most);
     needProgram(batch);
+    const std::map<std::string, std::string> whole_report = wholeReports(batch.folder);
     const auto made_from = [&](const json& session) {
       const std::string file = session.at("file").get<std::string>();
       const Recording recording = recordingOf(batch.folder, file);
-      return sha256Hex(kNextSchema + recording.nodes_csv + recording.samples_csv +
-                       textOf(batch.folder / (file + ".gap.json")));
+      return sha256Hex(kNextSchema + recording.nodes_csv + recording.samples_csv + whole_report.at(file));
     };
     const auto make = [&](const json& session) {
       return measuredFurther(batch, truth, session.at("file").get<std::string>());
