@@ -148,7 +148,7 @@ Drawn drawMetalPlane(const Setup& setup, Random& random) {
     solve = [=](const Move& move) { return sheet->solve(center_m + move.by_m, move.turn * attitude); };
     kind = "aluminium " + kind;
   }
-  return shareOf("metal_plane", kind, std::move(solve), false,
+  return shareOf("metal_plane", kind, solve, false,
                  {{"location_m", listed(distance_m * toward)},
                   {"material", ferromagnetic ? "ferromagnetic" : "conductive"},
                   {"amplitude", {{"name", "distance_m"}, {"value", distance_m}}},
@@ -175,7 +175,7 @@ Drawn drawFinitePlate(const Setup& setup, Random& random) {
           .solve(at_m + move.by_m, move.turn * attitude);
     };
   }
-  return shareOf("finite_plate", ferromagnetic ? "sheet of laminated iron" : "aluminium sheet", std::move(solve), true,
+  return shareOf("finite_plate", ferromagnetic ? "sheet of laminated iron" : "aluminium sheet", solve, true,
                  {{"location_m", listed(at_m)},
                   {"material", ferromagnetic ? "ferromagnetic" : "conductive"},
                   {"parameters",
