@@ -84,7 +84,7 @@ std::vector<int> placesOf(const effects::EffectFit& fit, std::span<const Eigen::
   return places;
 }
 
-/// Unit columns that stand for an effect: each of its linear parameters at a few of its starts.
+/// Unit columns that stand for an effect: each of its linear parameters at a few of its starts; none where it shows nothing.
 void setTypical(const std::vector<Eigen::MatrixXd>& columns, const std::vector<int>& places, Signature& signature) {
   constexpr std::size_t kMost = 8;
   const std::size_t used = std::min(kMost, columns.size());
@@ -189,7 +189,7 @@ Isolability isolabilityOf(const identify::GapSearch& search, std::size_t starts_
     if (found == signatures.end()) {
       Signature signature{way.effect->id, columns, places, {}, {}};
       setTypical(columns, places, signature);
-      signatures.push_back(std::move(signature));
+      if (signature.typical.cols() > 0) signatures.push_back(std::move(signature));
     } else {
       found->imitations.insert(found->imitations.end(), columns.begin(), columns.end());
       found->imitation_places.insert(found->imitation_places.end(), places.begin(), places.end());
