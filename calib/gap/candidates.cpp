@@ -279,9 +279,9 @@ void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, 
   else if (has_gap)
     smooth = std::max(kClearly, 2.0 * judgement.unnamed_nats);
   add(kUnnamedSmooth, smooth, judgement.smooth_left);
+  const bool is_mostly_scattered = judgement.selection.ways.empty() && floor_excess > 0.5;
   add(kUnnamedScattered,
-      floor_excess > 0.0 ? std::max(best, smooth) + kClearly * (judgement.selection.ways.empty() ? 1.0 : -1.0)
-                         : -3.0 * kClearly,
+      floor_excess > 0.0 ? std::max(best, smooth) + (is_mostly_scattered ? kClearly : -kClearly) : -3.0 * kClearly,
       1.0 - floor_excess);
 }
 

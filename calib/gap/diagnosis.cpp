@@ -199,12 +199,11 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   report.findings = std::move(cleaned.findings);
   control.progress(0.01);
 
-  const bool is_mirrored = identify::isMirrored(rows);
-  addInputFindings(metadata, is_mirrored, report);
+  const bool belongs_together = addInputFindings(metadata, rows, report);
   const identify::GapSearch search(rows, std::move(believed), identify::NoiseFrom::kResiduals, control);
   identify::EffectSelectionOptions selecting;
   const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
-  selecting.most_effects = has_enough && !is_mirrored && known_gap.value_or(true) ? options.most_effects : 0;
+  selecting.most_effects = has_enough && belongs_together && known_gap.value_or(true) ? options.most_effects : 0;
   const double part = options.replicates > 0 ? 0.1 : 1.0;  // Of the progress, without replicates.
   const identify::EffectSelection selection =
       identify::selectEffects(search, selecting, partOf(control, 0.1 * part, 0.7 * part));
@@ -218,7 +217,11 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);
   report.isolability = isolabilityOf(search, kStartsForIsolability, control);
   if (control.stop.stop_requested()) return stopped();
-  suggestNext(search, judgement.selection, report);
+  if (belongs_together) {
+    suggestNext(search, judgement.selection, report);
+  } else {
+    report.next_measurement = "Nothing needs to be measured: put the table right, and diagnose it again.";
+  }
   report.text = verdictText(report, known_gap ? "change" : "gap");
   if (!has_enough) {
     report.text += " Causes are not looked for: " + std::to_string(report.input.places) + " places are too few, " +

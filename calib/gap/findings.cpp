@@ -76,24 +76,31 @@ void addStatedTooSmall(const identify::GapSearch& search, const identify::GapRow
 
 /// What scatters from place to place beyond what can be placing is told.
 void addBoundOfFloor(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
-  const auto tell = [&](double seen, double bound, bool is_stated, const std::string& unit, const std::string& by_hand,
-                        const std::string& remedy) {
+  const auto tell = [&](double seen, double bound, const std::optional<double>& said, const std::string& unit,
+                        const std::string& by_hand, const std::string& remedy) {
     if (!(seen > 1.001 * bound)) return;
-    const std::string why = is_stated
-                                ? "The tolerance that is stated is far less, and a person with a jig stays within "
-                                : "No tolerance is stated, and a person with a jig stays within ";
-    report.findings.push_back({"",
-                               "The places scatter by " + shown(seen) + " " + unit +
-                                   " (SD per axis) about any smooth field. " + why + shown(bound) + " " + unit + " (" +
-                                   by_hand + "): the floor is held there, and what is above it counts as gap. " +
-                                   remedy,
-                               {}});
+    const std::string why =
+        said
+            ? "The tolerance that is stated is " + shown(*said) + " " + unit +
+                  ", and may be too small by a factor of " + shown(identify::kStatedTooSmall) +
+                  ": the floor is held at " + shown(bound) + " " + unit +
+                  ", and what is above it counts as gap. Set the jig anew at ten places: where the readings come back, "
+                  "something shifts single places; where they do not, state what the jig really keeps."
+            : "No tolerance is stated, and a person with a jig stays within " + shown(bound) + " " + unit + " (" +
+                  by_hand + "): the floor is held there, and what is above it counts as gap. " + remedy;
+    report.findings.push_back(
+        {"",
+         "The places scatter by " + shown(seen) + " " + unit + " (SD per axis) about any smooth field. " + why,
+         {}});
   };
-  tell(1e3 * search.placingSd_m(), 1e3 * search.floorPlacingSd_m(), stated.placing_sd_m.has_value(), "mm",
+  const auto times = [](double factor, const std::optional<double>& value) {
+    return value ? std::optional(factor * *value) : std::nullopt;
+  };
+  tell(1e3 * search.placingSd_m(), 1e3 * search.floorPlacingSd_m(), times(1e3, stated.placing_sd_m), "mm",
        "a foot set on its mark within a finger's breadth",
        "Are true and tracked positions of the same places and of one sensor? Else state jig_tolerance_m.");
-  tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * search.floorPlacingSd_rad(), stated.placing_sd_rad.has_value(),
-       "degrees", "turned and held upright by eye within ten degrees",
+  tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * search.floorPlacingSd_rad(),
+       times(kDegPerRad, stated.placing_sd_rad), "degrees", "turned and held upright by eye within ten degrees",
        "Are the true orientations those of the places, and all rows of one sensor? Else state jig_tolerance_rad, or "
        "leave the columns of the orientation out.");
 }
@@ -105,11 +112,29 @@ void addMirrored(GapReport& report) {
                              {}});
 }
 
+void addAstray(double share, GapReport& report) {
+  report.findings.push_back(
+      {"",
+       "True and tracked positions do not belong together: after the best alignment half of the readings "
+       "still lie off by " +
+           shown(100.0 * share) +
+           " % of the places' own spread or more. Are the rows of one recording, in one order, and "
+           "of one rig? Put that right first; causes are not looked for.",
+       {}});
+}
+
 }  // namespace
 
-void addInputFindings(const TableMetadata& metadata, bool is_mirrored, GapReport& report) {
+bool addInputFindings(const TableMetadata& metadata, const identify::GapRows& rows, GapReport& report) {
   addAssumption(metadata, report);
-  if (is_mirrored) addMirrored(report);
+  const double astray = identify::shareAstray(rows);
+  const bool is_mirrored = identify::isMirrored(rows);
+  if (is_mirrored) {
+    addMirrored(report);
+  } else if (astray > identify::kAstray) {
+    addAstray(astray, report);
+  }
+  return !is_mirrored && astray <= identify::kAstray;
 }
 
 void addFindings(const identify::GapSearch& search, const identify::GapRows& stated, const Judgement& judgement,

@@ -60,6 +60,9 @@ constexpr double kWorstPlacing_m = 0.010;
 constexpr double kWorstPlacing_rad = 0.087;
 /// A tolerance that is stated at most so much too small is a finding; what scatters more is no placing.
 constexpr double kStatedTooSmall = 2.2;
+/// No jig is set better than this, SD per axis, whatever is stated.
+constexpr double kBestPlacing_m = 0.0002;
+constexpr double kBestPlacing_rad = 0.001;
 /// The most that may be placing, SD per axis.
 double worstPlacing_m(const GapRows& rows);
 double worstPlacing_rad(const GapRows& rows);
@@ -74,6 +77,12 @@ Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad);
 /// Whether tracked positions fit a mirror image of the true ones far better than any turn of them.
 /// @source Umeyama 1991, IEEE PAMI 13 376, the sign of the determinant
 bool isMirrored(const GapRows& rows);
+
+/// From here on true and tracked positions are not of the same places: steel floors reach 0.2, rows in another order 1.
+constexpr double kAstray = 0.4;
+/// How far readings lie from their places after the best turn and shift, median, as a share of the places' spread (RMS
+/// about their middle).
+double shareAstray(const GapRows& rows);
 
 /// Eight blocks of places by the octant of their true position about the median, those of fewer than `fewest` places
 /// joined with the smallest other; for each row its block.

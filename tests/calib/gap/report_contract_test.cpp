@@ -70,7 +70,7 @@ CalibrationTable foreign(const std::string& kind) {
   std::normal_distribution<double> normal(0.0, 1.0);
   for (Node& node : table.nodes) {
     Eigen::Vector3d& p_m = node.tracker_from_sensor.position_m;
-    const Eigen::Vector3d at = 7.0 * p_m;
+    const Eigen::Vector3d at = 4.0 * p_m;
     if (kind == "swirl")
       p_m += 0.01 * Eigen::Vector3d(std::sin(at.y() + at.z()), std::sin(at.z() - at.x()), std::cos(at.x() * at.y()));
     if (kind == "scatter") p_m += 0.03 * Eigen::Vector3d(normal(generator), normal(generator), normal(generator));

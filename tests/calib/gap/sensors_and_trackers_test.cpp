@@ -1,5 +1,7 @@
 #include <QTest>
 #include <algorithm>
+#include <random>
+#include <vector>
 
 #include "tests/calib/gap/diagnosis_checks.h"
 #include "tests/support/test_main.h"
@@ -112,6 +114,41 @@ class SensorsAndTrackersTest : public QObject {
     QVERIFY(isTold(*report, "mirror images"));
     QVERIFY2(report->selected.empty() && report->verdict == GapVerdict::kUnexplained, report->text.c_str());
     QVERIFY(!isTold(*diagnose(recordedIn(gapScene(), gapPlan()), nullptr, nullptr), "mirror images"));
+  }
+
+  /// Rows in another order are readings of other places: no cause is looked for. Without a reading of its place the RMS
+  /// about the middle is left of both, so a half of them lies off by about the spread itself.
+  void rowsOfOtherPlacesAreAFinding() {
+    CalibrationTable table = recordedIn(gapScene(), gapPlan());
+    std::vector<Pose> readings;
+    for (const Node& node : table.nodes) readings.push_back(node.tracker_from_sensor);
+    std::shuffle(readings.begin(), readings.end(), std::mt19937_64(4));
+    for (std::size_t i = 0; i < readings.size(); ++i) table.nodes[i].tracker_from_sensor = readings[i];
+    const auto report = diagnose(table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY(isTold(*report, "do not belong together"));
+    for (const SelectedEffect& effect : report->selected) QCOMPARE(effect.effect, std::string("range_noise"));
+    QCOMPARE(report->verdict, GapVerdict::kUnexplained);
+    QVERIFY(!isTold(*diagnose(recordedIn(gapScene(), gapPlan()), nullptr, nullptr), "do not belong together"));
+  }
+
+  /// Twice as far as the tolerance says is a tolerance stated too small; four times as far is no placing.
+  void whatScattersFarBeyondItsToleranceIsAGap() {
+    const auto scattered = [](double sd_m) {
+      CalibrationTable table = recordedIn(gapScene(), gapPlan());
+      std::mt19937_64 random(5);
+      std::normal_distribution<double> normal(0.0, sd_m);
+      for (Node& node : table.nodes)
+        node.tracker_from_sensor.position_m += Eigen::Vector3d(normal(random), normal(random), normal(random));
+      return diagnose(table, nullptr, nullptr);
+    };
+    const auto twice = scattered(0.0017);
+    FT_VERIFY_OK(twice);
+    QVERIFY2(twice->verdict == GapVerdict::kNoGap && isTold(*twice, "less exact than stated"), twice->text.c_str());
+    const auto four = scattered(0.004);
+    FT_VERIFY_OK(four);
+    QVERIFY2(four->verdict == GapVerdict::kUnexplained && four->selected.empty(), four->text.c_str());
+    QVERIFY(isTold(*four, "may be too small by a factor of 2.2"));
   }
 };
 
