@@ -10,6 +10,10 @@
 namespace fieldtrue::gap {
 namespace {
 
+/// BIC gain of an effect that is there although it gets no name: at the edge of the places it bends so few that the
+/// others cannot foretell it.
+constexpr double kSureUnselected = 40.0;
+
 /// What of a scatter stands above what may be noise, over what of the gap does; squares per axis.
 double shareAbove(double scatter, double bound, double gap_rms) {
   constexpr double kClearly = 1.2;
@@ -79,7 +83,11 @@ double scatteredShare(const identify::GapSearch& search, const identify::GapRows
 bool hasGap(const identify::GapSearch& search, const Judgement& judgement, double scattered_share) {
   constexpr double kSureOfNothingNamed = 1e-6;  // F tests of many columns are a little too sure.
   constexpr double kSureNats = 12.0;
-  return !judgement.selection.ways.empty() || scattered_share > 0.0 ||
+  const std::vector<identify::TriedEffect>& first = judgement.selection.first;
+  const bool is_any_sure = std::any_of(first.begin(), first.end(), [](const auto& one) {
+    return !one.refined.model.terms.empty() && one.bic_gain > kSureUnselected;
+  });
+  return !judgement.selection.ways.empty() || scattered_share > 0.0 || is_any_sure ||
          search.structureOfNone().p_value < kSureOfNothingNamed || judgement.unnamed_nats > kSureNats;
 }
 

@@ -27,6 +27,13 @@ SetCounts countSets(const Sessions& sessions) {
   return counts;
 }
 
+/// Whether the class that is stated with the first cause holds the truth: what this recording could not tell apart.
+bool isTruthStated(const Session& session) {
+  const NamedCause* first = firstCandidate(session);
+  return first != nullptr && std::find(first->equivalents.begin(), first->equivalents.end(),
+                                       session.effects.front().id) != first->equivalents.end();
+}
+
 }  // namespace
 
 void addTopOne(std::vector<Figure>& figures, const Sessions& single) {
@@ -52,11 +59,15 @@ void addTopOne(std::vector<Figure>& figures, const Sessions& single) {
                       if (!session.own_classes.empty()) other.classes = session.own_classes;
                       return isFirstRight(other);
                     });
+  section.addShares("poses, random order, or the class that is stated with the name holds the truth", random_poses,
+                    [](const Session& session) { return isFirstRight(session) || isTruthStated(session); });
   section.add("the class stated with the right name holds the truth itself", "all", "share",
-              shareOf(where(single, isFirstRight), [](const Session& session) {
-                const std::vector<std::string>& stated = firstCandidate(session)->equivalents;
-                return std::find(stated.begin(), stated.end(), session.effects.front().id) != stated.end();
-              }));
+              shareOf(where(single, isFirstRight), isTruthStated));
+  std::vector<double> sizes;
+  for (const Session* session : random_poses)
+    if (const NamedCause* first = firstCandidate(*session))
+      sizes.push_back(static_cast<double>(first->equivalents.size()));
+  section.add("names in the class that is stated, mean", "poses, random order", "", bootstrap(sizes, meanOf));
 }
 
 void addTopOneByEffect(std::vector<Figure>& figures, const Sessions& single) {
