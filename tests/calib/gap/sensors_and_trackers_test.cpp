@@ -94,6 +94,27 @@ class SensorsAndTrackersTest : public QObject {
     FT_VERIFY_MATCH(names(*report, "grid_scale"));
   }
 
+  /// A body beside a corner of the grid bends a few places, which the others cannot foretell: named or not, it is a
+  /// gap.
+  void whatBendsACornerIsAGap_data() {
+    QTest::addColumn<double>("beyond_m");
+    QTest::addColumn<double>("radius_m");
+    QTest::newRow("small and near") << 0.16 << 0.045;
+    QTest::newRow("a little larger") << 0.16 << 0.06;
+    QTest::newRow("large and farther off") << 0.2 << 0.09;
+  }
+  void whatBendsACornerIsAGap() {
+    QFETCH(double, beyond_m);
+    QFETCH(double, radius_m);
+    const Eigen::Vector3d corner_m(0.8, 0.0, 0.6);
+    const Eigen::Vector3d outwards = Eigen::Vector3d(1.0, -1.0, 1.0).normalized();
+    const Eigen::Vector3d center_m = inverse(gapScene().reference_from_tracker) * (corner_m + beyond_m * outwards);
+    const nlohmann::json body = {{"center_m", {center_m.x(), center_m.y(), center_m.z()}}, {"radius_m", radius_m}};
+    const auto report = diagnose(withheldFrom("compact_metal", body.dump()).table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY2(report->verdict != GapVerdict::kNoGap, report->text.c_str());
+  }
+
   void mirroredAxesAreAFinding_data() {
     QTest::addColumn<bool>("turned");
     QTest::newRow("a sign") << false;
