@@ -84,7 +84,8 @@ std::vector<int> placesOf(const effects::EffectFit& fit, std::span<const Eigen::
   return places;
 }
 
-/// Unit columns that stand for an effect: each of its linear parameters at a few of its starts; none where it shows nothing.
+/// Unit columns that stand for an effect: each of its linear parameters at a few of its starts; none where it shows
+/// nothing.
 void setTypical(const std::vector<Eigen::MatrixXd>& columns, const std::vector<int>& places, Signature& signature) {
   constexpr std::size_t kMost = 8;
   const std::size_t used = std::min(kMost, columns.size());
