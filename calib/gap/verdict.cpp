@@ -82,7 +82,7 @@ double scatteredShare(const identify::GapSearch& search, const identify::GapRows
 
 bool hasGap(const identify::GapSearch& search, const Judgement& judgement, double scattered_share) {
   constexpr double kSureOfNothingNamed = 1e-6;  // F tests of many columns are a little too sure.
-  constexpr double kSureNats = 12.0;
+  constexpr double kSureNats = 24.0;
   const std::vector<identify::TriedEffect>& first = judgement.selection.first;
   const bool is_any_sure = std::any_of(first.begin(), first.end(), [](const auto& one) {
     return !one.refined.model.terms.empty() && one.bic_gain > kSureUnselected;
