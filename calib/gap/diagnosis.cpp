@@ -199,8 +199,8 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   report.findings = std::move(cleaned.findings);
   control.progress(0.01);
 
-  const bool belongs_together = addInputFindings(metadata, rows, report);
   const identify::GapSearch search(rows, std::move(believed), identify::NoiseFrom::kResiduals, control);
+  const bool belongs_together = addInputFindings(metadata, search, report);
   identify::EffectSelectionOptions selecting;
   const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
   selecting.most_effects = has_enough && belongs_together && known_gap.value_or(true) ? options.most_effects : 0;

@@ -125,10 +125,10 @@ void addAstray(double share, GapReport& report) {
 
 }  // namespace
 
-bool addInputFindings(const TableMetadata& metadata, const identify::GapRows& rows, GapReport& report) {
+bool addInputFindings(const TableMetadata& metadata, const identify::GapSearch& search, GapReport& report) {
   addAssumption(metadata, report);
-  const double astray = identify::shareAstray(rows);
-  const bool is_mirrored = identify::isMirrored(rows);
+  const double astray = search.shareAstray();
+  const bool is_mirrored = identify::isMirrored(search.physics().rows());
   if (is_mirrored) {
     addMirrored(report);
   } else if (astray > identify::kAstray) {

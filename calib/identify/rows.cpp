@@ -99,53 +99,28 @@ Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad) 
   return noise;
 }
 
-namespace {
-
-/// True and tracked positions about their middles, as the best turn of one onto the other has them.
-struct Turned {
-  Eigen::Matrix3Xd true_m;
-  Eigen::Matrix3Xd tracked_m;
-  Eigen::JacobiSVD<Eigen::Matrix3d> svd;  ///< Of their cross product, tracked by true.
-  bool has_mirror = false;                ///< Whether a mirror image would fit better.
-
-  explicit Turned(const GapRows& table)
-      : true_m(3, static_cast<Eigen::Index>(table.rows.size())), tracked_m(3, true_m.cols()) {
-    for (Eigen::Index i = 0; i < true_m.cols(); ++i) {
-      const GapRow& row = table.rows[static_cast<std::size_t>(i)];
-      true_m.col(i) = row.reference_from_sensor.position_m;
-      tracked_m.col(i) = row.tracker_from_sensor.position_m;
-    }
-    true_m.colwise() -= Eigen::Vector3d(true_m.rowwise().mean());
-    tracked_m.colwise() -= Eigen::Vector3d(tracked_m.rowwise().mean());
-    const Eigen::Matrix3d cross = tracked_m * true_m.transpose();
-    svd.compute(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    has_mirror = cross.determinant() < 0.0;
-  }
-
-  Eigen::Matrix3d turn() const {
-    const double last = svd.matrixU().determinant() * svd.matrixV().determinant();
-    return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, last).asDiagonal() * svd.matrixV().transpose();
-  }
-};
-
-}  // namespace
-
 bool isMirrored(const GapRows& table) {
   constexpr double kFarBetter = 0.3;
-  const Turned turned(table);
-  if (!turned.has_mirror) return false;
-  const Eigen::Vector3d singular = turned.svd.singularValues();
-  const double squares = turned.true_m.squaredNorm() + turned.tracked_m.squaredNorm();
-  const double mirrored = squares - 2.0 * singular.sum();
-  return mirrored < kFarBetter * kFarBetter * (mirrored + 4.0 * singular[2]);
-}
-
-double shareAstray(const GapRows& table) {
-  const Turned turned(table);
-  const Eigen::Matrix3Xd off_m = turned.tracked_m - turned.turn() * turned.true_m;
-  const Eigen::VectorXd sizes_m = off_m.colwise().norm();
-  const double spread_m = std::sqrt(turned.true_m.squaredNorm() / static_cast<double>(turned.true_m.cols()));
-  return spread_m > 0.0 ? median({sizes_m.begin(), sizes_m.end()}) / spread_m : 0.0;
+  Eigen::Vector3d middle_true_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d middle_tracked_m = Eigen::Vector3d::Zero();
+  const auto n = static_cast<double>(table.rows.size());
+  for (const GapRow& row : table.rows) {
+    middle_true_m += row.reference_from_sensor.position_m / n;
+    middle_tracked_m += row.tracker_from_sensor.position_m / n;
+  }
+  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
+  double squares = 0.0;
+  for (const GapRow& row : table.rows) {
+    const Eigen::Vector3d a = row.reference_from_sensor.position_m - middle_true_m;
+    const Eigen::Vector3d b = row.tracker_from_sensor.position_m - middle_tracked_m;
+    cross += a * b.transpose();
+    squares += a.squaredNorm() + b.squaredNorm();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross);
+  if (cross.determinant() >= 0.0) return false;
+  const double mirrored = squares - 2.0 * svd.singularValues().sum();
+  const double turned = mirrored + 4.0 * svd.singularValues()[2];
+  return mirrored < kFarBetter * kFarBetter * turned;
 }
 
 namespace {

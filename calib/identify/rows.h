@@ -78,12 +78,6 @@ Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad);
 /// @source Umeyama 1991, IEEE PAMI 13 376, the sign of the determinant
 bool isMirrored(const GapRows& rows);
 
-/// From here on true and tracked positions are not of the same places: steel floors reach 0.2, rows in another order 1.
-constexpr double kAstray = 0.4;
-/// How far readings lie from their places after the best turn and shift, median, as a share of the places' spread (RMS
-/// about their middle).
-double shareAstray(const GapRows& rows);
-
 /// Eight blocks of places by the octant of their true position about the median, those of fewer than `fewest` places
 /// joined with the smallest other; for each row its block.
 std::vector<int> octantBlocks(const GapRows& rows, std::size_t fewest = 3);

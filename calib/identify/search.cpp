@@ -175,6 +175,20 @@ double GapSearch::floorPlacingSd_m() const { return std::min(placing_sd_m_, wors
 
 double GapSearch::floorPlacingSd_rad() const { return std::min(placing_sd_rad_, worstPlacing_rad(rows_)); }
 
+double GapSearch::shareAstray() const {
+  const std::vector<Pose> predicted = physics_.predictions(none_.model);
+  const auto n = static_cast<double>(predicted.size());
+  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
+  for (const Pose& pose : predicted) middle_m += pose.position_m / n;
+  std::vector<double> off_m;
+  double spread_m2 = 0.0;
+  for (std::size_t i = 0; i < predicted.size(); ++i) {
+    off_m.push_back((rows_.rows[i].tracker_from_sensor.position_m - predicted[i].position_m).norm());
+    spread_m2 += (predicted[i].position_m - middle_m).squaredNorm() / n;
+  }
+  return median(std::move(off_m)) / std::sqrt(spread_m2);
+}
+
 void GapSearch::settleWays() {
   ways_.clear();
   design_ = {};

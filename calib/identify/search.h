@@ -33,6 +33,9 @@ struct TriedEffect {
 };
 
 /// Whether the rig's tolerance is taken as stated or as the flexible fit of the residuals shows it.
+/// From here on true and tracked positions are not of the same places: steel floors reach 0.2, rows in another order 1.
+constexpr double kAstray = 0.4;
+
 enum class NoiseFrom { kResiduals, kStated };
 
 /// What is common to all models of one recording, and the search among them.
@@ -67,6 +70,9 @@ class GapSearch {
   /// too small.
   double floorPlacingSd_m() const;
   double floorPlacingSd_rad() const;
+  /// How far readings lie from where they should without any further effect, median, as a share of the spread of the
+  /// sensors' places (RMS about their middle).
+  double shareAstray() const;
 
   /// @param used per row, which rows count; empty = all
   double bicOf(const GapModel& model, std::span<const char> used = {}) const;

@@ -153,6 +153,20 @@ class SensorsAndTrackersTest : public QObject {
     QVERIFY(!isTold(*diagnose(recordedIn(gapScene(), gapPlan()), nullptr, nullptr), "do not belong together"));
   }
 
+  /// A sensor on an arm longer than the grid is wide, turned at every place: far from its places, and where it should
+  /// be.
+  void aLongArmIsNotAstray() {
+    GapPlan plan;
+    plan.counts = {3, 3, 3};
+    plan.orientations = threeTurns();
+    CalibrationTable table = recordedIn(gapScene(), gapPlan(plan));
+    for (Node& node : table.nodes)
+      node.tracker_from_sensor.position_m += node.tracker_from_sensor.orientation * Eigen::Vector3d(0.4, 0.3, 0.2);
+    const auto report = diagnose(table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY2(!isTold(*report, "do not belong together"), report->text.c_str());
+  }
+
   /// Twice as far as the tolerance says is a tolerance stated too small; four times as far is no placing.
   void whatScattersFarBeyondItsToleranceIsAGap() {
     const auto scattered = [](double sd_m) {
