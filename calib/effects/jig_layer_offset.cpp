@@ -20,6 +20,12 @@ constexpr std::size_t kMostLayers = 12;
 constexpr std::size_t kFewestPlacesOfALayer = 3;
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
+/// Where the rig put the sensor's holder, rig's frame: a sensor on an arm hangs above or below its layer.
+Eigen::Vector3d holderOf_m(const field::SensorSetting& setting) {
+  if (setting.holder_m) return *setting.holder_m;
+  return inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m;
+}
+
 /// Layers across one axis of the rig.
 class Layers {
  public:
@@ -34,8 +40,7 @@ class Layers {
   double reach_m() const { return reach_m_; }
 
   void respond(const field::SensorSetting& setting, std::span<field::EffectResponse> responses) const {
-    const Eigen::Vector3d q_m = inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m;
-    if (const auto layer = layerOf(q_m[axis_])) {
+    if (const auto layer = layerOf(holderOf_m(setting)[axis_])) {
       responses[*layer].shift_m = setting.tracker_from_reference.orientation * Eigen::Vector3d::Unit(axis_);
     }
   }
@@ -146,9 +151,7 @@ std::unique_ptr<EffectFit> wayAlong(int axis, const std::vector<Layer>& layers) 
 
 std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
   std::vector<Eigen::Vector3d> places_m;
-  for (const field::SensorSetting& setting : design.settings) {
-    places_m.push_back(inverse(setting.tracker_from_reference) * setting.tracker_from_sensor.position_m);
-  }
+  for (const field::SensorSetting& setting : design.settings) places_m.push_back(holderOf_m(setting));
   std::vector<std::unique_ptr<EffectFit>> ways;
   for (int axis = 0; axis < 3; ++axis) {
     const std::vector<Layer> layers = layersAlong(axis, places_m, design.pitch_m);
@@ -165,7 +168,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 
 /// Layers of a rig that are too high or too low: pipes cut to the wrong length, a shelf on another peg.
 ///
-/// Convention: a sensor in the layer at the height h along one of the rig's axes is really at h + offset. It belongs to
+/// Convention: a holder in the layer at the height h along one of the rig's axes is really at h + offset. It belongs to
 /// the nearest layer of the list, and to none where that is farther than half the smallest spacing of the list.
 /// @source geometry, by hand
 Effect jigLayerOffsetEffect() {

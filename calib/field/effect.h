@@ -21,6 +21,8 @@ struct SensorSetting {
   Pose tracker_from_reference;              ///< The rig's frame in the tracker's.
   std::optional<std::array<int, 3>> index;  ///< Grid index i j k; none when scattered.
   double time_s = 0.0;                      ///< From the start of the session.
+  /// Where the rig put the holder, rig's frame; none where the sensor has no holder of its own.
+  std::optional<Eigen::Vector3d> holder_m = std::nullopt;
 };
 
 /// What effects change at one reading, to first order: contributions of several effects add.

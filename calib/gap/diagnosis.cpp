@@ -15,6 +15,7 @@
 #include "calib/gap/judgement.h"
 #include "calib/gap/next_measurement.h"
 #include "calib/gap/replicates.h"
+#include "calib/gap/source_shape.h"
 #include "calib/gap/verdict.h"
 #include "calib/gap/where.h"
 #include "calib/identify/sample_findings.h"
@@ -111,17 +112,19 @@ void selectSignalFindings(GapReport& report) {
   }
 }
 
-/// What single readings show; of several sensors, those of the first.
+/// What single readings show of each sensor, said of which where there are several.
 void addSignalFindings(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
                        recording::Cleaned& cleaned) {
-  if (cleaned.nodes.empty()) return;
-  const auto by_sensor = [](const Node& a, const Node& b) { return a.sensor < b.sensor; };
-  const int sensor = std::min_element(cleaned.nodes.begin(), cleaned.nodes.end(), by_sensor)->sensor;
-  const auto own = rowsOfSensor(table, sensor);
-  std::optional<SampleTable> own_samples;
-  if (samples != nullptr) own_samples = rowsOfSensor(*samples, sensor);
-  const auto found = identify::sampleFindings(own_samples ? &*own_samples : nullptr, own ? *own : table, scene);
-  cleaned.findings.insert(cleaned.findings.end(), found.begin(), found.end());
+  const std::vector<int> sensors = sensorsOf(cleaned.nodes);
+  for (const int sensor : sensors) {
+    const auto own = rowsOfSensor(table, sensor);
+    std::optional<SampleTable> own_samples;
+    if (samples != nullptr) own_samples = rowsOfSensor(*samples, sensor);
+    for (auto& found : identify::sampleFindings(own_samples ? &*own_samples : nullptr, own ? *own : table, scene)) {
+      if (sensors.size() > 1) found.text = "Sensor " + std::to_string(sensor) + ": " + found.text;
+      cleaned.findings.push_back(std::move(found));
+    }
+  }
 }
 
 void describeInput(const identify::GapRows& rows, const SampleTable* samples, GapReport& report) {
@@ -169,6 +172,9 @@ void describeJudgement(const identify::GapSearch& search, const Judgement& judge
   if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
     report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
   addFindings(search, rows, judgement, has_gap, report);
+  if (has_gap && rows.has_dipoles) report.source_shape = sourceShapeOf(search, judgement.selection);
+  if (report.source_shape && report.source_shape->shape != Shape::kUnclear)
+    report.findings.push_back({"", sourceShapeText(*report.source_shape), {}});
   addSequence(judgement.far, report);
   report.remaining = remainingOf(judgement.far, rows);
 }

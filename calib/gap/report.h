@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -97,6 +98,22 @@ struct GapBin {
 struct Hotspot {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  ///< Tracker frame.
   double radius_m = 0.0;
+};
+
+/// What shape a thing in the room has by how it answers along each of its axes.
+enum class Shape { kUnclear, kBody, kFlatOrLoop, kLongConductor, kIronBar, kIronSheet };
+inline constexpr std::array kShapes = {Shape::kUnclear,       Shape::kBody,    Shape::kFlatOrLoop,
+                                       Shape::kLongConductor, Shape::kIronBar, Shape::kIronSheet};
+/// "unclear", "body", "flat_or_loop", "long_conductor", "iron_bar", "iron_sheet".
+std::string_view idOf(Shape shape);
+
+/// The thing in the room that bends the readings most, as one dipole of any polarizability; tracker frame.
+struct SourceShape {
+  Shape shape = Shape::kUnclear;
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d values_m3 = Eigen::Vector3d::Zero();  ///< Principal polarizabilities, the largest first.
+  Eigen::Vector3d sds_m3 = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Unit columns, in the order of the values.
 };
 
 struct IsolabilityPair {
@@ -207,6 +224,7 @@ struct GapReport {
   std::vector<GapNode> nodes;
   PlaceNames names;  ///< What the places are called; not in the document.
   std::optional<Hotspot> hotspot;
+  std::optional<SourceShape> source_shape;
   std::vector<GapChannel> channels;
   std::vector<GapBin> by_range;
   std::vector<GapBin> by_layer;

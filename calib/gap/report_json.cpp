@@ -104,10 +104,21 @@ json channelToJson(const GapChannel& channel) {
           {"floor", numberToJson(channel.floor)}};
 }
 
+json sourceShapeToJson(const SourceShape& shape) {
+  json axes = json::array();
+  for (int k = 0; k < 3; ++k) axes.push_back(vectorToJson(shape.axes.col(k)));
+  return {{"shape", idOf(shape.shape)},
+          {"center_m", vectorToJson(shape.center_m)},
+          {"polarizabilities_m3", vectorToJson(shape.values_m3)},
+          {"sd_m3", vectorToJson(shape.sds_m3)},
+          {"axes", std::move(axes)}};
+}
+
 json whereToJson(const GapReport& report) {
   json to = {{"nodes", listToJson(report.nodes,
                                   [&](const GapNode& node) { return nodeToJson(node, report.input.position_only); })},
              {"hotspot", nullptr},
+             {"source_shape", nullptr},
              {"channels", listToJson(report.channels, channelToJson)},
              {"by_range", binsToJson(report.by_range, "low_m", "high_m")},
              {"by_layer", binsToJson(report.by_layer, "layer", nullptr)},
@@ -121,6 +132,7 @@ json whereToJson(const GapReport& report) {
     to["hotspot"] = {{"center_m", vectorToJson(report.hotspot->center_m)},
                      {"radius_m", numberToJson(report.hotspot->radius_m)}};
   }
+  if (report.source_shape) to["source_shape"] = sourceShapeToJson(*report.source_shape);
   return to;
 }
 

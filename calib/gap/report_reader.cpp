@@ -68,10 +68,26 @@ std::vector<GapBin> binsFrom(const JsonReader& reader, const char* low_key, cons
   });
 }
 
+SourceShape sourceShapeFrom(const JsonReader& reader) {
+  SourceShape shape;
+  const std::string id = reader["shape"].text();
+  for (const Shape one : kShapes)
+    if (id == idOf(one)) shape.shape = one;
+  shape.center_m = vectorFrom(reader["center_m"]);
+  shape.values_m3 = vectorFrom(reader["polarizabilities_m3"]);
+  shape.sds_m3 = vectorFrom(reader["sd_m3"]);
+  int k = 0;
+  for (const Eigen::Vector3d& axis : reader["axes"].list(vectorFrom))
+    if (k < 3) shape.axes.col(k++) = axis;
+  return shape;
+}
+
 void readWhere(const JsonReader& reader, GapReport& report) {
   report.nodes = reader["nodes"].list(nodeFrom);
   const JsonReader hotspot = reader["hotspot"];
   if (!hotspot.isNull()) report.hotspot = Hotspot{vectorFrom(hotspot["center_m"]), hotspot["radius_m"].numberOrNan()};
+  if (const auto shape = reader.find("source_shape"); shape && !shape->isNull())
+    report.source_shape = sourceShapeFrom(*shape);
   report.channels = reader["channels"].list([](const JsonReader& channel) {
     return GapChannel{channel["name"].text(), channel["unit"].text(), channel["rms"].numberOrNan(),
                       channel["floor"].numberOrNan()};

@@ -23,7 +23,7 @@ std::vector<field::SensorSetting> GapPhysics::settings(const GapAlignment& align
   for (const GapRow& row : rows_.rows) {
     settings.push_back(
         {alignment.tracker_from_reference * row.reference_from_sensor * alignment.mount_from_sensor[row.sensor],
-         alignment.tracker_from_reference, row.index, row.time_s});
+         alignment.tracker_from_reference, row.index, row.time_s, row.reference_from_sensor.position_m});
   }
   return settings;
 }

@@ -90,7 +90,7 @@ StandingSensor TrackerPhysics::standing(const Pose& reference_from_sensor,
                                         double last_s) const {
   StandingSensor sensor;
   sensor.stated = {tracker_from_reference_ * reference_from_sensor * scene_.mount_from_sensor, tracker_from_reference_,
-                   index, first_s};
+                   index, first_s, reference_from_sensor.position_m};
   std::vector<field::EffectResponse> responses;
   field::EffectResponse sum;
   for (const auto& effect : effects_) {

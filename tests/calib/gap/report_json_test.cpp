@@ -63,6 +63,8 @@ GapReport someReport() {
   node.is_flagged = true;
   report.nodes = {node};
   report.hotspot = Hotspot{Eigen::Vector3d(1, 2, 3), 0.4};
+  report.source_shape = SourceShape{Shape::kIronBar, Eigen::Vector3d(1, 2, 4), Eigen::Vector3d(0.5, 0.25, 0.125),
+                                    Eigen::Vector3d(0.0625, 0.03125, 0.015625), Eigen::Matrix3d::Identity()};
   report.channels = {{"radial", "mm", 3.5, 0.5}};
   report.by_range = {{0.5, 1.0, 4.0, 1.0}};
   report.by_layer = {{0.3, 0.3, 5.0, 1.5}};
@@ -112,13 +114,16 @@ class GapJsonTest : public QObject {
                                 "position_rms_mm orientation_rms_deg floor_position_mm "
                                 "floor_orientation_deg ratio_to_floor p_value")
                                 .split(' ');
-    QTest::newRow("where") << "/where" << QString("nodes hotspot channels by_range by_layer by_time origin").split(' ');
+    QTest::newRow("where")
+        << "/where" << QString("nodes hotspot source_shape channels by_range by_layer by_time origin").split(' ');
     QTest::newRow("node") << "/where/nodes/0"
                           << QString(
                                  "node visit gap_mm gap_deg excess flagged place_m before_mm "
                                  "after_mm")
                                  .split(' ');
     QTest::newRow("hotspot") << "/where/hotspot" << QStringList{"center_m", "radius_m"};
+    QTest::newRow("shape") << "/where/source_shape"
+                           << QString("shape center_m polarizabilities_m3 sd_m3 axes").split(' ');
     QTest::newRow("channel") << "/where/channels/0" << QString("name rms unit floor").split(' ');
     QTest::newRow("range") << "/where/by_range/0" << QString("low_m high_m rms_mm floor_mm").split(' ');
     QTest::newRow("layer") << "/where/by_layer/0" << QString("layer rms_mm floor_mm").split(' ');

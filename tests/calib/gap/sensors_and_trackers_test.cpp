@@ -19,11 +19,18 @@ Pose mountOf(int sensor) {
 }
 
 /// The same places recorded by two sensors on one jig, the second off the mount and turned.
-CalibrationTable recordedByTwo(simulation::Scene scene) {
+CalibrationTable recordedByTwo(simulation::Scene scene, const Pose& second = mountOf(1),
+                               SampleTable* samples = nullptr) {
   CalibrationTable both;
   for (const int sensor : {0, 1}) {
-    scene.mount_from_sensor = mountOf(sensor);
-    const CalibrationTable own = recordedIn(scene, gapPlan(), 1 + static_cast<std::uint64_t>(sensor));
+    scene.mount_from_sensor = sensor == 0 ? Pose{} : second;
+    SampleTable own_samples;
+    const CalibrationTable own = recordedIn(scene, gapPlan(), 1 + static_cast<std::uint64_t>(sensor),
+                                            samples != nullptr ? &own_samples : nullptr);
+    for (SampleRow row : own_samples.rows) {
+      row.sensor = sensor;
+      samples->rows.push_back(row);
+    }
     both.metadata = own.metadata;
     for (Node node : own.nodes) {
       node.sensor = sensor;
@@ -61,6 +68,40 @@ class SensorsAndTrackersTest : public QObject {
     FT_VERIFY_MATCH(near(*report->selected.front().location_m, {1.3, 0.5, 0.3}, 0.08));
     QCOMPARE(report->input.rows, 160);
     QCOMPARE(report->input.places, 80);
+  }
+
+  /// The layer of a jig is where its holder is, wherever the sensor hangs from it: 11 cm below, more than half a step.
+  void aSensorThatHangsLowIsOfItsHoldersLayer() {
+    simulation::Scene scene = gapScene();
+    const std::vector<double> offsets_m = {0.0, 0.006, -0.005, 0.004};
+    scene.effects.push_back(
+        {"jig_layer_offset", {{"axis", "z"}, {"heights_m", {0.0, 0.2, 0.4, 0.6}}, {"offsets_m", offsets_m}}});
+    const Pose hanging{{0.0, 0.0, -0.11}, Eigen::Quaterniond::Identity()};
+    const auto report = diagnose(recordedByTwo(scene, hanging), nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    FT_VERIFY_MATCH(names(*report, "jig_layer_offset"));
+    const nlohmann::json& found = report->selected.front().scene_parameters;
+    QCOMPARE(found.at("heights_m").size(), offsets_m.size());
+    // Layers against each other: how high all of them stand is the alignment's.
+    const auto found_m = found.at("offsets_m").get<std::vector<double>>();
+    for (std::size_t k = 1; k < offsets_m.size(); ++k)
+      FT_VERIFY_MATCH(near(found_m[k] - found_m[0], offsets_m[k] - offsets_m[0], 0.001));
+  }
+
+  /// Single readings of every sensor are looked at, and it is said whose they are.
+  void eachSensorsReadingsAreLookedAt() {
+    SampleTable samples;
+    CalibrationTable both = recordedByTwo(gapScene(), mountOf(1), &samples);
+    simulation::Scene humming = gapScene();
+    humming.effects.push_back({"mains_interference", {{"line_hz", {50.0}}, {"amplitude_per_m3", {1e-4}}}});
+    SampleTable with_hum;
+    recordedByTwo(humming, mountOf(1), &with_hum);
+    for (std::size_t i = 0; i < samples.rows.size(); ++i)
+      if (samples.rows[i].sensor == 1) samples.rows[i] = with_hum.rows[i];
+    const auto report = diagnose(both, &samples, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY(isTold(*report, "Sensor 1: "));
+    QVERIFY(!isTold(*report, "Sensor 0: "));
   }
 
   /// Of a tracker whose transmitter is no dipole nothing is claimed by the physics of dipoles: the same readings have a
