@@ -5,6 +5,7 @@
 
 #include "app/cli_text.h"
 #include "calib/core/number_text.h"
+#include "calib/identify/thresholds.h"
 #include "calib/recording/finding.h"
 #include "widgets/report/numbers.h"
 
@@ -140,10 +141,13 @@ std::string isolabilityText(const gap::Isolability& isolability) {
   std::vector<gap::IsolabilityPair> pairs = isolability.pairs;
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const gap::IsolabilityPair& a, const gap::IsolabilityPair& b) { return a.r2 > b.r2; });
+  const identify::Thresholds thresholds;
   std::vector<Row> rows{{"effect", "and effect", "R2", ""}};
   for (const gap::IsolabilityPair& pair : pairs) {
     if (pair.r2 < kSmallestR2 || rows.size() > kMostPairs) break;
-    const std::string told = pair.r2 > 0.9 ? "cannot be told apart" : pair.r2 > 0.5 ? "hard to tell apart" : "";
+    const std::string told = pair.r2 > thresholds.same_on_design   ? "cannot be told apart"
+                             : pair.r2 > thresholds.hard_on_design ? "hard to tell apart"
+                                                                   : "";
     rows.push_back({pair.a, pair.b, fixedText(pair.r2, 3), told});
   }
   const std::size_t apart = pairs.size() + 1 - rows.size();

@@ -10,28 +10,18 @@
 namespace fieldtrue::gap {
 namespace {
 
-/// BIC differences are over-confident where the catalogue is not the world; found on sessions made by other physics.
-constexpr double kTemperature = 2.5;
-/// Effects whose fitted signals correlate beyond this and whose evidence is closer than that are not told apart.
-constexpr double kSameSignal = 0.9;
-constexpr double kSameEvidence = 10.0;
 constexpr double kNinety = 1.645;
-/// Real things are no point dipoles, round loops or endless planes: a place is not known better than to a share of the
-/// size of what stands there, or of a plane's distance, however many nodes say so. Shares and factor found on bodies
-/// made by other physics.
-constexpr double kShareOfSize = 0.12;
-constexpr double kShareOfDistance = 0.03;
-constexpr double kWiderOfPlaced = 1.4;
 
-/// SD of a place that stands for the physics the catalogue leaves out [m].
-double unmodelledPlaceSd_m(const effects::FittedEffect& fitted) {
+/// SD of a place that stands for the physics the catalogue leaves out [m]: a place is not known better than to a share
+/// of the size of what stands there, or of a plane's distance, however many nodes say so.
+double unmodelledPlaceSd_m(const effects::FittedEffect& fitted, const identify::Thresholds& thresholds) {
   double sd_m = 0.0;
   for (const effects::FittedParameter& p : fitted.values) {
-    if (p.name == "size_m") sd_m = std::max(sd_m, kShareOfSize * p.value);
-    if (p.name == "radius_m") sd_m = std::max(sd_m, 2.0 * kShareOfSize * p.value / std::numbers::sqrt2);
-    if (p.name == "distance_m") sd_m = std::max(sd_m, kShareOfDistance * p.value);
+    if (p.name == "size_m") sd_m = std::max(sd_m, thresholds.share_of_size * p.value);
+    if (p.name == "radius_m") sd_m = std::max(sd_m, 2.0 * thresholds.share_of_size * p.value / std::numbers::sqrt2);
+    if (p.name == "distance_m") sd_m = std::max(sd_m, thresholds.share_of_distance * p.value);
   }
-  return std::min(sd_m, 0.3);
+  return std::min(sd_m, thresholds.widest_place_m);
 }
 
 /// No interval of a searched parameter reaches beyond where it may be searched.
@@ -46,19 +36,20 @@ void keepWithinSearch(const effects::EffectFit& fit, GapCandidate& candidate) {
 }
 
 /// Widens the intervals of a thing in the room for the physics that its model leaves out.
-void widenPlaced(const effects::FittedEffect& fitted, GapCandidate& candidate) {
+void widenPlaced(const effects::FittedEffect& fitted, const identify::Thresholds& thresholds, GapCandidate& candidate) {
   if (!fitted.location_m) return;
-  const double place_sd_m = unmodelledPlaceSd_m(fitted);
+  const double place_sd_m = unmodelledPlaceSd_m(fitted, thresholds);
+  const double wider = thresholds.wider_of_placed;
   for (Estimate& estimate : candidate.parameters) {
     if (!estimate.low90 || !estimate.high90) continue;
     const bool is_center = estimate.name.rfind("center_", 0) == 0;
     const double more = is_center ? kNinety * place_sd_m : 0.0;
-    estimate.low90 = estimate.value - std::hypot(kWiderOfPlaced * (estimate.value - *estimate.low90), more);
-    estimate.high90 = estimate.value + std::hypot(kWiderOfPlaced * (*estimate.high90 - estimate.value), more);
+    estimate.low90 = estimate.value - std::hypot(wider * (estimate.value - *estimate.low90), more);
+    estimate.high90 = estimate.value + std::hypot(wider * (*estimate.high90 - estimate.value), more);
   }
   if (!candidate.location_covariance_m2) return;
-  *candidate.location_covariance_m2 = kWiderOfPlaced * kWiderOfPlaced * *candidate.location_covariance_m2 +
-                                      place_sd_m * place_sd_m * Eigen::Matrix3d::Identity();
+  *candidate.location_covariance_m2 =
+      wider * wider * *candidate.location_covariance_m2 + place_sd_m * place_sd_m * Eigen::Matrix3d::Identity();
 }
 
 /// Parameters of one term within the covariance of a refined model.
@@ -190,30 +181,28 @@ void findEquivalents(const identify::GapSearch& search, const identify::EffectSe
     candidates[a].equivalents = {candidates[a].effect};
     for (std::size_t b = 0; b < tried.size(); ++b) {
       if (a == b || signals[a].size() == 0 || signals[b].size() == 0) continue;
-      if (std::abs(tried[a].bic_gain - tried[b].bic_gain) > kSameEvidence) continue;
-      if (correlation2(signals[a], signals[b]) > kSameSignal) candidates[a].equivalents.push_back(candidates[b].effect);
+      if (std::abs(tried[a].bic_gain - tried[b].bic_gain) > search.thresholds().same_evidence) continue;
+      if (correlation2(signals[a], signals[b]) > search.thresholds().same_signal)
+        candidates[a].equivalents.push_back(candidates[b].effect);
     }
   }
 }
 
 /// What does not help on places it was not fitted to counts for less; where nothing was worth selecting, nothing is
 /// likelier than none.
-double evidenceOf(const GapCandidate& c, bool is_any_fit) {
-  constexpr double kCostOfFailing = 10.0;
-  constexpr double kCostOfUnselected = 12.0;
+double evidenceOf(const GapCandidate& c, bool is_any_fit, const identify::Thresholds& thresholds) {
   if (isNameless(c.effect)) return c.bic_gain;
-  const double evidence = c.bic_gain - (c.shrinkage.fraction <= 0.0 ? kCostOfFailing : 0.0);
-  return is_any_fit ? evidence : std::min(evidence, 0.0) - kCostOfUnselected;
+  const double evidence = c.bic_gain - (c.shrinkage.fraction <= 0.0 ? thresholds.cost_of_failing : 0.0);
+  return is_any_fit ? evidence : std::min(evidence, 0.0) - thresholds.cost_of_unselected;
 }
 
 /// Two names of one thing, as a wrong scale of the rig and of the tracker: the first carries the probability of both.
-void joinExactTwins(std::vector<GapCandidate>& candidates) {
-  constexpr double kSame = 0.5;  // BIC.
+void joinExactTwins(const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
   for (std::size_t a = 0; a < candidates.size(); ++a) {
     for (std::size_t b = a + 1; b < candidates.size(); ++b) {
       const auto& names = candidates[a].equivalents;
       const bool is_twin = std::find(names.begin(), names.end(), candidates[b].effect) != names.end() &&
-                           std::abs(candidates[a].bic_gain - candidates[b].bic_gain) < kSame;
+                           std::abs(candidates[a].bic_gain - candidates[b].bic_gain) < thresholds.twin_evidence;
       if (!is_twin) continue;
       candidates[a].probability += candidates[b].probability;
       candidates[b].probability = 0.0;
@@ -221,16 +210,16 @@ void joinExactTwins(std::vector<GapCandidate>& candidates) {
   }
 }
 
-void setProbabilities(std::vector<GapCandidate>& candidates, bool is_any_fit) {
+void setProbabilities(bool is_any_fit, const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
   double most = 0.0;
-  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_fit));
+  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_fit, thresholds));
   double sum = 0.0;
   for (GapCandidate& c : candidates) {
-    c.probability = std::exp(0.5 * (evidenceOf(c, is_any_fit) - most) / kTemperature);
+    c.probability = std::exp(0.5 * (evidenceOf(c, is_any_fit, thresholds) - most) / thresholds.temperature);
     sum += c.probability;
   }
   for (GapCandidate& c : candidates) c.probability /= sum;
-  joinExactTwins(candidates);
+  joinExactTwins(thresholds, candidates);
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const GapCandidate& a, const GapCandidate& b) { return a.probability > b.probability; });
 }
@@ -257,8 +246,9 @@ Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::Tr
 }
 
 /// The rivals without a name, weighed so that they stand against what was selected as the judgement found.
-void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, std::vector<GapCandidate>& candidates) {
-  constexpr double kClearly = 12.0;  // BIC.
+void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, const identify::Thresholds& thresholds,
+                 std::vector<GapCandidate>& candidates) {
+  const double margin = thresholds.nameless_margin;
   const double before_m2 = judgement.far.excess_m2.front().value;
   const auto add = [&](const char* id, double evidence, double left) {
     GapCandidate nameless;
@@ -271,17 +261,17 @@ void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, 
   double best = 0.0;
   for (const GapCandidate& c : candidates) best = std::max(best, c.bic_gain);
   add("none", 0.0, 1.0);
-  double smooth = -3.0 * kClearly;
+  double smooth = -3.0 * margin;
   if (!judgement.selection.ways.empty())
-    smooth = best - 2.0 * std::max(3.0, judgement.nats_over_unnamed);
+    smooth = best - 2.0 * std::max(thresholds.least_nats, judgement.nats_over_unnamed);
   else if (judgement.refusal != Refusal::kNone && has_gap)
-    smooth = best + std::max(0.5 * kClearly, -2.0 * judgement.nats_over_unnamed);
+    smooth = best + std::max(0.5 * margin, -2.0 * judgement.nats_over_unnamed);
   else if (has_gap)
-    smooth = std::max(kClearly, 2.0 * judgement.unnamed_nats);
+    smooth = std::max(margin, 2.0 * judgement.unnamed_nats);
   add(kUnnamedSmooth, smooth, judgement.smooth_left);
-  const bool is_mostly_scattered = judgement.selection.ways.empty() && floor_excess > 0.5;
+  const bool is_mostly_scattered = judgement.selection.ways.empty() && floor_excess > thresholds.mostly_scattered;
   add(kUnnamedScattered,
-      floor_excess > 0.0 ? std::max(best, smooth) + (is_mostly_scattered ? kClearly : -kClearly) : -3.0 * kClearly,
+      floor_excess > 0.0 ? std::max(best, smooth) + (is_mostly_scattered ? margin : -margin) : -3.0 * margin,
       1.0 - floor_excess);
 }
 
@@ -297,7 +287,7 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
     const bool is_refined = !tried.refined.model.terms.empty();
     identify::RefinedModel model = is_refined ? tried.refined : identify::RefinedModel{tried.model, {}, 0, 0.0};
     describeTerm(model, model.model.terms.size() - 1, candidate);
-    widenPlaced(fittedOf(model.model.terms.back()), candidate);
+    widenPlaced(fittedOf(model.model.terms.back()), search.thresholds(), candidate);
     keepWithinSearch(*model.model.terms.back().fit, candidate);
     candidate.bic_gain = tried.bic_gain;
     candidate.shrinkage = shrinkageOfTried(search, tried, judgement.far, none);
@@ -308,8 +298,8 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
     for (GapCandidate& c : candidates)
       if (c.effect == search.ways()[selection.ways[t]].effect->id) c.shrinkage = shrinkageOfStep(judgement.far, t);
   }
-  addNameless(judgement, has_gap, scattered_share, candidates);
-  setProbabilities(candidates, !selection.ways.empty() || judgement.refusal != Refusal::kNone);
+  addNameless(judgement, has_gap, scattered_share, search.thresholds(), candidates);
+  setProbabilities(!selection.ways.empty() || judgement.refusal != Refusal::kNone, search.thresholds(), candidates);
   return candidates;
 }
 
@@ -326,7 +316,7 @@ std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, 
     SelectedEffect effect;
     describeTerm(selection.model, t, effect);
     profileSearched(search, selection.model, t, effect);
-    widenPlaced(fittedOf(selection.model.model.terms[t]), effect);
+    widenPlaced(fittedOf(selection.model.model.terms[t]), search.thresholds(), effect);
     keepWithinSearch(*selection.model.model.terms[t].fit, effect);
     effect.credit_fraction = credit[t];
     effect.equivalents = {effect.effect};

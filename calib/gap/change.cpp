@@ -12,7 +12,6 @@ namespace fieldtrue::gap {
 namespace {
 
 constexpr std::size_t kRowsForField = 500;  ///< Of the earlier one, to foretell what it would have read.
-constexpr std::size_t kFewestPlaces = 8;
 
 /// What would have been read at one row, metres or radians beside the alignment, and the variance of each component.
 struct Foretold {
@@ -30,13 +29,14 @@ class Channel {
         later_(identify::readingsOf(*now.search, alignments.now, rotation)),
         both_(someOfBoth(before, now, alignments, places, rotation)),
         places_(places.begin(), places.end()),
-        pitch_m_(std::max(before.search->design().pitch_m, now.search->design().pitch_m)) {
+        pitch_m_(std::max(before.search->design().pitch_m, now.search->design().pitch_m)),
+        thresholds_(now.search->thresholds()) {
     parts_.turn = before.rows.several_orientations || now.rows.several_orientations;
     earlier_.free.clear();  // The alignment is settled: what it leaves is of the field.
   }
 
   void run(const RunControl& control) {
-    found_ = identify::compareFields(both_, parts_, pitch_m_, control);
+    found_ = identify::compareFields(both_, parts_, pitch_m_, thresholds_, control);
     const identify::SharedField field(earlier_, found_.earlier);
     for (std::size_t i = 0; i < later_.size(); ++i)
       foretold_.push_back(
@@ -60,10 +60,10 @@ class Channel {
 
   /// A reading counts where what is foretold is no less sure than itself, or at least far surer than without any.
   bool knows(std::size_t row) const {
-    constexpr double kFarSurer = 0.25;
     const identify::SmoothLaw& law = found_.earlier.field;
     const double unknown = law.by_place * law.by_place + law.by_turn * law.by_turn;
-    return foretold_[row].variance <= std::max(later_.variances[static_cast<Eigen::Index>(row)], kFarSurer * unknown) &&
+    return foretold_[row].variance <=
+               std::max(later_.variances[static_cast<Eigen::Index>(row)], thresholds_.far_surer * unknown) &&
            nearestBefore_m(row) <= 2.0 * pitch_m_;
   }
 
@@ -80,6 +80,7 @@ class Channel {
   identify::FieldReadings both_;
   std::vector<int> places_;
   double pitch_m_;
+  identify::Thresholds thresholds_;
   identify::SmoothParts parts_;
   identify::FieldComparison found_;
   std::vector<Foretold> foretold_;
@@ -178,9 +179,9 @@ void describeSize(const Recording& now, const Alignments& alignments, const Chan
 }  // namespace
 
 Result<RecordingChange> changeSince(const CalibrationTable& before_table, const CalibrationTable& now_table,
-                                    const RunControl& control) {
-  FT_TRY(auto before, recordingOf(before_table));
-  FT_TRY(auto now, recordingOf(now_table));
+                                    const identify::Thresholds& thresholds, const RunControl& control) {
+  FT_TRY(auto before, recordingOf(before_table, thresholds));
+  FT_TRY(auto now, recordingOf(now_table, thresholds));
   const std::vector<int> places = placesBefore(*before, *now);
   const Alignments alignments = alignedTogether(*before, *now, places);
   std::vector<Channel> channels;
@@ -199,15 +200,15 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
   RecordingChange change;
   change.places = static_cast<int>(std::count(place_known.begin(), place_known.end(), char{1}));
   change.places_left_out = static_cast<int>(place_known.size()) - change.places;
-  if (static_cast<std::size_t>(change.places) < kFewestPlaces) {
+  if (static_cast<std::size_t>(change.places) < thresholds.fewest_places) {
     return fail(ErrorCode::kTooFewNodes, "The earlier recording tells the field at " + std::to_string(change.places) +
-                                             " places of this one; at least " + std::to_string(kFewestPlaces) +
-                                             " are needed to compare them.");
+                                             " places of this one; at least " +
+                                             std::to_string(thresholds.fewest_places) + " are needed to compare them.");
   }
   const double log_odds = jointLogOdds(
       channels[0].found().log_odds, channels.size() > 1 ? std::optional(channels[1].found().log_odds) : std::nullopt);
   change.p_value = std::min(1.0, std::exp(-log_odds));
-  change.changed = log_odds > identify::kSureOfChange;
+  change.changed = log_odds > thresholds.sure_of_change;
   change.scatter_before_mm = 1e3 * channels[0].scatter(false);
   change.scatter_now_mm = 1e3 * channels[0].scatter(true);
   change.least_shown_mm = 1e3 * std::sqrt(3.0) * channels[0].found().least_shown;
@@ -238,10 +239,10 @@ std::string changedText(const RecordingChange& change, const GapReport& report) 
   return text + ". " + report.text;
 }
 
-void addRigMoved(const RecordingChange& change, GapReport& report) {
-  constexpr double kTold_mm = 5.0;
-  constexpr double kTold_deg = 0.5;
-  if (!change.rig_moved_mm || (*change.rig_moved_mm < kTold_mm && *change.rig_turned_deg < kTold_deg)) return;
+void addRigMoved(const RecordingChange& change, const identify::Thresholds& thresholds, GapReport& report) {
+  if (!change.rig_moved_mm) return;
+  if (*change.rig_moved_mm < thresholds.told_rig_moved_mm && *change.rig_turned_deg < thresholds.told_rig_turned_deg)
+    return;
   report.findings.push_back({"",
                              "The whole rig stands " + shown(*change.rig_moved_mm) + " mm and " +
                                  shown(*change.rig_turned_deg) +
@@ -251,10 +252,9 @@ void addRigMoved(const RecordingChange& change, GapReport& report) {
 }
 
 /// Noise that grew is no field, and yet something to look for.
-void addScatter(const RecordingChange& change, GapReport& report) {
-  constexpr double kClearly = 1.7;
+void addScatter(const RecordingChange& change, const identify::Thresholds& thresholds, GapReport& report) {
   const double ratio = change.scatter_now_mm / change.scatter_before_mm;
-  if (ratio < kClearly && ratio > 1.0 / kClearly) return;
+  if (ratio < thresholds.told_scatter && ratio > 1.0 / thresholds.told_scatter) return;
   report.findings.push_back({"",
                              "About any smooth field the places scatter by " + shown(change.scatter_now_mm) +
                                  " mm now and by " + shown(change.scatter_before_mm) +
@@ -265,7 +265,7 @@ void addScatter(const RecordingChange& change, GapReport& report) {
 
 }  // namespace
 
-void describeChange(const RecordingChange& change, GapReport& report) {
+void describeChange(const RecordingChange& change, const identify::Thresholds& thresholds, GapReport& report) {
   report.tracker_from_reference = change.tracker_from_reference;
   report.sensors_from_mounts = change.sensors_from_mounts;
   report.sensor_from_mount = change.sensors_from_mounts.begin()->second;
@@ -286,8 +286,8 @@ void describeChange(const RecordingChange& change, GapReport& report) {
     }
     report.text = changedText(change, report);
   }
-  addRigMoved(change, report);
-  addScatter(change, report);
+  addRigMoved(change, thresholds, report);
+  addScatter(change, thresholds, report);
   if (change.places_left_out > 0) {
     report.findings.push_back({"",
                                std::to_string(change.places_left_out) +

@@ -7,6 +7,7 @@
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
 #include "calib/gap/report.h"
+#include "calib/identify/thresholds.h"
 #include "calib/recording/cleaning.h"
 
 namespace fieldtrue::gap {
@@ -33,14 +34,14 @@ struct RecordingChange {
 };
 
 /// Tells a report that was made of the change's table what it is of: the part `against`, verdict and sentence.
-void describeChange(const RecordingChange& change, GapReport& report);
+void describeChange(const RecordingChange& change, const identify::Thresholds& thresholds, GapReport& report);
 
 /// What both recordings share is a smooth field, each seen through its own alignment, its own noise and, at places that
 /// both have, the same errors of the rig; whether the later one saw another field beside is told by the odds of the
 /// two.
-/// @error kTooFewNodes where fewer than 8 usable places are in either, or the earlier one knows the field at fewer than
-/// 8 places of the later one; kCancelled
+/// @error kTooFewNodes where fewer than Thresholds::fewest_places usable places are in either, or the earlier one knows
+/// the field at fewer places of the later one; kCancelled
 Result<RecordingChange> changeSince(const CalibrationTable& before, const CalibrationTable& now,
-                                    const RunControl& control = {});
+                                    const identify::Thresholds& thresholds, const RunControl& control = {});
 
 }  // namespace fieldtrue::gap

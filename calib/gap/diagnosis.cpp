@@ -17,7 +17,6 @@
 #include "calib/gap/replicates.h"
 #include "calib/gap/source_shape.h"
 #include "calib/gap/verdict.h"
-#include "calib/gap/where.h"
 #include "calib/identify/sample_findings.h"
 #include "calib/identify/selection.h"
 #include "calib/recording/cleaning.h"
@@ -59,7 +58,7 @@ void addSequence(const HowFar& far, GapReport& report) {
   for (std::size_t s = 0; s < far.excess_m2.size(); ++s) report.sequence.push_back(step(s));
 }
 
-Remaining remainingOf(const HowFar& far, const identify::GapRows& rows) {
+Remaining remainingOf(const HowFar& far, const identify::GapRows& rows, const identify::Thresholds& thresholds) {
   Remaining remaining;
   remaining.fraction = far.remaining().value;
   remaining.low90 = far.remaining().low90;
@@ -76,10 +75,9 @@ Remaining remainingOf(const HowFar& far, const identify::GapRows& rows) {
   std::sort(worst.rbegin(), worst.rend());
   remaining.worst_mm = 1e3 * worst.front().first;
   remaining.worst_node = worst.front().second;
-  constexpr double kFarOut = 2.5;  // Floors.
   constexpr std::size_t kMostNamed = 10;
   for (const auto& [size_m, node] : worst) {
-    if (size_m < kFarOut * std::sqrt(far.floor_m2) || remaining.where.size() >= kMostNamed) break;
+    if (size_m < thresholds.told_place * std::sqrt(far.floor_m2) || remaining.where.size() >= kMostNamed) break;
     if (std::find(remaining.where.begin(), remaining.where.end(), node) == remaining.where.end())
       remaining.where.push_back(node);
   }
@@ -157,17 +155,11 @@ void describeAlignment(const identify::GapAlignment& alignment, const identify::
 void describeJudgement(const identify::GapSearch& search, const Judgement& judgement, std::optional<bool> known_gap,
                        GapReport& report) {
   const identify::GapRows& rows = search.physics().rows();
-  describeWhere(search, judgement.selection.model.model, report);
+  const bool has_gap = decide(search, judgement, known_gap, report);
   describeAlignment(judgement.selection.model.model.alignment, rows, report);
-  report.floor_position_mm = 1e3 * std::sqrt(judgement.far.floor_m2);
-  if (rows.has_orientation) report.floor_orientation_deg = kDegPerRad * std::sqrt(judgement.far.floor_rad2);
   report.p_value = search.structureOfNone().p_value;
   report.origin = search.structureOfNone().origin;
-  const double scattered = scatteredShare(search, rows, report);
-  const bool has_gap = known_gap.value_or(hasGap(search, judgement, scattered));
-  report.candidates = describeCandidates(search, judgement, has_gap, scattered);
   report.selected = describeSelected(search, judgement, report.candidates);
-  report.verdict = verdictOf(judgement.far, !report.selected.empty(), has_gap);
   report.rival = rivalOf(judgement);
   if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
     report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
@@ -176,7 +168,7 @@ void describeJudgement(const identify::GapSearch& search, const Judgement& judge
   if (report.source_shape && report.source_shape->shape != Shape::kUnclear)
     report.findings.push_back({"", sourceShapeText(*report.source_shape), {}});
   addSequence(judgement.far, report);
-  report.remaining = remainingOf(judgement.far, rows);
+  report.remaining = remainingOf(judgement.far, rows, search.thresholds());
 }
 
 /// Makes the recording again and again under what was found.
@@ -197,7 +189,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
                                std::optional<bool> known_gap, const RunControl& control) {
   const auto stopped = [&] { return fail(ErrorCode::kCancelled, "The diagnosis was stopped."); };
   GapReport report;
-  FT_TRY(auto rows, identify::makeGapRows(cleaned.nodes, metadata));
+  FT_TRY(auto rows, identify::makeGapRows(cleaned.nodes, metadata, options.thresholds));
   takeFromScene(scene, metadata, rows);
   FT_TRY(auto believed, believedEffects(scene, rows.excitation));
   report.names = std::move(cleaned.names);
@@ -205,10 +197,12 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   report.findings = std::move(cleaned.findings);
   control.progress(0.01);
 
-  const identify::GapSearch search(rows, std::move(believed), identify::NoiseFrom::kResiduals, control);
+  const identify::GapSearch search(rows, std::move(believed), identify::NoiseFrom::kResiduals, options.thresholds,
+                                   control);
   const bool belongs_together = addInputFindings(metadata, search, report);
   identify::EffectSelectionOptions selecting;
-  const bool has_enough = rows.place_nodes.size() >= identify::kFewestPlacesForCauses;
+  const std::size_t fewest = options.thresholds.fewest_places_for_causes;
+  const bool has_enough = rows.place_nodes.size() >= fewest;
   selecting.most_effects = has_enough && belongs_together && known_gap.value_or(true) ? options.most_effects : 0;
   const double part = options.replicates > 0 ? 0.1 : 1.0;  // Of the progress, without replicates.
   const identify::EffectSelection selection =
@@ -220,7 +214,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   control.progress(0.9 * part);
 
   describeJudgement(search, judgement, known_gap, report);
-  report.smallest_detectable = smallestDetectable(search, selecting.least_gain_first);
+  report.smallest_detectable = smallestDetectable(search);
   report.isolability = isolabilityOf(search, kStartsForIsolability, control);
   if (control.stop.stop_requested()) return stopped();
   if (belongs_together) {
@@ -231,7 +225,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   report.text = verdictText(report, known_gap ? "change" : "gap");
   if (!has_enough) {
     report.text += " Causes are not looked for: " + std::to_string(report.input.places) + " places are too few, " +
-                   std::to_string(identify::kFewestPlacesForCauses) + " are needed.";
+                   std::to_string(fewest) + " are needed.";
   }
   selectSignalFindings(report);
   if (options.replicates > 0) {
@@ -245,7 +239,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
 /// What changed since an earlier recording: nothing, or the change diagnosed as a gap is.
 Result<GapReport> diagnoseChange(const CalibrationTable& table, const simulation::Scene* scene,
                                  const DiagnosisOptions& options, const RunControl& control) {
-  FT_TRY(auto change, changeSince(*options.against, table, control));
+  FT_TRY(auto change, changeSince(*options.against, table, options.thresholds, control));
   std::optional<simulation::Scene> tracker;  // What was wrong then is believed already.
   if (scene != nullptr) {
     tracker = *scene;
@@ -253,7 +247,7 @@ Result<GapReport> diagnoseChange(const CalibrationTable& table, const simulation
   }
   FT_TRY(auto report, diagnoseRows(std::move(change.rows), change.metadata, nullptr, tracker ? &*tracker : nullptr,
                                    options, change.changed, partOf(control, 0.2, 1.0)));
-  describeChange(change, report);
+  describeChange(change, options.thresholds, report);
   return report;
 }
 

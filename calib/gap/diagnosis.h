@@ -9,6 +9,7 @@
 #include "calib/core/error.h"
 #include "calib/core/run_control.h"
 #include "calib/gap/report.h"
+#include "calib/identify/thresholds.h"
 #include "calib/simulation/scene.h"
 
 namespace fieldtrue::gap {
@@ -20,6 +21,7 @@ struct DiagnosisOptions {
   int most_effects = 4;
   int replicates = 0;      ///< How many recordings are made again under what was found, to tell how far to trust it.
   std::uint64_t seed = 1;  ///< Of those.
+  identify::Thresholds thresholds;
 };
 
 /// Where a recording differs from what the scene's simulator would have recorded, which unmodelled effect causes it,

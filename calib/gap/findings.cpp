@@ -12,19 +12,18 @@ namespace fieldtrue::gap {
 namespace {
 
 /// What is left beside the named effects and varies smoothly, where it is worth telling.
-void addRest(const Judgement& judgement, GapReport& report) {
-  constexpr double kWorthTelling = 0.1;  // Of the start's excess.
+void addRest(const Judgement& judgement, const identify::Thresholds& thresholds, GapReport& report) {
   const double start_m2 = judgement.far.excess_m2.front().value;
-  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > kWorthTelling * start_m2)) return;
+  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > thresholds.told_rest * start_m2)) return;
   report.findings.push_back({"",
                              "Beside what is named, " + shown(signedRoot_mm(judgement.rest_m2)) +
                                  " mm vary smoothly from place to place and have no name.",
                              {}});
 }
 
-void addTraces(const std::vector<identify::Trace>& traces, GapReport& report) {
+void addTraces(const std::vector<identify::Trace>& traces, const identify::Thresholds& thresholds, GapReport& report) {
   for (const identify::Trace& trace : traces)
-    if (trace.p_value < kSureTrace)
+    if (trace.p_value < thresholds.sure_trace)
       report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
 }
 
@@ -59,19 +58,19 @@ void addAssumption(const TableMetadata& metadata, GapReport& report) {
 
 /// A tolerance that is stated too small is a finding: what scatters so is no gap.
 void addStatedTooSmall(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
-  constexpr double kTold = 1.3;
+  const identify::Thresholds& thresholds = search.thresholds();
   const auto tell = [&](double seen, double said, double most, const std::string& unit) {
-    if (!(said > 0.0) || seen < kTold * said || seen > most) return;
+    if (!(said > 0.0) || seen < thresholds.told_tolerance * said || seen > most) return;
     report.findings.push_back({"",
                                "The places are less exact than stated: " + shown(seen) + " " + unit + " instead of " +
                                    shown(said) + " " + unit + " (SD per axis). That is no gap.",
                                {}});
   };
-  tell(1e3 * search.placingSd_m(), 1e3 * stated.placing_sd_m.value_or(0.0), 1e3 * identify::worstPlacing_m(stated),
-       "mm");
+  tell(1e3 * search.placingSd_m(), 1e3 * stated.placing_sd_m.value_or(0.0),
+       1e3 * identify::worstPlacing_m(stated, thresholds), "mm");
   if (stated.has_orientation)
     tell(kDegPerRad * search.placingSd_rad(), kDegPerRad * stated.placing_sd_rad.value_or(0.0),
-         kDegPerRad * identify::worstPlacing_rad(stated), "degrees");
+         kDegPerRad * identify::worstPlacing_rad(stated, thresholds), "degrees");
 }
 
 /// What scatters from place to place beyond what can be placing is told.
@@ -82,7 +81,7 @@ void addBoundOfFloor(const identify::GapSearch& search, const identify::GapRows&
     const std::string why =
         said
             ? "The tolerance that is stated is " + shown(*said) + " " + unit +
-                  ", and may be too small by a factor of " + shown(identify::kStatedTooSmall) +
+                  ", and may be too small by a factor of " + shown(search.thresholds().stated_too_small) +
                   ": the floor is held at " + shown(bound) + " " + unit +
                   ", and what is above it counts as gap. Set the jig anew at ten places: where the readings come back, "
                   "something shifts single places; where they do not, state what the jig really keeps."
@@ -128,19 +127,19 @@ void addAstray(double share, GapReport& report) {
 bool addInputFindings(const TableMetadata& metadata, const identify::GapSearch& search, GapReport& report) {
   addAssumption(metadata, report);
   const double astray = search.shareAstray();
-  const bool is_mirrored = identify::isMirrored(search.physics().rows());
+  const bool is_mirrored = identify::isMirrored(search.physics().rows(), search.thresholds());
   if (is_mirrored) {
     addMirrored(report);
-  } else if (astray > identify::kAstray) {
+  } else if (astray > search.thresholds().astray) {
     addAstray(astray, report);
   }
-  return !is_mirrored && astray <= identify::kAstray;
+  return !is_mirrored && astray <= search.thresholds().astray;
 }
 
 void addFindings(const identify::GapSearch& search, const identify::GapRows& stated, const Judgement& judgement,
                  bool has_gap, GapReport& report) {
-  if (has_gap && stated.has_dipoles) addTraces(judgement.left.traces, report);
-  addRest(judgement, report);
+  if (has_gap && stated.has_dipoles) addTraces(judgement.left.traces, search.thresholds(), report);
+  addRest(judgement, search.thresholds(), report);
   addMisfits(has_gap, stated, report);
   addStatedTooSmall(search, stated, report);
   addBoundOfFloor(search, stated, report);

@@ -134,11 +134,12 @@ double imitation(const Signature& a, const Signature& b) {
   return median({best.data(), best.data() + best.size()});
 }
 
-std::vector<std::string> adviceFor(const Isolability& isolability, const identify::GapRows& rows) {
+std::vector<std::string> adviceFor(const Isolability& isolability, const identify::GapRows& rows,
+                                   const identify::Thresholds& thresholds) {
   std::vector<std::string> advice;
   std::string same;
   for (const IsolabilityPair& pair : isolability.pairs)
-    if (pair.r2 > 0.9) same += (same.empty() ? "" : ", ") + pair.a + " from " + pair.b;
+    if (pair.r2 > thresholds.same_on_design) same += (same.empty() ? "" : ", ") + pair.a + " from " + pair.b;
   if (!same.empty()) advice.push_back("This grid cannot tell " + same + ".");
   if (!rows.several_orientations) {
     advice.push_back(
@@ -209,11 +210,11 @@ Isolability isolabilityOf(const identify::GapSearch& search, std::size_t starts_
   });
   std::stable_sort(isolability.pairs.begin(), isolability.pairs.end(),
                    [](const IsolabilityPair& a, const IsolabilityPair& b) { return a.r2 > b.r2; });
-  isolability.warnings = adviceFor(isolability, search.physics().rows());
+  isolability.warnings = adviceFor(isolability, search.physics().rows(), search.thresholds());
   return isolability;
 }
 
-std::vector<SmallestDetectable> smallestDetectable(const identify::GapSearch& search, double least_gain) {
+std::vector<SmallestDetectable> smallestDetectable(const identify::GapSearch& search) {
   const std::vector<int> one_block(search.physics().size(), 0);
   const identify::Linearized at(search.physics(), search.none().model, search.whitening(), one_block);
   const AlignmentProjector projected(at);
@@ -227,7 +228,8 @@ std::vector<SmallestDetectable> smallestDetectable(const identify::GapSearch& se
       const Eigen::MatrixXd columns = projected(at.columns(*way.fit, start));
       const double norm = columns.col(0).norm();
       const double parameters = static_cast<double>(linear.size()) + static_cast<double>(start.size());
-      if (norm > 0.0) sizes.push_back(std::sqrt(parameters * std::log(count) + least_gain) / norm);
+      if (norm > 0.0)
+        sizes.push_back(std::sqrt(parameters * std::log(count) + search.thresholds().least_gain_first) / norm);
     }
     if (sizes.empty()) continue;
     list.push_back({way.effect->id, linear.front().name, median(std::move(sizes)), linear.front().unit});

@@ -12,6 +12,6 @@ namespace fieldtrue::gap {
 Isolability isolabilityOf(const identify::GapSearch& search, std::size_t starts_each, const RunControl& control);
 
 /// The smallest size of each effect that would have been found on this design.
-std::vector<SmallestDetectable> smallestDetectable(const identify::GapSearch& search, double least_gain);
+std::vector<SmallestDetectable> smallestDetectable(const identify::GapSearch& search);
 
 }  // namespace fieldtrue::gap

@@ -6,9 +6,6 @@
 namespace fieldtrue::gap {
 namespace {
 
-constexpr double kLeastNats = 3.0;
-constexpr double kLeastShare = 0.5;
-
 std::string idOf(const identify::GapSearch& search, const identify::EffectSelection& selection, std::size_t term) {
   return search.ways()[selection.ways[term]].effect->id;
 }
@@ -73,7 +70,7 @@ class Judge {
     if (selection.ways.empty()) return;
     judgement.nats_over_unnamed = natsOf(selection.model.model, laws_.beside);
     while (selection.ways.size() > 1 && !control_.stop.stop_requested()) {
-      double least = kLeastNats;
+      double least = search_.thresholds().least_nats;
       std::optional<std::size_t> idle;
       identify::RefinedModel best_rest;
       double best_nats = 0.0;
@@ -144,10 +141,10 @@ class Judge {
     if (by_both > 0.0) judgement.named_share = by_effects / by_both;
     const bool foretells_better = judgement.unseen_gain.low90.value_or(-1.0) > 0.0;
     const bool foretells_worse = judgement.unseen_gain.high90.value_or(1.0) < 0.0;
-    const bool is_likelier = judgement.nats_over_unnamed >= kLeastNats && !foretells_worse;
+    const bool is_likelier = judgement.nats_over_unnamed >= search_.thresholds().least_nats && !foretells_worse;
     if (!foretells_better && !is_likelier)
       judgement.refusal = Refusal::kForetellsNoBetter;
-    else if (judgement.named_share < kLeastShare)
+    else if (judgement.named_share < search_.thresholds().least_share)
       judgement.refusal = Refusal::kSmallShare;
   }
 

@@ -132,7 +132,8 @@ bool proposeSeparation(const identify::GapSearch& search, const identify::Effect
   if (report.candidates.size() < 2) return false;
   const GapCandidate& first = report.candidates[0];
   const GapCandidate& second = report.candidates[1];
-  if (first.effect == "none" || second.effect == "none" || second.probability < 0.05) return false;
+  if (first.effect == "none" || second.effect == "none" || second.probability < search.thresholds().open_cause)
+    return false;
   const identify::TriedEffect* a = triedOf(search, selection, first.effect);
   const identify::TriedEffect* b = triedOf(search, selection, second.effect);
   if (a == nullptr || b == nullptr) return false;
@@ -152,7 +153,7 @@ bool proposeSeparation(const identify::GapSearch& search, const identify::Effect
       best = &proposal;
     }
   }
-  if (best == nullptr || most < 0.05) {
+  if (best == nullptr || most < search.thresholds().least_separation) {
     report.next_measurement = "No extra place or turn of the sensor would tell " + effects::labelOf(first.effect) +
                               " from " + effects::labelOf(second.effect) +
                               ": check one of them by hand, for instance a long distance with a tape measure.";

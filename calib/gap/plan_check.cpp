@@ -67,9 +67,9 @@ Result<PlanCheck> planCheck(std::span<const PlannedPlace> plan, const simulation
   simulation::Scene believed = scene != nullptr ? *scene : simulation::Scene{};
   if (scene == nullptr) believed.reference_from_tracker = defaultTransmitter(plan);
   FT_TRY(auto rows, plannedRows(plan, believed));
-  if (rows.place_nodes.size() < identify::kFewestPlacesForCauses) {
-    return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " +
-                                             std::to_string(identify::kFewestPlacesForCauses) +
+  const std::size_t fewest = identify::Thresholds{}.fewest_places_for_causes;
+  if (rows.place_nodes.size() < fewest) {
+    return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " + std::to_string(fewest) +
                                              " places; this one has " + std::to_string(rows.place_nodes.size()) + ".");
   }
   FT_TRY(auto effects, simulation::makeEffects(believed.effects, rows.excitation));

@@ -32,6 +32,8 @@ class World {
         identify::devianceOf(leftBy(search, model).structure.left, physics.rows().has_orientation, search.law()).scale;
   }
 
+  const identify::Thresholds& thresholds() const { return search_.thresholds(); }
+
   identify::GapRows drawn(std::uint64_t seed) const {
     std::mt19937_64 generator(seed);
     identify::GapRows rows = search_.physics().rows();
@@ -91,8 +93,8 @@ void addOff(const std::vector<std::pair<std::string, Eigen::Vector3d>>& first, c
 }
 
 Named namedBy(const identify::GapRows& rows, const BelievedEffects& believed, const ReplicateOptions& options,
-              const RunControl& control) {
-  const identify::GapSearch search(rows, believed());
+              const identify::Thresholds& thresholds, const RunControl& control) {
+  const identify::GapSearch search(rows, believed(), identify::NoiseFrom::kResiduals, thresholds);
   identify::EffectSelectionOptions selecting;
   selecting.most_effects = options.most_effects;
   const Judgement judgement = judge(search, identify::selectEffects(search, selecting, control), control);
@@ -119,7 +121,7 @@ class Replicator {
       if (is_late || control_.stop.stop_requested()) return;
       RunControl quiet;
       quiet.stop = control_.stop;
-      all[k] = namedBy(world.drawn(seed + k), believed_, options_, quiet);
+      all[k] = namedBy(world.drawn(seed + k), believed_, options_, world.thresholds(), quiet);
       control_.progress(from + (to - from) * static_cast<double>(++done) / static_cast<double>(wanted));
     });
     std::erase_if(all, [](const Named& one) { return !one.is_done; });

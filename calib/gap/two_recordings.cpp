@@ -10,12 +10,13 @@
 
 namespace fieldtrue::gap {
 
-Result<std::unique_ptr<Recording>> recordingOf(const CalibrationTable& table) {
+Result<std::unique_ptr<Recording>> recordingOf(const CalibrationTable& table, const identify::Thresholds& thresholds) {
   auto recording = std::make_unique<Recording>();
   recording->cleaned = recording::cleanRows(table);
-  FT_TRY(recording->rows, identify::makeGapRows(recording->cleaned.nodes, table.metadata));
+  FT_TRY(recording->rows, identify::makeGapRows(recording->cleaned.nodes, table.metadata, thresholds));
   recording->search =
-      std::make_unique<identify::GapSearch>(recording->rows, std::vector<std::unique_ptr<field::PhysicalEffect>>{});
+      std::make_unique<identify::GapSearch>(recording->rows, std::vector<std::unique_ptr<field::PhysicalEffect>>{},
+                                            identify::NoiseFrom::kResiduals, thresholds);
   return recording;
 }
 

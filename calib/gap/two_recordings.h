@@ -18,8 +18,8 @@ struct Recording {
   std::unique_ptr<identify::GapSearch> search;
 };
 
-/// @error kTooFewNodes below 8 usable places
-Result<std::unique_ptr<Recording>> recordingOf(const CalibrationTable& table);
+/// @error kTooFewNodes below Thresholds::fewest_places usable places
+Result<std::unique_ptr<Recording>> recordingOf(const CalibrationTable& table, const identify::Thresholds& thresholds);
 
 /// The alignments of the earlier and of the later recording.
 struct Alignments {

@@ -95,9 +95,9 @@ class FoldFitter {
     const auto others = starts.begin() + static_cast<std::ptrdiff_t>(std::min(starts.size(), kSearchedAFold));
     starts.erase(std::stable_partition(others, starts.end(), is_own), starts.end());
     const double base = search_.bicOf(model, used);
-    double best = base - (step == 0 ? identify::EffectSelectionOptions{}.least_gain_first
-                                    : identify::EffectSelectionOptions{}.least_gain_more) *
-                             n / static_cast<double>(used.size() * static_cast<std::size_t>(channels()));
+    const identify::Thresholds& thresholds = search_.thresholds();
+    double best = base - (step == 0 ? thresholds.least_gain_first : thresholds.least_gain_more) * n /
+                             static_cast<double>(used.size() * static_cast<std::size_t>(channels()));
     const identify::GapModel before = search_.seenFrom(model);
     bool is_added = false;
     for (const Start& start : starts) {

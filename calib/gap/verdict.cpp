@@ -6,18 +6,15 @@
 #include "calib/core/file_io.h"
 #include "calib/core/units.h"
 #include "calib/effects/registry.h"
+#include "calib/gap/candidates.h"
+#include "calib/gap/where.h"
 
 namespace fieldtrue::gap {
 namespace {
 
-/// BIC gain of an effect that is there although it gets no name: at the edge of the places it bends so few that the
-/// others cannot foretell it.
-constexpr double kSureUnselected = 40.0;
-
 /// What of a scatter stands above what may be noise, over what of the gap does; squares per axis.
-double shareAbove(double scatter, double bound, double gap_rms) {
-  constexpr double kClearly = 1.2;
-  if (scatter <= kClearly * bound) return 0.0;
+double shareAbove(double scatter, double bound, double gap_rms, const identify::Thresholds& thresholds) {
+  if (scatter <= thresholds.clearly_scattered * bound) return 0.0;
   const double gap_excess = gap_rms * gap_rms / 3.0 - bound * bound;
   const double left_excess = scatter * scatter - bound * bound;
   return gap_excess > left_excess ? left_excess / gap_excess : 1.0;
@@ -73,29 +70,44 @@ std::string fallText(const GapReport& report) {
 }  // namespace
 
 double scatteredShare(const identify::GapSearch& search, const identify::GapRows& stated, const GapReport& report) {
-  double share = shareAbove(search.placingSd_m(), identify::worstPlacing_m(stated), 1e-3 * report.position_rms_mm);
+  const identify::Thresholds& thresholds = search.thresholds();
+  double share = shareAbove(search.placingSd_m(), identify::worstPlacing_m(stated, thresholds),
+                            1e-3 * report.position_rms_mm, thresholds);
   if (report.orientation_rms_deg)
-    share = std::max(share, shareAbove(search.placingSd_rad(), identify::worstPlacing_rad(stated),
-                                       *report.orientation_rms_deg / kDegPerRad));
+    share = std::max(share, shareAbove(search.placingSd_rad(), identify::worstPlacing_rad(stated, thresholds),
+                                       *report.orientation_rms_deg / kDegPerRad, thresholds));
   return share;
 }
 
 bool hasGap(const identify::GapSearch& search, const Judgement& judgement, double scattered_share) {
-  constexpr double kSureOfNothingNamed = 1e-6;  // F tests of many columns are a little too sure.
-  constexpr double kSureNats = 24.0;
+  const identify::Thresholds& thresholds = search.thresholds();
   const std::vector<identify::TriedEffect>& first = judgement.selection.first;
-  const bool is_any_sure = std::any_of(first.begin(), first.end(), [](const auto& one) {
-    return !one.refined.model.terms.empty() && one.bic_gain > kSureUnselected;
+  const bool is_any_sure = std::any_of(first.begin(), first.end(), [&](const auto& one) {
+    return !one.refined.model.terms.empty() && one.bic_gain > thresholds.sure_unselected;
   });
   return !judgement.selection.ways.empty() || scattered_share > 0.0 || is_any_sure ||
-         search.structureOfNone().p_value < kSureOfNothingNamed || judgement.unnamed_nats > kSureNats;
+         search.structureOfNone().p_value < thresholds.sure_of_structure ||
+         judgement.unnamed_nats > thresholds.sure_nats;
 }
 
-GapVerdict verdictOf(const HowFar& far, bool has_effect, bool has_gap) {
+GapVerdict verdictOf(const HowFar& far, bool has_effect, bool has_gap, const identify::Thresholds& thresholds) {
   if (!has_effect) return has_gap ? GapVerdict::kUnexplained : GapVerdict::kNoGap;
   const double surely_left = far.remaining().low90.value_or(0.0);
-  if (surely_left > 0.5) return GapVerdict::kUnexplained;
-  return surely_left > 0.15 ? GapVerdict::kPartlyExplained : GapVerdict::kExplained;
+  if (surely_left > thresholds.unexplained_left) return GapVerdict::kUnexplained;
+  return surely_left > thresholds.partly_left ? GapVerdict::kPartlyExplained : GapVerdict::kExplained;
+}
+
+bool decide(const identify::GapSearch& search, const Judgement& judgement, std::optional<bool> known_gap,
+            GapReport& report) {
+  const identify::GapRows& rows = search.physics().rows();
+  describeWhere(search, judgement.selection.model.model, report);
+  report.floor_position_mm = 1e3 * std::sqrt(judgement.far.floor_m2);
+  if (rows.has_orientation) report.floor_orientation_deg = kDegPerRad * std::sqrt(judgement.far.floor_rad2);
+  const double scattered = scatteredShare(search, rows, report);
+  const bool has_gap = known_gap.value_or(hasGap(search, judgement, scattered));
+  report.candidates = describeCandidates(search, judgement, has_gap, scattered);
+  report.verdict = verdictOf(judgement.far, !judgement.selection.ways.empty(), has_gap, search.thresholds());
+  return has_gap;
 }
 
 std::string shown(double value) {

@@ -7,9 +7,6 @@
 
 namespace fieldtrue::gap {
 
-/// A trace of what no catalogue holds is told from here on.
-inline constexpr double kSureTrace = 1e-5;
-
 /// How much of the gap's square scatters from place to place beyond the floor, 0 to 1: a tolerance that is a little too
 /// small is no gap, and neither is what a person with a jig does where none is stated.
 /// @param stated the rows as the table and the scene state them
@@ -18,9 +15,15 @@ double scatteredShare(const identify::GapSearch& search, const identify::GapRows
 /// Whether anything stands out of the floor: smooth, or scattered.
 bool hasGap(const identify::GapSearch& search, const Judgement& judgement, double scattered_share);
 
-/// Unexplained where nothing is named or surely more than half of the excess is left on places that no fit saw; partly
-/// explained where surely more than 15 % is.
-GapVerdict verdictOf(const HowFar& far, bool has_effect, bool has_gap);
+/// Unexplained where nothing is named or surely too much of the excess is left on places that no fit saw; partly
+/// explained where surely less of it is.
+GapVerdict verdictOf(const HowFar& far, bool has_effect, bool has_gap, const identify::Thresholds& thresholds);
+
+/// Verdict and candidates of what was judged, where the gap lies, and how large gap and floor are.
+/// @param known_gap whether there is a gap, where that is known already
+/// @return whether there is one
+bool decide(const identify::GapSearch& search, const Judgement& judgement, std::optional<bool> known_gap,
+            GapReport& report);
 
 /// A figure as the sentences of a diagnosis show it.
 std::string shown(double value);

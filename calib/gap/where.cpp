@@ -203,7 +203,7 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
     node.excess = std::sqrt(std::max(0.0, d2 / channels - 1.0));
     report.nodes.push_back(node);
   }
-  const std::vector<char> flagged = discoveries(p, 0.05);
+  const std::vector<char> flagged = discoveries(p, search.thresholds().false_discoveries);
   for (std::size_t i = 0; i < flagged.size(); ++i) report.nodes[i].is_flagged = flagged[i] != 0;
   const auto n = static_cast<double>(before.size());
   report.position_rms_mm = 1e3 * std::sqrt(gap_m2 / n);

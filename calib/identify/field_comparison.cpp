@@ -119,13 +119,13 @@ double logMean(std::span<const double> logs) {
 
 /// The smallest size of a change as wide as half the region that is to be expected to show: directions of visibility s
 /// bring log odds of (s - log(1 + s)) / 2 each, in three components.
-double leastShown(const SharedField& unchanged, double length_m, double noise, double log_tried) {
+double leastShown(const SharedField& unchanged, double length_m, double noise, double log_odds) {
   constexpr double kStep = 1.1;
   const Eigen::ArrayXd of_one = unchanged.visibilityOf({{.length_m = length_m, .by_place = 1.0}});
   double size = 0.1 * noise;
   for (; size < 1e3 * noise; size *= kStep) {
     const Eigen::ArrayXd s = size * size * of_one;
-    if (1.5 * (s - (1.0 + s).log()).sum() >= kSureOfChange + log_tried) break;
+    if (1.5 * (s - (1.0 + s).log()).sum() >= log_odds) break;
   }
   return size;
 }
@@ -169,7 +169,7 @@ SharedLaw likeliestSharedLaw(const FieldReadings& readings, const SmoothParts& p
 }
 
 FieldComparison compareFields(const FieldReadings& readings, const SmoothParts& parts, double pitch_m,
-                              const RunControl& control) {
+                              const Thresholds& thresholds, const RunControl& control) {
   constexpr int kDeals = 8;
   constexpr unsigned kSeed = 1;
   FieldComparison found;
@@ -197,7 +197,7 @@ FieldComparison compareFields(const FieldReadings& readings, const SmoothParts& 
     found.log_odds -= by_chance;
   }
   found.least_shown = leastShown(unchanged, 0.5 * extentOf(readings), std::sqrt(readings.variances.mean()),
-                                 std::log(static_cast<double>(odds.size())));
+                                 thresholds.sure_of_change + std::log(static_cast<double>(odds.size())));
   return found;
 }
 

@@ -2,6 +2,7 @@
 
 #include "calib/core/run_control.h"
 #include "calib/identify/shared_field.h"
+#include "calib/identify/thresholds.h"
 
 namespace fieldtrue::identify {
 
@@ -18,12 +19,8 @@ struct FieldComparison {
   double least_shown = 0.0;  ///< SD of a change that these readings would show, in the unit of the values.
 };
 
-/// Log odds that no unchanged field gives by chance more often than once in a hundred recordings.
-/// @source Markov's inequality: were nothing changed, odds of k or more come at most once in k
-constexpr double kSureOfChange = 4.605;
-
 /// @param pitch_m a change varies over no less than one and a half times this
 FieldComparison compareFields(const FieldReadings& readings, const SmoothParts& parts, double pitch_m,
-                              const RunControl& control = {});
+                              const Thresholds& thresholds = {}, const RunControl& control = {});
 
 }  // namespace fieldtrue::identify

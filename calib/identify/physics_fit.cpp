@@ -203,7 +203,7 @@ PhysicsFit noPhysics(PhysicsFit fit, std::string why) {
 Result<PhysicsFit> fitPhysics(const CalibrationTable& table, const PhysicsFitOptions& options,
                               const RunControl& control) {
   const auto rows = makeGapRows(recording::cleanRows(table).nodes, table.metadata);
-  if (!rows || rows->place_nodes.size() < kFewestPlacesForCauses)
+  if (!rows || rows->place_nodes.size() < Thresholds{}.fewest_places_for_causes)
     return noPhysics({}, "there are fewer places than a cause can be told from");
   const GapSearch search(*rows, {});
   EffectSelectionOptions selecting;

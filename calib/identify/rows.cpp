@@ -12,8 +12,6 @@
 namespace fieldtrue::identify {
 namespace {
 
-constexpr std::size_t kFewestPlaces = 8;
-
 /// How many clearly different orientations the rig states.
 int countOrientations(std::span<const GapRow> rows) {
   constexpr double kDifferent_rad = 0.17;
@@ -44,7 +42,7 @@ GapRow rowOf(const Node& node) {
 
 }  // namespace
 
-Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& metadata) {
+Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& metadata, const Thresholds& thresholds) {
   GapRows table;
   table.has_orientation = std::all_of(nodes.begin(), nodes.end(), [](const Node& n) { return n.has_orientation; });
   table.has_times = std::all_of(nodes.begin(), nodes.end(), [](const Node& n) { return n.t_start_s.has_value(); });
@@ -60,10 +58,10 @@ Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& me
     row.sensor = static_cast<std::size_t>(std::distance(sensors.begin(), sensors.find(node.sensor)));
     table.rows.push_back(row);
   }
-  if (table.place_nodes.size() < kFewestPlaces) {
-    return fail(ErrorCode::kTooFewNodes, "The gap is looked for with at least " + std::to_string(kFewestPlaces) +
-                                             " places; the table has " + std::to_string(table.place_nodes.size()) +
-                                             ".");
+  if (table.place_nodes.size() < thresholds.fewest_places) {
+    return fail(ErrorCode::kTooFewNodes, "The gap is looked for with at least " +
+                                             std::to_string(thresholds.fewest_places) + " places; the table has " +
+                                             std::to_string(table.place_nodes.size()) + ".");
   }
   table.n_orientations = countOrientations(table.rows);
   table.several_orientations = table.n_orientations > 1;
@@ -79,12 +77,14 @@ Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& me
   return table;
 }
 
-double worstPlacing_m(const GapRows& rows) {
-  return rows.placing_sd_m ? std::max(kBestPlacing_m, kStatedTooSmall * *rows.placing_sd_m) : kWorstPlacing_m;
+double worstPlacing_m(const GapRows& rows, const Thresholds& thresholds) {
+  if (!rows.placing_sd_m) return thresholds.worst_placing_m;
+  return std::max(thresholds.best_placing_m, thresholds.stated_too_small * *rows.placing_sd_m);
 }
 
-double worstPlacing_rad(const GapRows& rows) {
-  return rows.placing_sd_rad ? std::max(kBestPlacing_rad, kStatedTooSmall * *rows.placing_sd_rad) : kWorstPlacing_rad;
+double worstPlacing_rad(const GapRows& rows, const Thresholds& thresholds) {
+  if (!rows.placing_sd_rad) return thresholds.worst_placing_rad;
+  return std::max(thresholds.best_placing_rad, thresholds.stated_too_small * *rows.placing_sd_rad);
 }
 
 Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad) {
@@ -99,8 +99,7 @@ Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad) 
   return noise;
 }
 
-bool isMirrored(const GapRows& table) {
-  constexpr double kFarBetter = 0.3;
+bool isMirrored(const GapRows& table, const Thresholds& thresholds) {
   Eigen::Vector3d middle_true_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d middle_tracked_m = Eigen::Vector3d::Zero();
   const auto n = static_cast<double>(table.rows.size());
@@ -120,7 +119,7 @@ bool isMirrored(const GapRows& table) {
   if (cross.determinant() >= 0.0) return false;
   const double mirrored = squares - 2.0 * svd.singularValues().sum();
   const double turned = mirrored + 4.0 * svd.singularValues()[2];
-  return mirrored < kFarBetter * kFarBetter * turned;
+  return mirrored < thresholds.mirrored * thresholds.mirrored * turned;
 }
 
 namespace {

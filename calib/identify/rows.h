@@ -7,6 +7,7 @@
 #include "calib/core/calibration_table.h"
 #include "calib/core/error.h"
 #include "calib/effects/effect_fit.h"
+#include "calib/identify/thresholds.h"
 
 namespace fieldtrue::identify {
 
@@ -50,33 +51,21 @@ struct GapRows {
   int channels() const { return has_orientation ? 6 : 3; }  ///< Residuals a row.
 };
 
-/// From how many places on causes can be told apart; with fewer there is noise to tell, and whether there is a gap.
-constexpr std::size_t kFewestPlacesForCauses = 12;
-
-/// The most that a person with a jig errs by, SD per axis, where no tolerance is stated: a foot set on its mark within
-/// a finger's breadth (20 mm, two SD) and turned and held upright by eye within ten degrees (two SD). What scatters
-/// more than that is no placing, whatever it is, and stays above the floor.
-constexpr double kWorstPlacing_m = 0.010;
-constexpr double kWorstPlacing_rad = 0.087;
-/// A tolerance that is stated at most so much too small is a finding; what scatters more is no placing.
-constexpr double kStatedTooSmall = 2.2;
-/// No jig is set better than this, SD per axis, whatever is stated.
-constexpr double kBestPlacing_m = 0.0002;
-constexpr double kBestPlacing_rad = 0.001;
-/// The most that may be placing, SD per axis.
-double worstPlacing_m(const GapRows& rows);
-double worstPlacing_rad(const GapRows& rows);
+/// The most that may be placing, SD per axis: what scatters more is none, whatever it is, and stays above the floor.
+double worstPlacing_m(const GapRows& rows, const Thresholds& thresholds);
+double worstPlacing_rad(const GapRows& rows, const Thresholds& thresholds);
 
 /// @param nodes rows that count, cleaned
-/// @error kTooFewNodes below 8 places
-Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& metadata);
+/// @error kTooFewNodes below Thresholds::fewest_places
+Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& metadata,
+                            const Thresholds& thresholds = {});
 
 /// Noise covariance of one row: samples, placing and quantum; position [m^2] before rotation [rad^2].
 Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad);
 
 /// Whether tracked positions fit a mirror image of the true ones far better than any turn of them.
 /// @source Umeyama 1991, IEEE PAMI 13 376, the sign of the determinant
-bool isMirrored(const GapRows& rows);
+bool isMirrored(const GapRows& rows, const Thresholds& thresholds = {});
 
 /// Eight blocks of places by the octant of their true position about the median, those of fewer than `fewest` places
 /// joined with the smallest other; for each row its block.

@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kGuessedPlacing_m = 1e-3;
 constexpr double kGuessedPlacing_rad = 3e-3;
-constexpr double kImplausibleCost = 12.0;  // In BIC units.
 
 double pitchOf_m(std::span<const field::SensorSetting> settings) {
   std::vector<double> nearest_m;
@@ -31,8 +30,8 @@ double pitchOf_m(std::span<const field::SensorSetting> settings) {
 }  // namespace
 
 GapSearch::GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed, NoiseFrom noise,
-                     const RunControl& control)
-    : rows_(rows), physics_(rows, std::move(believed)), space_blocks_(octantBlocks(rows)) {
+                     const Thresholds& thresholds, const RunControl& control)
+    : rows_(rows), thresholds_(thresholds), physics_(rows, std::move(believed)), space_blocks_(octantBlocks(rows)) {
   time_blocks_ = rows.has_times ? timeBlocks(rows) : space_blocks_;
   none_.model.alignment = initialAlignment(rows);
   placing_sd_m_ = rows.placing_sd_m.value_or(kGuessedPlacing_m);
@@ -171,9 +170,9 @@ double GapSearch::whitenedUnit_mm() const {
   return 1e3 * std::sqrt(sum_m2 / static_cast<double>(rows_.rows.size()));
 }
 
-double GapSearch::floorPlacingSd_m() const { return std::min(placing_sd_m_, worstPlacing_m(rows_)); }
+double GapSearch::floorPlacingSd_m() const { return std::min(placing_sd_m_, worstPlacing_m(rows_, thresholds_)); }
 
-double GapSearch::floorPlacingSd_rad() const { return std::min(placing_sd_rad_, worstPlacing_rad(rows_)); }
+double GapSearch::floorPlacingSd_rad() const { return std::min(placing_sd_rad_, worstPlacing_rad(rows_, thresholds_)); }
 
 double GapSearch::shareAstray() const {
   const std::vector<Pose> predicted = physics_.predictions(none_.model);
@@ -307,7 +306,7 @@ void GapSearch::finish(TriedEffect& tried, double base_bic) const {
   tried.model = tried.refined.model;
   const GapTerm& term = tried.model.terms.back();
   tried.fitted = term.fit->describe(term.searched, term.linear);
-  tried.bic_gain = base_bic - bicOf(tried.model) - (tried.fitted.is_plausible ? 0.0 : kImplausibleCost);
+  tried.bic_gain = base_bic - bicOf(tried.model) - (tried.fitted.is_plausible ? 0.0 : thresholds_.implausible_cost);
   if (term.effect->share_to_win > 0.0) tried.bic_gain -= term.effect->share_to_win * std::max(0.0, tried.bic_gain);
 }
 
@@ -351,7 +350,7 @@ std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunCont
     if (!one.refined.model.terms.empty()) continue;
     const GapTerm& term = one.model.terms.back();
     one.fitted = term.fit->describe(term.searched, term.linear);
-    if (!one.fitted.is_plausible) one.bic_gain -= kImplausibleCost;
+    if (!one.fitted.is_plausible) one.bic_gain -= thresholds_.implausible_cost;
   }
   std::stable_sort(tried.begin(), tried.end(), better);
   std::vector<TriedEffect> of_each;

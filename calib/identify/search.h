@@ -33,9 +33,6 @@ struct TriedEffect {
 };
 
 /// Whether the rig's tolerance is taken as stated or as the flexible fit of the residuals shows it.
-/// From here on true and tracked positions are not of the same places: steel floors reach 0.2, rows in another order 1.
-constexpr double kAstray = 0.4;
-
 enum class NoiseFrom { kResiduals, kStated };
 
 /// What is common to all models of one recording, and the search among them.
@@ -43,11 +40,14 @@ class GapSearch {
  public:
   /// @param rows outlives the search
   GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed,
-            NoiseFrom noise = NoiseFrom::kResiduals, const RunControl& control = {});
+            NoiseFrom noise = NoiseFrom::kResiduals, const Thresholds& thresholds = {}, const RunControl& control = {});
   GapSearch(const GapSearch&) = delete;
   GapSearch& operator=(const GapSearch&) = delete;
 
   const GapPhysics& physics() const { return physics_; }
+  const Thresholds& thresholds() const { return thresholds_; }
+  /// Decides by others from here on; noise and alignment depend on none.
+  void decideBy(const Thresholds& thresholds) { thresholds_ = thresholds; }
   const Whitening& whitening() const { return whitening_; }
   const ResidualLaw& law() const { return law_; }
   std::span<const EffectWay> ways() const { return ways_; }
@@ -104,6 +104,7 @@ class GapSearch {
   void finish(TriedEffect& tried, double base_bic) const;
 
   const GapRows& rows_;
+  Thresholds thresholds_;
   GapPhysics physics_;
   std::vector<int> space_blocks_;
   std::vector<int> time_blocks_;

@@ -10,13 +10,13 @@ namespace {
 class Selector {
  public:
   Selector(const GapSearch& search, const EffectSelectionOptions& options, const RunControl& control)
-      : search_(search), options_(options), control_(control) {}
+      : search_(search), thresholds_(search.thresholds()), options_(options), control_(control) {}
 
   EffectSelection run() {
     none_bic_ = search_.bicOf(search_.none().model);
     if (options_.most_effects < 1) return finished({}, {});
     const std::vector<TriedEffect> first = search_.rank(search_.none(), control_);
-    const TriedEffect* best = firstWorth(first, options_.least_gain_first);
+    const TriedEffect* best = firstWorth(first, thresholds_.least_gain_first);
     if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);
     EffectSelection selection = grown(*best);
     const TriedEffect* other = firstOfOtherKind(first, *best);
@@ -54,7 +54,7 @@ class Selector {
       selection = std::move(grown);
       if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
       following = search_.rank(selection.model, control_);
-      next = firstWorth(following, options_.least_gain_more);
+      next = firstWorth(following, thresholds_.least_gain_more);
     }
     selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
     return selection;
@@ -63,10 +63,9 @@ class Selector {
   /// One flexible thing in the room can pass for two errors of the instrument, and the other way round: the best of the
   /// other kind is worth a start of its own where it explains a good part.
   const TriedEffect* firstOfOtherKind(const std::vector<TriedEffect>& tried, const TriedEffect& best) const {
-    constexpr double kGoodPart = 0.4;
     const auto is_in_room = [&](const TriedEffect& one) { return one.fitted.location_m.has_value(); };
     for (const TriedEffect& one : tried) {
-      if (one.bic_gain < std::max(options_.least_gain_first, kGoodPart * best.bic_gain)) break;
+      if (one.bic_gain < std::max(thresholds_.least_gain_first, thresholds_.other_kind_share * best.bic_gain)) break;
       if (is_in_room(one) != is_in_room(best) && one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
     }
     return nullptr;
@@ -84,7 +83,8 @@ class Selector {
 
   /// What growing lowers: the criterion, and for each effect what it must at least be worth.
   double priceOf(const EffectSelection& selection) const {
-    return search_.bicOf(selection.model.model) + options_.least_gain_more * static_cast<double>(selection.ways.size());
+    return search_.bicOf(selection.model.model) +
+           thresholds_.least_gain_more * static_cast<double>(selection.ways.size());
   }
 
   void add(const TriedEffect& tried, EffectSelection& selection) const {
@@ -104,7 +104,7 @@ class Selector {
       const std::vector<TriedEffect> tried = search_.rank(rest, control_);
       if (tried.empty()) return;
       const TriedEffect* best = firstWorth(tried, 0.0);
-      if (best == nullptr || search_.bicOf(best->model) > bic - 2.0) continue;
+      if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) continue;
       selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
       selection.model = best->refined.model.terms.empty() ? search_.refined(best->model) : best->refined;
       selection.ways.push_back(best->way);
@@ -115,7 +115,7 @@ class Selector {
   void prune(EffectSelection& selection) {
     while (selection.ways.size() > 1) {
       const double bic = search_.bicOf(selection.model.model);
-      double least = options_.least_gain_more;
+      double least = thresholds_.least_gain_more;
       std::optional<std::size_t> cheapest;
       RefinedModel best_rest;
       for (std::size_t term = 0; term < selection.ways.size(); ++term) {
@@ -144,7 +144,7 @@ class Selector {
       tried.model = selection.model.model;
       tried.bic_gain = gain;
     }
-    const TriedEffect* best = firstWorth(selection.alternatives, gain + 2.0);
+    const TriedEffect* best = firstWorth(selection.alternatives, gain + thresholds_.least_gain_exchange);
     if (best == nullptr || search_.ways()[best->way].effect == effect) return;
     selection.ways.clear();
     add(*best, selection);
@@ -166,13 +166,14 @@ class Selector {
     selection.alternatives = search_.rank(rest, control_);
     const double bic = search_.bicOf(selection.model.model);
     const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
-    if (best == nullptr || search_.bicOf(best->model) > bic - 2.0) return;
+    if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) return;
     selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(selection.leading));
     add(*best, selection);
     selection.leading = selection.ways.size() - 1;
   }
 
   const GapSearch& search_;
+  const Thresholds& thresholds_;
   const EffectSelectionOptions& options_;
   const RunControl& control_;
   double none_bic_ = 0.0;

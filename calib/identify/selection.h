@@ -18,8 +18,6 @@ struct EffectSelection {
 
 struct EffectSelectionOptions {
   int most_effects = 4;
-  double least_gain_first = 8.0;  ///< BIC gain that the first effect needs.
-  double least_gain_more = 14.0;  ///< And every further one.
 };
 
 EffectSelection selectEffects(const GapSearch& search, const EffectSelectionOptions& options,

@@ -65,9 +65,11 @@ class FloorBoundTest : public QObject {
     QVERIFY(tellsOf(report, kHeld));
     QVERIFY(tellsOf(report, unit.toStdString() + " (SD per axis)"));
     // The bound per axis, three axes; the readings' own noise is far below it.
-    if (moved_m > 0.0) QVERIFY(report.floor_position_mm < 1.1e3 * std::sqrt(3.0) * identify::kWorstPlacing_m);
+    if (moved_m > 0.0)
+      QVERIFY(report.floor_position_mm < 1.1e3 * std::sqrt(3.0) * identify::Thresholds{}.worst_placing_m);
     if (turned_rad > 0.0) {
-      QVERIFY(*report.floor_orientation_deg < 1.1 * std::sqrt(3.0) * identify::kWorstPlacing_rad / kDegree);
+      QVERIFY(*report.floor_orientation_deg <
+              1.1 * std::sqrt(3.0) * identify::Thresholds{}.worst_placing_rad / kDegree);
       if (moved_m == 0.0) QVERIFY2(report.text.find("degrees") != std::string::npos, report.text.c_str());
       QVERIFY(*report.orientation_rms_deg > 4.0 * *report.floor_orientation_deg);
     }

@@ -56,16 +56,18 @@ class SelectionTest : public QObject {
       const RefinedModel rest = search.refined(withoutTerm(seen.model.model, term));
       const double cost = search.bicOf(rest.model) - bic;
       // Nothing is left to drop, nothing to exchange: the two things that it ends with.
-      QVERIFY2(cost >= options.least_gain_more, qPrintable(QString::number(cost)));
+      QVERIFY2(cost >= search.thresholds().least_gain_more, qPrintable(QString::number(cost)));
       most = std::max(most, cost);
       if (term == seen.leading) FT_VERIFY_MATCH(near(cost, most, 1e-6));
       for (const TriedEffect& other : search.rank(rest, {}))
         if (other.fitted.is_plausible && other.held_out_gain > 0.0)
-          QVERIFY2(search.bicOf(other.model) > bic - 2.0, search.ways()[other.way].effect->id.c_str());
+          QVERIFY2(search.bicOf(other.model) > bic - search.thresholds().least_gain_exchange,
+                   search.ways()[other.way].effect->id.c_str());
     }
     // Nor to add.
     for (const TriedEffect& more : search.rank(seen.model, {}))
-      QVERIFY(more.bic_gain < options.least_gain_more || !more.fitted.is_plausible || more.held_out_gain <= 0.0);
+      QVERIFY(more.bic_gain < search.thresholds().least_gain_more || !more.fitted.is_plausible ||
+              more.held_out_gain <= 0.0);
   }
 
   void findsNothingInNoise() {
@@ -98,9 +100,9 @@ class SelectionTest : public QObject {
     const GapSearch search(rows, {});
     const EffectSelection free = selectEffects(search, {}, {});
     QCOMPARE(namesOf(free), QString("grid_scale"));
-    EffectSelectionOptions dear;
+    Thresholds dear;
     dear.least_gain_first = free.first.front().bic_gain + 1.0;
-    const EffectSelection seen = selectEffects(search, dear, {});
+    const EffectSelection seen = selectEffects(GapSearch(rows, {}, NoiseFrom::kResiduals, dear), {}, {});
     QCOMPARE(namesOf(seen), QString());
     QCOMPARE(seen.first.size(), free.first.size());
   }

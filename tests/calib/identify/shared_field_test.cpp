@@ -157,7 +157,7 @@ class SharedFieldTest : public QObject {
     QVERIFY2(none.log_odds < 0.0, std::to_string(none.log_odds).c_str());
     const FieldReadings changed = pairOf(0.008);
     const FieldComparison some = compareFields(changed, {}, 0.2);
-    QVERIFY2(some.log_odds > kSureOfChange, std::to_string(some.log_odds).c_str());
+    QVERIFY2(some.log_odds > Thresholds{}.sure_of_change, std::to_string(some.log_odds).c_str());
     const SharedField field(changed, some.earlier, some.change);
     const auto at = [&](double x) {
       return field.changeAt({Eigen::Vector3d::Constant(x), Eigen::Quaterniond::Identity(), 0.0});
@@ -173,8 +173,10 @@ class SharedFieldTest : public QObject {
     int small_shown = 0;
     int large_shown = 0;
     for (unsigned seed = 1; seed <= kChanges; ++seed) {
-      small_shown += compareFields(changedBy(least / 3.0, seed), {}, 0.2).log_odds > kSureOfChange ? 1 : 0;
-      large_shown += compareFields(changedBy(3.0 * least, seed), {}, 0.2).log_odds > kSureOfChange ? 1 : 0;
+      small_shown +=
+          compareFields(changedBy(least / 3.0, seed), {}, 0.2).log_odds > Thresholds{}.sure_of_change ? 1 : 0;
+      large_shown +=
+          compareFields(changedBy(3.0 * least, seed), {}, 0.2).log_odds > Thresholds{}.sure_of_change ? 1 : 0;
     }
     QCOMPARE(small_shown, 0);
     QVERIFY2(large_shown >= kChanges - 1, std::to_string(large_shown).c_str());
