@@ -142,13 +142,14 @@ std::string isolabilityText(const gap::Isolability& isolability) {
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const gap::IsolabilityPair& a, const gap::IsolabilityPair& b) { return a.r2 > b.r2; });
   const identify::Thresholds thresholds;
-  std::vector<Row> rows{{"effect", "and effect", "R2", ""}};
+  std::vector<Row> rows{{"effect", "and effect", "R2", "told apart from", ""}};
   for (const gap::IsolabilityPair& pair : pairs) {
     if (pair.r2 < kSmallestR2 || rows.size() > kMostPairs) break;
     const std::string told = pair.r2 > thresholds.same_on_design   ? "cannot be told apart"
                              : pair.r2 > thresholds.hard_on_design ? "hard to tell apart"
                                                                    : "";
-    rows.push_back({pair.a, pair.b, fixedText(pair.r2, 3), told});
+    const std::string from = pair.told_apart_from ? fixedText(*pair.told_apart_from, 1) + " x noise" : "no strength";
+    rows.push_back({pair.a, pair.b, fixedText(pair.r2, 3), from, told});
   }
   const std::size_t apart = pairs.size() + 1 - rows.size();
   std::string text = rows.size() > 1 ? alignedColumns(rows) : "";

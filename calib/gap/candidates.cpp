@@ -210,6 +210,31 @@ void joinExactTwins(const identify::Thresholds& thresholds, std::vector<GapCandi
   }
 }
 
+double unknownShareOf(const GapCandidate& c, const identify::Thresholds& thresholds) {
+  if (c.effect == "none") return thresholds.unknown_as_none;
+  if (isNameless(c.effect)) return 0.0;
+  return c.location_m ? thresholds.unknown_as_thing : thresholds.unknown_as_other;
+}
+
+/// What the catalogue does not hold is taken for a cause that it holds, or for nothing, in part of all recordings: that
+/// part of the probability goes to a cause without a name, which does not become the first by it.
+void leaveRoomForTheUnknown(const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
+  const auto by_probability = [](const GapCandidate& a, const GapCandidate& b) {
+    return a.probability < b.probability;
+  };
+  const auto first = std::max_element(candidates.begin(), candidates.end(), by_probability);
+  const auto unnamed = std::find_if(candidates.begin(), candidates.end(),
+                                    [](const GapCandidate& c) { return c.effect == kUnnamedSmooth; });
+  if (unnamed == candidates.end() || first == unnamed) return;
+  double unknown = 0.0;
+  for (const GapCandidate& c : candidates) unknown += unknownShareOf(c, thresholds) * c.probability;
+  const double lead = first->probability - unnamed->probability;
+  const double closing = unknown + unknownShareOf(*first, thresholds) * first->probability;
+  const double part = closing < lead ? 1.0 : 0.999 * lead / closing;
+  for (GapCandidate& c : candidates) c.probability *= 1.0 - part * unknownShareOf(c, thresholds);
+  unnamed->probability += part * unknown;
+}
+
 void setProbabilities(bool is_any_fit, const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
   double most = 0.0;
   for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_fit, thresholds));
@@ -220,6 +245,7 @@ void setProbabilities(bool is_any_fit, const identify::Thresholds& thresholds, s
   }
   for (GapCandidate& c : candidates) c.probability /= sum;
   joinExactTwins(thresholds, candidates);
+  leaveRoomForTheUnknown(thresholds, candidates);
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const GapCandidate& a, const GapCandidate& b) { return a.probability > b.probability; });
 }

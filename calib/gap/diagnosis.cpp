@@ -215,7 +215,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
 
   describeJudgement(search, judgement, known_gap, report);
   report.smallest_detectable = smallestDetectable(search);
-  report.isolability = isolabilityOf(search, kStartsForIsolability, control);
+  report.isolability = isolabilityOf(search, kStartsForIsolability, Imitators::kOfCoarseGrid, control);
   if (control.stop.stop_requested()) return stopped();
   if (belongs_together) {
     suggestNext(search, judgement.selection, report);

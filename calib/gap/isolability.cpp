@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 
@@ -25,12 +26,19 @@ class AlignmentProjector {
 
 constexpr int kNowhere = -1;
 
-/// What one effect does on this design: the columns at some of its starts, alignment taken out.
+/// An effect at one of its starts.
+struct Imitation {
+  const effects::EffectFit* fit = nullptr;
+  Eigen::VectorXd start;
+  Eigen::MatrixXd columns;  ///< Alignment taken out.
+  int place = kNowhere;     ///< Which of the common places it stands at; kNowhere: it stands at none.
+};
+
+/// What one effect does on this design.
 struct Signature {
   std::string effect;
-  std::vector<Eigen::MatrixXd> imitations;
-  std::vector<int> imitation_places;  ///< Which of the common places each stands at; kNowhere: it stands at none.
-  Eigen::MatrixXd typical;            ///< Unit columns.
+  std::vector<Imitation> imitations;
+  Eigen::MatrixXd typical;  ///< Unit columns.
   std::vector<int> typical_places;
 };
 
@@ -86,13 +94,14 @@ std::vector<int> placesOf(const effects::EffectFit& fit, std::span<const Eigen::
 
 /// Unit columns that stand for an effect: each of its linear parameters at a few of its starts; none where it shows
 /// nothing.
-void setTypical(const std::vector<Eigen::MatrixXd>& columns, const std::vector<int>& places, Signature& signature) {
+void setTypical(Signature& signature) {
+  const std::vector<Imitation>& all = signature.imitations;
   constexpr std::size_t kMost = 8;
-  const std::size_t used = std::min(kMost, columns.size());
+  const std::size_t used = std::min(kMost, all.size());
   std::vector<Eigen::VectorXd> list;
   for (std::size_t i = 0; i < used; ++i) {
-    const std::size_t chosen = i * columns.size() / used;
-    const Eigen::MatrixXd& m = columns[chosen];
+    const Imitation& chosen = all[i * all.size() / used];
+    const Eigen::MatrixXd& m = chosen.columns;
     Eigen::VectorXd mixed = Eigen::VectorXd::Zero(m.rows());
     for (Eigen::Index j = 0; j < m.cols(); ++j) {
       const double norm = m.col(j).norm();
@@ -101,9 +110,9 @@ void setTypical(const std::vector<Eigen::MatrixXd>& columns, const std::vector<i
       mixed += m.col(j) / norm * (j % 2 == 0 ? 1.0 : -0.6);
     }
     if (used > 1 && mixed.norm() > 0.0) list.emplace_back(mixed.normalized());
-    signature.typical_places.resize(list.size(), places[chosen]);
+    signature.typical_places.resize(list.size(), chosen.place);
   }
-  signature.typical.resize(columns.front().rows(), static_cast<Eigen::Index>(list.size()));
+  signature.typical.resize(all.front().columns.rows(), static_cast<Eigen::Index>(list.size()));
   for (std::size_t i = 0; i < list.size(); ++i) signature.typical.col(static_cast<Eigen::Index>(i)) = list[i];
 }
 
@@ -121,17 +130,77 @@ Eigen::VectorXd imitated(const Eigen::MatrixXd& typical, const Eigen::MatrixXd& 
   return right.cwiseProduct(x).colwise().sum();
 }
 
-double imitation(const Signature& a, const Signature& b) {
-  Eigen::VectorXd best = Eigen::VectorXd::Zero(a.typical.cols());
-  for (std::size_t k = 0; k < b.imitations.size(); ++k) {
-    const Eigen::VectorXd shares = imitated(a.typical, b.imitations[k]);
-    for (Eigen::Index i = 0; i < shares.size(); ++i) {
-      const int place = a.typical_places[static_cast<std::size_t>(i)];
-      const int other = b.imitation_places[k];
-      if (place == kNowhere || other == kNowhere || place == other) best[i] = std::max(best[i], shares[i]);
+bool isPlaced(const Signature& signature) { return signature.imitations.front().place != kNowhere; }
+
+/// Share of a signal that an imitator makes once its place and shape are fitted to it.
+/// @param strength norm of the signal, so that what is believable of the imitator counts
+double fittedShare(const identify::Linearized& at, const Eigen::VectorXd& unit, double strength, const Imitation& by) {
+  const identify::LocalFit fitted = identify::refineLocally(at.withResidual(strength * unit), *by.fit, by.start);
+  return fitted.gain / (strength * strength);
+}
+
+/// How the shares of a's typical signals that b can make are found.
+class Imitator {
+ public:
+  Imitator(const identify::Linearized& at, Imitators kind) : at_(at), is_fitted_(kind == Imitators::kFitted) {}
+
+  /// Of each typical signal of a, the largest share that b makes.
+  std::vector<double> shares(const Signature& a, const Signature& b) const {
+    std::vector<double> best(static_cast<std::size_t>(a.typical.cols()), 0.0);
+    std::vector<std::vector<std::pair<double, std::size_t>>> tried(best.size());
+    for (std::size_t k = 0; k < b.imitations.size(); ++k) {
+      const Eigen::VectorXd made = imitated(a.typical, b.imitations[k].columns);
+      for (std::size_t i = 0; i < best.size(); ++i) {
+        const int place = a.typical_places[i];
+        const int other = b.imitations[k].place;
+        if (place != kNowhere && other != kNowhere && place != other) continue;
+        const double share = made[static_cast<Eigen::Index>(i)];
+        tried[i].emplace_back(share, k);
+        best[i] = std::max(best[i], share);
+      }
     }
+    if (!is_fitted_ || !isPlaced(a) || !isPlaced(b)) return best;
+    for (std::size_t i = 0; i < best.size(); ++i) {
+      const Eigen::VectorXd unit = a.typical.col(static_cast<Eigen::Index>(i));
+      for (const std::size_t k : mostAlike(tried[i]))
+        best[i] = std::max(best[i], fittedShare(at_, unit, strength(), b.imitations[k]));
+    }
+    return best;
   }
-  return median({best.data(), best.data() + best.size()});
+
+ private:
+  static std::vector<std::size_t> mostAlike(std::vector<std::pair<double, std::size_t>> tried) {
+    constexpr std::size_t kFitted = 2;
+    std::sort(tried.rbegin(), tried.rend());
+    std::vector<std::size_t> most;
+    for (std::size_t k = 0; k < std::min(kFitted, tried.size()); ++k) most.push_back(tried[k].second);
+    return most;
+  }
+  /// Of a signal as large as the noise.
+  double strength() const { return std::sqrt(static_cast<double>(at_.order().size()) * at_.channels()); }
+
+  const identify::Linearized& at_;
+  bool is_fitted_;
+};
+
+/// Signal over noise from which two signals, of which the other makes such a share, are taken for each other once in
+/// fifty: half their distance is then 2.05 SDs of the noise along it.
+std::optional<double> toldApartFrom(double share, double count) {
+  constexpr double kDistance2 = 4.0 * 2.05 * 2.05;
+  constexpr double kSame = 1e-6;
+  if (1.0 - share < kSame) return std::nullopt;
+  return std::sqrt(kDistance2 / ((1.0 - share) * count));
+}
+
+IsolabilityPair pairOf(const Signature& a, const Signature& b, const Imitator& imitator, std::optional<double> count) {
+  constexpr double kMostPlaces = 0.9;
+  const std::vector<double> a_by_b = imitator.shares(a, b);
+  const std::vector<double> b_by_a = imitator.shares(b, a);
+  IsolabilityPair pair{a.effect, b.effect, std::clamp(std::min(median(a_by_b), median(b_by_a)), 0.0, 1.0), {}};
+  if (count)
+    pair.told_apart_from =
+        toldApartFrom(std::min(quantile(a_by_b, kMostPlaces), quantile(b_by_a, kMostPlaces)), *count);
+  return pair;
 }
 
 std::vector<std::string> adviceFor(const Isolability& isolability, const identify::GapRows& rows,
@@ -172,7 +241,8 @@ std::vector<std::string> adviceFor(const Isolability& isolability, const identif
 
 }  // namespace
 
-Isolability isolabilityOf(const identify::GapSearch& search, std::size_t starts_each, const RunControl& control) {
+Isolability isolabilityOf(const identify::GapSearch& search, std::size_t starts_each, Imitators imitators,
+                          const RunControl& control) {
   const std::vector<int> one_block(search.physics().size(), 0);
   const identify::Linearized at(search.physics(), search.none().model, search.whitening(), one_block);
   const AlignmentProjector projected(at);
@@ -180,21 +250,21 @@ Isolability isolabilityOf(const identify::GapSearch& search, std::size_t starts_
   std::vector<Signature> signatures;
   for (const identify::EffectWay& way : search.ways()) {
     const std::vector<Eigen::VectorXd> starts = startsFor(*way.fit, centers_m, starts_each);
-    std::vector<Eigen::MatrixXd> columns(starts.size());
+    const std::vector<int> places = placesOf(*way.fit, starts, centers_m);
+    std::vector<Imitation> imitations(starts.size());
     control.parallel_for(starts.size(), [&](std::size_t i) {
-      if (!control.stop.stop_requested()) columns[i] = projected(at.columns(*way.fit, starts[i]));
+      if (control.stop.stop_requested()) return;
+      imitations[i] = {way.fit.get(), starts[i], projected(at.columns(*way.fit, starts[i])), places[i]};
     });
-    if (control.stop.stop_requested() || columns.empty()) continue;
+    if (control.stop.stop_requested() || imitations.empty()) continue;
     const auto found = std::find_if(signatures.begin(), signatures.end(),
                                     [&](const Signature& s) { return s.effect == way.effect->id; });
-    const std::vector<int> places = placesOf(*way.fit, starts, centers_m);
     if (found == signatures.end()) {
-      Signature signature{way.effect->id, columns, places, {}, {}};
-      setTypical(columns, places, signature);
+      Signature signature{way.effect->id, std::move(imitations), {}, {}};
+      setTypical(signature);
       if (signature.typical.cols() > 0) signatures.push_back(std::move(signature));
     } else {
-      found->imitations.insert(found->imitations.end(), columns.begin(), columns.end());
-      found->imitation_places.insert(found->imitation_places.end(), places.begin(), places.end());
+      std::move(imitations.begin(), imitations.end(), std::back_inserter(found->imitations));
     }
   }
   Isolability isolability;
@@ -202,11 +272,12 @@ Isolability isolabilityOf(const identify::GapSearch& search, std::size_t starts_
   for (std::size_t a = 0; a < signatures.size(); ++a)
     for (std::size_t b = a + 1; b < signatures.size(); ++b) pairs.emplace_back(a, b);
   isolability.pairs.resize(pairs.size());
+  const Imitator imitator(at, imitators);
+  std::optional<double> count;
+  if (imitators == Imitators::kFitted) count = static_cast<double>(at.order().size()) * at.channels();
   control.parallel_for(pairs.size(), [&](std::size_t i) {
-    const Signature& a = signatures[pairs[i].first];
-    const Signature& b = signatures[pairs[i].second];
-    const double r2 = std::min(imitation(a, b), imitation(b, a));
-    isolability.pairs[i] = {a.effect, b.effect, std::clamp(r2, 0.0, 1.0)};
+    if (control.stop.stop_requested()) return;
+    isolability.pairs[i] = pairOf(signatures[pairs[i].first], signatures[pairs[i].second], imitator, count);
   });
   std::stable_sort(isolability.pairs.begin(), isolability.pairs.end(),
                    [](const IsolabilityPair& a, const IsolabilityPair& b) { return a.r2 > b.r2; });

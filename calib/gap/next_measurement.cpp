@@ -129,11 +129,12 @@ const identify::TriedEffect* triedOf(const identify::GapSearch& search, const id
 /// The two effects that the evidence separates least, when it is not enough.
 bool proposeSeparation(const identify::GapSearch& search, const identify::EffectSelection& selection,
                        GapReport& report) {
-  if (report.candidates.size() < 2) return false;
-  const GapCandidate& first = report.candidates[0];
-  const GapCandidate& second = report.candidates[1];
-  if (first.effect == "none" || second.effect == "none" || second.probability < search.thresholds().open_cause)
-    return false;
+  const auto is_named = [](const GapCandidate& c) { return !isNameless(c.effect); };
+  if (report.candidates.empty() || !is_named(report.candidates.front())) return false;
+  const GapCandidate& first = report.candidates.front();
+  const auto next = std::find_if(report.candidates.begin() + 1, report.candidates.end(), is_named);
+  if (next == report.candidates.end() || next->probability < search.thresholds().open_cause) return false;
+  const GapCandidate& second = *next;
   const identify::TriedEffect* a = triedOf(search, selection, first.effect);
   const identify::TriedEffect* b = triedOf(search, selection, second.effect);
   if (a == nullptr || b == nullptr) return false;

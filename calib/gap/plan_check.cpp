@@ -75,7 +75,7 @@ Result<PlanCheck> planCheck(std::span<const PlannedPlace> plan, const simulation
   FT_TRY(auto effects, simulation::makeEffects(believed.effects, rows.excitation));
   const identify::GapSearch search(rows, std::move(effects), identify::NoiseFrom::kStated);
   PlanCheck check{
-      isolabilityOf(search, kStartsEach, control),
+      isolabilityOf(search, kStartsEach, Imitators::kFitted, control),
       evaluation::plannedOrientations(plan, inverse(believed.reference_from_tracker), placingSd_m(believed))};
   if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The check of the plan was stopped.");
   return check;

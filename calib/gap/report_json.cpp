@@ -262,7 +262,10 @@ json findingToJson(const recording::GapFinding& finding) {
 json toJson(const Isolability& isolability) {
   return {{"pairs", listToJson(isolability.pairs,
                                [](const IsolabilityPair& pair) -> json {
-                                 return {{"a", pair.a}, {"b", pair.b}, {"r2", numberToJson(pair.r2)}};
+                                 return {{"a", pair.a},
+                                         {"b", pair.b},
+                                         {"r2", numberToJson(pair.r2)},
+                                         {"told_apart_from", numberToJson(pair.told_apart_from)}};
                                })},
           {"warnings", isolability.warnings}};
 }

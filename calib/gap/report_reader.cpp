@@ -233,7 +233,9 @@ Against againstFrom(const JsonReader& reader) {
 Isolability isolabilityFrom(const JsonReader& reader) {
   Isolability isolability;
   isolability.pairs = reader["pairs"].list([](const JsonReader& pair) {
-    return IsolabilityPair{pair["a"].text(), pair["b"].text(), pair["r2"].numberOrNan()};
+    IsolabilityPair read{pair["a"].text(), pair["b"].text(), pair["r2"].numberOrNan(), {}};
+    if (const auto from = pair.find("told_apart_from")) read.told_apart_from = from->optionalNumber();
+    return read;
   });
   isolability.warnings = reader["warnings"].texts();
   return isolability;

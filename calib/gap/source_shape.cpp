@@ -10,10 +10,6 @@
 namespace fieldtrue::gap {
 namespace {
 
-/// Below it a thing in the room is not sure enough to be asked for its shape.
-constexpr double kSureThing = 20.0;  // BIC.
-/// An axis that answers with less than this share of the strongest does not answer, with more it does.
-constexpr double kSilentShare = 0.4;
 constexpr double kNinety = 1.645;
 constexpr Eigen::Index kComponents = 6;
 
@@ -31,7 +27,7 @@ const identify::EffectWay* bodyOfAnyShape(const identify::GapSearch& search) {
 std::vector<Eigen::Vector3d> centersOf(const identify::GapSearch& search, const identify::EffectSelection& selection) {
   std::vector<Eigen::Vector3d> centers_m;
   for (const identify::TriedEffect& one : selection.first) {
-    const bool is_sure = one.bic_gain > kSureThing && !one.refined.model.terms.empty();
+    const bool is_sure = one.bic_gain > search.thresholds().sure_thing && !one.refined.model.terms.empty();
     if (!is_sure || !search.ways()[one.way].fit->searchesPlace()) continue;
     centers_m.emplace_back(one.refined.model.terms.back().searched.head<3>());
   }
@@ -73,8 +69,8 @@ std::string directionText(const Eigen::Vector3d& v) {
 
 }  // namespace
 
-Shape shapeOf(const Eigen::Vector3d& values_m3, const Eigen::Vector3d& sds_m3) {
-  const double bound_m3 = kSilentShare * std::abs(values_m3[0]);
+Shape shapeOf(const Eigen::Vector3d& values_m3, const Eigen::Vector3d& sds_m3, double silent_axis) {
+  const double bound_m3 = silent_axis * std::abs(values_m3[0]);
   if (std::abs(values_m3[0]) < 3.0 * kNinety * sds_m3[0]) return Shape::kUnclear;
   const auto is_silent = [&](int k) { return std::abs(values_m3[k]) + kNinety * sds_m3[k] < bound_m3; };
   const auto answers = [&](int k) { return std::abs(values_m3[k]) - kNinety * sds_m3[k] > bound_m3; };
@@ -111,7 +107,7 @@ std::optional<SourceShape> sourceShapeOf(const identify::GapSearch& search,
     shape.values_m3[k] = axes.eigenvalues()[of];
     shape.sds_m3[k] = std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
   }
-  shape.shape = shapeOf(shape.values_m3, shape.sds_m3);
+  shape.shape = shapeOf(shape.values_m3, shape.sds_m3, search.thresholds().silent_axis);
   return shape;
 }
 

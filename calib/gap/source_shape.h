@@ -17,7 +17,8 @@ std::optional<SourceShape> sourceShapeOf(const identify::GapSearch& search, cons
 
 /// The shape that three principal polarizabilities with these SDs allow.
 /// @param values_m3 largest size first
-Shape shapeOf(const Eigen::Vector3d& values_m3, const Eigen::Vector3d& sds_m3);
+/// @param silent_axis share of the strongest below which an axis does not answer
+Shape shapeOf(const Eigen::Vector3d& values_m3, const Eigen::Vector3d& sds_m3, double silent_axis);
 
 /// A sentence for a reader: "What bends the readings near (0.5, 0.2, 1) m answers ...".
 std::string sourceShapeText(const SourceShape& shape);

@@ -326,6 +326,12 @@ Eigen::MatrixXd Linearized::columnsOf(std::span<const field::EffectResponse> res
   return columns;
 }
 
+Linearized Linearized::withResidual(Eigen::VectorXd residual) const {
+  Linearized other = *this;
+  other.residual_ = std::move(residual);
+  return other;
+}
+
 Eigen::MatrixXd Linearized::columns(const effects::EffectFit& fit, const Eigen::VectorXd& searched) const {
   const std::size_t m = fit.linear().size();
   std::vector<field::EffectResponse> responses(settings_.size() * m);

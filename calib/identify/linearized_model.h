@@ -55,6 +55,9 @@ class Linearized {
   Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening, std::span<const int> block,
              ResponseAt response = ResponseAt::kModel);
 
+  /// The same with other residuals, whitened and sorted as residual() is: "what if the readings showed this?"
+  Linearized withResidual(Eigen::VectorXd residual) const;
+
   Eigen::Index size() const { return residual_.size(); }
   const Eigen::VectorXd& residual() const { return residual_; }
   /// Alignment, mounting, and the terms of the state: linear parameters and searched ones.

@@ -92,6 +92,14 @@ struct Thresholds {
   /// By which differences of BIC are divided: they are over-confident where the catalogue is not the world. Set on open
   /// sessions, so that probabilities are met.
   double temperature = 2.5;
+  /// Share of the recordings that named a thing in the room, and were of something that the catalogue does not hold:
+  /// that much of such a name's probability is left to a cause without one. Set on 2,098 open sessions, a quarter of
+  /// which had such a cause.
+  double unknown_as_thing = 0.25;
+  /// The same of those that named any other effect.
+  double unknown_as_other = 0.06;
+  /// The same of those in which nothing was found.
+  double unknown_as_none = 0.12;
   /// Squared correlation of fitted signals from which effects are not told apart. Set by reason.
   double same_signal = 0.9;
   /// BIC units within which that holds. Set by reason: odds of 7 to 1 when tempered.
@@ -136,6 +144,11 @@ struct Thresholds {
   double told_tolerance = 1.3;
   /// Floors from which a place counts among those where something is left. Set by reason.
   double told_place = 2.5;
+  /// BIC units from which a thing in the room is asked for its shape. Set by reason.
+  double sure_thing = 20.0;
+  /// Share of the strongest polarizability below which an axis does not answer, and above which it does. Set by reason:
+  /// a sheet and a bar of ten to one have a tenth, a block of two to one a half.
+  double silent_axis = 0.4;
   /// Probability of the second cause from which a measurement is sought that separates the first two. Set by reason.
   double open_cause = 0.05;
   /// Mean square difference that such a measurement must be expected to show, in noise variances. Set by reason.

@@ -147,6 +147,16 @@ std::string nameOf(std::size_t index) {
   return name;
 }
 
+/// Strength of the weakest effect; 0 where there is none.
+double weakestOf(const json& effects) {
+  double weakest = 0.0;
+  for (const json& effect : effects) {
+    const double rho = effect["rho"].get<double>();
+    if (weakest == 0.0 || rho < weakest) weakest = rho;
+  }
+  return weakest;
+}
+
 /// Writes the tables of one session.
 /// @return its truth, with the classes that plan-check declares beside those of this program's own physics
 json writeSession(const Options& options, const SessionWish& wish, const std::string& name, std::uint64_t seed,
@@ -160,7 +170,8 @@ json writeSession(const Options& options, const SessionWish& wish, const std::st
   session.truth["file"] = name;
   session.truth["own_classes"] = session.truth["classes"];
   if (!asks_plan_check) return session.truth;
-  const std::optional<Classes> declared = planCheckClasses(options.cli, nodes, catalogueIds());
+  const std::optional<Classes> declared =
+      planCheckClasses(options.cli, nodes, catalogueIds(), weakestOf(session.truth["effects"]));
   if (!declared) throw std::runtime_error(options.cli.string() + " plan-check declares no classes");
   session.truth["classes"] = *declared;
   return session.truth;

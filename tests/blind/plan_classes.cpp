@@ -8,8 +8,19 @@
 
 namespace blind {
 
+namespace {
+
+/// Programs before that key said nothing of strength.
+bool isTooWeak(const nlohmann::json& pair, double rho) {
+  if (rho <= 0.0 || !pair.contains("told_apart_from")) return false;
+  const nlohmann::json& from = pair["told_apart_from"];
+  return !from.is_number() || rho < from.get<double>();
+}
+
+}  // namespace
+
 std::optional<Classes> planCheckClasses(const std::filesystem::path& cli, const std::filesystem::path& nodes,
-                                        const std::vector<std::string>& ids) {
+                                        const std::vector<std::string>& ids, double rho) {
   constexpr double kSame = 0.9;
   const Finished checked =
       runProgram({cli.string(), "plan-check", "--nodes", nodes.string(), "--json", "--threads", "1"});
@@ -19,7 +30,7 @@ std::optional<Classes> planCheckClasses(const std::filesystem::path& cli, const 
   std::set<std::pair<std::string, std::string>> same;
   for (const nlohmann::json& pair : answer["pairs"]) {
     if (!pair.is_object() || !pair.contains("r2") || !pair["r2"].is_number()) continue;
-    if (pair["r2"].get<double>() <= kSame) continue;
+    if (pair["r2"].get<double>() <= kSame && !isTooWeak(pair, rho)) continue;
     const std::string a = pair.value("a", ""), b = pair.value("b", "");
     same.emplace(std::min(a, b), std::max(a, b));
   }

@@ -10,12 +10,14 @@ namespace blind {
 using Classes = std::vector<std::vector<std::string>>;
 
 /// Classes of effects that the design of a node table cannot tell apart, as `plan-check` of the program under test
-/// declares them before anything is answered: effects joined by pairs of R2 above 0.9.
+/// declares them before anything is answered: effects joined by pairs of R2 above 0.9, and by pairs of which it says
+/// that they are told apart from a larger strength only.
 /// @param cli fieldtrue-cli
 /// @param ids every effect of the catalogue; each comes out in exactly one class
+/// @param rho strength of the weakest effect of the session, gap to noise; 0: none
 /// @return nothing when the program fails or prints no pairs
 std::optional<Classes> planCheckClasses(const std::filesystem::path& cli, const std::filesystem::path& nodes,
-                                        const std::vector<std::string>& ids);
+                                        const std::vector<std::string>& ids, double rho);
 
 /// Joins every two ids of which `alike` says so, and what is joined to either.
 template <typename Alike>

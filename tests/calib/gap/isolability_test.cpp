@@ -23,6 +23,12 @@ double r2(const Isolability& isolability, const std::string& a, const std::strin
   return std::nan("");
 }
 
+std::optional<double> toldApartFrom(const Isolability& isolability, const std::string& a, const std::string& b) {
+  for (const IsolabilityPair& pair : isolability.pairs)
+    if ((pair.a == a && pair.b == b) || (pair.a == b && pair.b == a)) return pair.told_apart_from;
+  return std::nullopt;
+}
+
 GapPlan cube(int turns = 1, bool in_random_order = true) {
   GapPlan plan;
   plan.counts = {4, 4, 4};
@@ -32,7 +38,7 @@ GapPlan cube(int turns = 1, bool in_random_order = true) {
 }
 
 /// The noise is the jig's alone, the same along all axes: shares can be worked by hand.
-Isolability ofPlan(const GapPlan& plan, bool has_orientation = true) {
+Isolability ofPlan(const GapPlan& plan, bool has_orientation = true, Imitators imitators = Imitators::kOfCoarseGrid) {
   CalibrationTable table = recordedIn(gapScene(), gapPlan(plan));
   for (Node& node : table.nodes) {
     node.has_orientation = has_orientation;
@@ -41,7 +47,7 @@ Isolability ofPlan(const GapPlan& plan, bool has_orientation = true) {
   }
   const identify::GapRows rows = identify::makeGapRows(table.nodes, table.metadata).value();
   const identify::GapSearch search(rows, {}, identify::NoiseFrom::kStated);
-  return isolabilityOf(search, 60, {});
+  return isolabilityOf(search, 60, imitators, {});
 }
 
 std::string allOf(const std::vector<std::string>& texts) {
@@ -76,6 +82,30 @@ class GapIsolabilityTest : public QObject {
   void layersMakeAThirdOfAScale() {
     const Isolability seen = ofPlan(cube(), false);
     FT_VERIFY_MATCH(near(r2(seen, "grid_scale", "jig_layer_offset"), 1.0 / 3.0, 0.002));
+  }
+
+  /// Two thirds of a scale are what layers cannot make: from a signal s, 192 s^2 2/3 = (2 x 2.05)^2 of them are beyond
+  /// chance, s = 0.362 of the noise.
+  void strengthPartsWhatLooksAlike() {
+    const Isolability seen = ofPlan(cube(), false, Imitators::kFitted);
+    const auto from = toldApartFrom(seen, "grid_scale", "jig_layer_offset");
+    QVERIFY(from.has_value());
+    FT_VERIFY_MATCH(near(*from, std::sqrt(4.0 * 2.05 * 2.05 / (192.0 * 2.0 / 3.0)), 0.003));
+    QVERIFY(!toldApartFrom(ofPlan(cube(), false), "grid_scale", "jig_layer_offset").has_value());
+  }
+
+  /// A loop and a plate answer along their normal both: fitted to each other they are alike where each as the coarse
+  /// grid has it is not, and only strength parts them; a gain needs far less.
+  void aLoopPassesForAPlate() {
+    const Isolability coarse = ofPlan(cube(), true);
+    const Isolability fitted = ofPlan(cube(), true, Imitators::kFitted);
+    const double as_it_is = r2(coarse, "closed_loop", "finite_plate");
+    const double once_fitted = r2(fitted, "closed_loop", "finite_plate");
+    QVERIFY2(1.0 - once_fitted < 0.2 * (1.0 - as_it_is), qPrintable(QString("%1 %2").arg(once_fitted).arg(as_it_is)));
+    const auto plate = toldApartFrom(fitted, "closed_loop", "finite_plate");
+    const auto gain = toldApartFrom(fitted, "closed_loop", "global_gain");
+    QVERIFY2(!plate || *plate > 0.7, qPrintable(QString::number(plate.value_or(0.0))));
+    QVERIFY2(gain && *gain < 0.5, qPrintable(QString::number(gain.value_or(0.0))));
   }
 
   /// Coil gains pass for scales where only positions count (0.85 to 0.93 by the study of designs) and part from them

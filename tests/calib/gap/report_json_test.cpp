@@ -81,7 +81,7 @@ GapReport someReport() {
   report.remaining = {3.25, 0.2, 0.1, 0.3, true, 156.25, 6.25, 2.5, 4.0, 5.0, 6.5, 17, {17, 4}};
   report.rival = {12.5, 30.0, 1.5, 0.5, 0.875, {"gain_drift"}, "A field without a name does as well."};
   report.odds_over_next = 14.5;
-  report.isolability = {{{"compact_metal", "closed_loop", 0.31}}, {"One orientation only."}};
+  report.isolability = {{{"compact_metal", "closed_loop", 0.31, 1.5}}, {"One orientation only."}};
   report.next_measurement = "Turn the sensor.";
   report.next_separates = {"compact_metal", "closed_loop"};
   report.predictions = {{"compact_metal", 17, 31.0, 12.0, 4.0}};

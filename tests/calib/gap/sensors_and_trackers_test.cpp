@@ -28,7 +28,7 @@ CalibrationTable recordedByTwo(simulation::Scene scene, const Pose& second = mou
     const CalibrationTable own = recordedIn(scene, gapPlan(), 1 + static_cast<std::uint64_t>(sensor),
                                             samples != nullptr ? &own_samples : nullptr);
     for (SampleRow row : own_samples.rows) {
-      row.sensor = sensor;
+      row.sample.sensor = sensor;
       samples->rows.push_back(row);
     }
     both.metadata = own.metadata;
@@ -97,7 +97,7 @@ class SensorsAndTrackersTest : public QObject {
     SampleTable with_hum;
     recordedByTwo(humming, mountOf(1), &with_hum);
     for (std::size_t i = 0; i < samples.rows.size(); ++i)
-      if (samples.rows[i].sensor == 1) samples.rows[i] = with_hum.rows[i];
+      if (samples.rows[i].sample.sensor == 1) samples.rows[i] = with_hum.rows[i];
     const auto report = diagnose(both, &samples, nullptr);
     FT_VERIFY_OK(report);
     QVERIFY(isTold(*report, "Sensor 1: "));
