@@ -38,6 +38,7 @@ namespace fieldtrue::cli {
 namespace {
 
 constexpr int kTakesBeforeSkipping = 3;
+constexpr int kPlaceCheck_ms = 2000;
 constexpr double kReconnect_s = 300.0;  ///< Where nothing is said.
 
 struct AcquireOptions {
@@ -95,6 +96,7 @@ class Acquisition {
     controller_.setReconnects(patience_s() > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic) listenToOperator();
+    watchTracesPlace();
     if (!over_) QCoreApplication::exec();
     writeTraceOfLine();
     controller_.disconnectDevice();
@@ -273,15 +275,20 @@ class Acquisition {
     }
     if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
     lines_ << std::endl;
-    tellNoRoom();
   }
 
-  /// A disk that fills while places are taken is told once, not at the end of the day.
-  void tellNoRoom() {
-    if (options_.trace.empty() || told_no_room_) return;
-    const std::string why = noRoomFor(options_.trace);
-    told_no_room_ = !why.empty();
-    if (told_no_room_) tell(why);
+  /// A disk that fills while places are taken is told when it does, not at the end of the day.
+  void watchTracesPlace() {
+    if (options_.trace.empty()) return;
+    QObject::connect(&place_timer_, &QTimer::timeout, &context_, [this] { tellNoPlace(); });
+    place_timer_.start(kPlaceCheck_ms);
+  }
+
+  void tellNoPlace() {
+    if (told_no_place_) return;
+    const std::string why = noPlaceFor(options_.trace);
+    told_no_place_ = !why.empty();
+    if (told_no_place_) tell(why);
   }
 
   void onTakeRefused(int place, double off_m) {
@@ -449,11 +456,12 @@ class Acquisition {
   std::optional<nlohmann::json> expected_plan_;
   std::map<std::size_t, int> failed_takes_;
   LiveLine live_line_;
+  QTimer place_timer_;
   std::optional<Failure> failure_;
   std::string how_;
   bool told_start_ = false;
   bool enter_waits_ = false;
-  bool told_no_room_ = false;
+  bool told_no_place_ = false;
   bool prompted_ = false;
   bool over_ = false;
 };
