@@ -129,7 +129,7 @@ class SessionDamageTest : public QObject {
     bench.readTables();
     damage(path, leafOf("actions", 0.5));
     bench.controller.take();
-    bench.tracker->stand(0.6);
+    bench.tracker->stand(1.2);
     QCOMPARE(static_cast<int>(bench.stored.size()), before);
     QCOMPARE(bench.take_failures.size(), 1);
     QVERIFY2(bench.take_failures[0].contains("damaged"), qPrintable(bench.take_failures[0]));
