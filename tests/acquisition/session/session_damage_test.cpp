@@ -128,6 +128,7 @@ class SessionDamageTest : public QObject {
     const int before = static_cast<int>(bench.stored.size());
     bench.readTables();
     damage(path, leafOf("actions", 0.5));
+    bench.tracker->true_pose = bench.placePose(0);
     bench.controller.take();
     bench.tracker->stand(1.2);
     QCOMPARE(static_cast<int>(bench.stored.size()), before);
