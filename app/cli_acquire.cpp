@@ -38,6 +38,8 @@ namespace fieldtrue::cli {
 namespace {
 
 constexpr int kTakesBeforeSkipping = 3;
+constexpr const char* kHeldKeys = "Enter waits longer, a takes again";  ///< Where there is nothing to keep.
+constexpr int kPlaceCheck_ms = 2000;
 constexpr double kReconnect_s = 300.0;  ///< Where nothing is said.
 
 struct AcquireOptions {
@@ -46,7 +48,8 @@ struct AcquireOptions {
   std::string plan;
   std::string session;
   int samples_per_node = 60;
-  std::string until;  ///< When a take is complete, where not by that.
+  std::string until;          ///< When a take is complete, where not by that.
+  std::string at_time_limit;  ///< What becomes of a take whose time is over, where not the usual.
   bool automatic = false;
   std::string sensors;                ///< Those recorded, as readSensors reads them.
   std::optional<double> reconnect_s;  ///< For so long a tracker that was lost is waited for.
@@ -78,8 +81,13 @@ class Acquisition {
     connectSignals();
   }
 
-  Outcome run(const QString& plan_json, const Setup& setup, const acquisition::TakeLength& length,
-              const std::vector<int>& sensors) {
+  void setTakes(const acquisition::TakeLength& length, acquisition::AtTimeLimit at_time_limit) {
+    controller_.setTakeLength(length);
+    controller_.setAtTimeLimit(at_time_limit);
+    asks_ = at_time_limit == acquisition::AtTimeLimit::kAsk;
+  }
+
+  Outcome run(const QString& plan_json, const Setup& setup, const std::vector<int>& sensors) {
     const EndRequest end_request([this] { end("stopped"); });
     controller_.setSetup(setup);
     controller_.openSession(QString::fromStdString(options_.session), plan_json);
@@ -88,13 +96,13 @@ class Acquisition {
     for (const std::string& remark : remarks_) tell(remark);
     is_open_ = true;
     if (const auto other = otherPlan(); !other.empty()) return notPossible(other);
-    controller_.setTakeLength(length);
     controller_.setAutomatic(options_.automatic);
     if (const auto others = otherSensors(sensors); !others.empty()) return notPossible(others);
     chooseSensors(sensors);
     controller_.setReconnects(patience_s() > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
-    if (!options_.automatic) listenToOperator();
+    if (!options_.automatic || asks_) listenToOperator();
+    watchTracesPlace();
     if (!over_) QCoreApplication::exec();
     writeTraceOfLine();
     controller_.disconnectDevice();
@@ -130,6 +138,7 @@ class Acquisition {
     connect(&acquisition::AcquisitionController::statusChanged, &Acquisition::onStatus);
     connect(&acquisition::AcquisitionController::nodesStored, &Acquisition::onStored);
     connect(&acquisition::AcquisitionController::takeFailed, &Acquisition::onTakeFailed);
+    connect(&acquisition::AcquisitionController::takeHeld, &Acquisition::onTakeHeld);
     connect(&acquisition::AcquisitionController::takeRefused, &Acquisition::onTakeRefused);
     connect(&acquisition::AcquisitionController::deviceFailed, &Acquisition::onDeviceFailed);
     connect(&acquisition::AcquisitionController::deviceBack, &Acquisition::onDeviceBack);
@@ -236,7 +245,9 @@ class Acquisition {
     endWhereOneIsMissing();
     tellSilent();
     live_line_.show(status);
-    if (options_.automatic || !status.current || status.take == acquisition::TakeState::kCollecting) return;
+    const bool takes =
+        status.take == acquisition::TakeState::kCollecting || status.take == acquisition::TakeState::kHeld;
+    if (options_.automatic || !status.current || takes) return;
     if (before != status.current || !prompted_) prompt();
   }
 
@@ -273,15 +284,36 @@ class Acquisition {
     }
     if (!suspicious.isEmpty()) lines_ << "  SUSPICIOUS: " << suspicious.toStdString();
     lines_ << std::endl;
-    tellNoRoom();
   }
 
-  /// A disk that fills while places are taken is told once, not at the end of the day.
-  void tellNoRoom() {
-    if (options_.trace.empty() || told_no_room_) return;
-    const std::string why = noRoomFor(options_.trace);
-    told_no_room_ = !why.empty();
-    if (told_no_room_) tell(why);
+  /// A disk that fills while places are taken is told when it does, not at the end of the day.
+  void watchTracesPlace() {
+    if (options_.trace.empty()) return;
+    QObject::connect(&place_timer_, &QTimer::timeout, &context_, [this] { tellNoPlace(); });
+    place_timer_.start(kPlaceCheck_ms);
+  }
+
+  void tellNoPlace() {
+    if (told_no_place_) return;
+    const std::string why = noPlaceFor(options_.trace);
+    told_no_place_ = !why.empty();
+    if (told_no_place_) tell(why);
+  }
+
+  void onTakeHeld(int place, const QString& reason, bool can_keep) {
+    live_line_.clear();
+    lines_ << "Time is up at " << placeName(status_.session->places.at(static_cast<std::size_t>(place))) << ": "
+           << reason.toStdString() << ".   " << (can_keep ? "Enter keeps it, w waits longer, a takes again" : kHeldKeys)
+           << ", s skips, q quits" << std::endl;
+    if (!hears_) answerAlone();
+  }
+
+  /// Nobody is there to be asked.
+  void answerAlone() {
+    const acquisition::AcquisitionStatus now = controller_.status();
+    if (now.take != acquisition::TakeState::kHeld) return;
+    if (now.can_keep) return controller_.keepTake();
+    controller_.skip();
   }
 
   void onTakeRefused(int place, double off_m) {
@@ -313,8 +345,8 @@ class Acquisition {
     controller_.skip();
   }
 
-  void onRemark(const QString& message) {
-    if (message == controller_.status().other_names) return fail(message.toStdString());
+  void onRemark(const QString& message, acquisition::RemarkKind kind) {
+    if (kind == acquisition::RemarkKind::kOtherSensors) return fail(message.toStdString());
     remarks_.push_back(message.toStdString());
     if (is_open_) tell(remarks_.back());
   }
@@ -372,17 +404,21 @@ class Acquisition {
   void readInput() {
     std::array<char, 256> bytes{};
     const ssize_t n = ::read(STDIN_FILENO, bytes.data(), bytes.size());
-    if (n <= 0) {
-      input_->setEnabled(false);
-      end("stopped");
-      return;
-    }
+    if (n <= 0) return onInputEnded();
     typed_.append(bytes.data(), static_cast<std::size_t>(n));
     for (auto line_end = typed_.find('\n'); line_end != std::string::npos && !over_; line_end = typed_.find('\n')) {
       const std::string command = typed_.substr(0, line_end);
       typed_.erase(0, line_end + 1);
       obey(command);
     }
+  }
+
+  /// By itself the recording goes on without an operator.
+  void onInputEnded() {
+    input_->setEnabled(false);
+    hears_ = false;
+    if (!options_.automatic) return end("stopped");
+    answerAlone();
   }
 
   /// Pressed before the tracker runs.
@@ -393,11 +429,28 @@ class Acquisition {
 
   void obey(const std::string& command) {
     prompted_ = false;
+    if (controller_.status().take == acquisition::TakeState::kHeld && decide(command)) return;
+    if (command.empty() && options_.automatic) return;
     if (command.empty()) return told_start_ ? controller_.take() : keepEnter();
     if (command == "s") return controller_.skip();
     if (command == "u") return controller_.undo();
     if (command == "q") return end("stopped");
     lines_ << "'" << command << "' is not known: Enter takes, s skips, u takes back, q quits" << std::endl;
+  }
+
+  /// What becomes of a take whose time is over. @return whether the command said so
+  bool decide(const std::string& command) {
+    const bool can_keep = controller_.status().can_keep;
+    if (command == "w" || (command.empty() && !can_keep)) {
+      controller_.waitLonger();
+    } else if (command == "a") {
+      controller_.takeAgain();
+    } else if (command.empty()) {
+      controller_.keepTake();
+    } else {
+      return false;
+    }
+    return true;
   }
 
   /// A session that was made for a tracker that never answered would only be in the way.
@@ -449,11 +502,14 @@ class Acquisition {
   std::optional<nlohmann::json> expected_plan_;
   std::map<std::size_t, int> failed_takes_;
   LiveLine live_line_;
+  QTimer place_timer_;
   std::optional<Failure> failure_;
   std::string how_;
+  bool asks_ = false;  ///< What becomes of a take whose time is over.
+  bool hears_ = true;  ///< The operator may type.
   bool told_start_ = false;
   bool enter_waits_ = false;
-  bool told_no_room_ = false;
+  bool told_no_place_ = false;
   bool prompted_ = false;
   bool over_ = false;
 };
@@ -479,6 +535,9 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   const auto length =
       acquisition::readTakeLength(options.until.empty() ? std::to_string(options.samples_per_node) : options.until);
   if (!length) return wrongUsage("--until: " + length.error().message);
+  const auto at_time_limit = options.at_time_limit.empty() ? Result<acquisition::AtTimeLimit>()
+                                                           : acquisition::readAtTimeLimit(options.at_time_limit);
+  if (!at_time_limit) return wrongUsage("--at-timeout: " + at_time_limit.error().message);
   const auto sensors = acquisition::readSensors(options.sensors);
   if (!sensors) return wrongUsage("--sensor: " + sensors.error().message);
   const bool resumes = QFileInfo::exists(QString::fromStdString(options.session));
@@ -495,7 +554,8 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   }
   Acquisition acquisition(options, common);
   if (resumes && plan_json) acquisition.expectPlan(*plan_json);
-  return acquisition.run(create_plan_json, *setup, *length, *sensors);
+  acquisition.setTakes(*length, *at_time_limit);
+  return acquisition.run(create_plan_json, *setup, *sensors);
 }
 
 }  // namespace
@@ -514,6 +574,13 @@ void addAcquireCommand(CommandLine& line) {
                    "When a take is complete, instead: after a time (2.5s), or when its mean is known so well (0.05mm)")
       ->type_name("LENGTH")
       ->excludes(samples);
+  command
+      ->add_option(
+          "--at-timeout", options->at_time_limit,
+          "What becomes of a take that is not complete within its time: keep what it has, take it again (up to "
+          "twice), skip its place, or ask; default: keep a mean that is known, though less well than --until "
+          "asks, and let any other take fail")
+      ->type_name("keep|again|skip|ask");
   addSetupOption(*command, options->setup, "What the tracker does not tell of itself");
   command
       ->add_option("--sensor", options->sensors,

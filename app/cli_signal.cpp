@@ -98,18 +98,27 @@ nlohmann::json spectrumJson(const std::optional<recording::SampleSpectrum>& spec
 
 nlohmann::json numbersJson(const acquisition::JudgedSignal& signal) {
   const acquisition::SignalReport& report = signal.report;
-  nlohmann::json json = {{"sensor", report.sensor},     {"readings", report.readings},
-                         {"rate_hz", report.rate_hz},   {"marks", report.marks},
-                         {"rested_s", report.rested_s}, {"position_m", nullptr},
-                         {"orientation_wxyz", nullptr}, {"sd_m", nullptr},
-                         {"expected_sd_m", nullptr},    {"drift_m_per_s", nullptr},
-                         {"drift_sd_m_per_s", nullptr}, {"correlation", nullptr},
-                         {"n_effective", nullptr},      {"spectrum", spectrumJson(report.spectrum)}};
+  nlohmann::json json = {{"sensor", report.sensor},
+                         {"readings", report.readings},
+                         {"rate_hz", report.rate_hz},
+                         {"marks", report.marks},
+                         {"rested_s", report.rested_s},
+                         {"position_m", nullptr},
+                         {"orientation_wxyz", nullptr},
+                         {"sd_m", nullptr},
+                         {"expected_sd_m", nullptr},
+                         {"drift_m_per_s", nullptr},
+                         {"drift_sd_m_per_s", nullptr},
+                         {"correlation", nullptr},
+                         {"n_effective", nullptr},
+                         {"least_sd_m", nullptr},
+                         {"spectrum", spectrumJson(report.spectrum)}};
   if (report.stand) {
     const Eigen::Quaterniond q = canonical(report.stand->orientation);
     json["position_m"] = vectorJson(report.stand->position_m);
     json["orientation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
     json["sd_m"] = vectorJson(report.noise->sds_m);
+    json["least_sd_m"] = report.least_sd_m;
     json["sd_rot_rad"] = report.sd_rot_rad;
     json["correlation"] = report.correlation;
     json["n_effective"] = report.worth;

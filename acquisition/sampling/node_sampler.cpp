@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "acquisition/sampling/shift_test.h"
 #include "acquisition/sampling/stillness.h"
@@ -82,7 +83,10 @@ void NodeSampler::start() {
 
 void NodeSampler::cancel() {
   state_ = TakeState::kIdle;
-  collected_ = restarts_ = bad_ = 0;
+  collected_ = restarts_ = bad_ = passed_over_ = 0;
+  limits_ = 1;
+  was_held_ = false;
+  held_s_ = 0.0;
   next_look_ = options_.block;
   wanted_ = options_.length.until == TakeLength::Until::kSamples ? static_cast<int>(options_.length.amount) : kUsual;
   last_status_.clear();
@@ -99,6 +103,7 @@ void NodeSampler::cancel() {
 TakeState NodeSampler::add(const Sample& sample) {
   if (state_ != TakeState::kCollecting) return state_;
   if (!first_time_s_) first_time_s_ = sample.time_s;
+  if (std::exchange(was_held_, false) && !samples_.empty()) held_s_ += sample.time_s - samples_.back().time_s;
   newest_s_ = sample.time_s;
   samples_.push_back(sample);
   if (isGood(sample)) {
@@ -108,6 +113,13 @@ TakeState NodeSampler::add(const Sample& sample) {
     last_status_ = sample.status;
   }
   if (isGood(sample)) look();
+  return passTime(sample.time_s);
+}
+
+TakeState NodeSampler::passOver(const Sample& sample) {
+  if (state_ != TakeState::kCollecting) return state_;
+  newest_s_ = sample.time_s;
+  ++passed_over_;
   return passTime(sample.time_s);
 }
 
@@ -150,7 +162,7 @@ bool NodeSampler::isComplete(bool is_due) {
 }
 
 bool NodeSampler::isCompleteByTime() {
-  const double span_s = samples_.back().time_s - samples_.front().time_s;
+  const double span_s = samples_.back().time_s - samples_.front().time_s - held_s_;
   if (span_s > 0.0) wanted_ = std::max(kFewestByTime, static_cast<int>(collected_ * options_.length.amount / span_s));
   return collected_ >= kFewestByTime && span_s >= options_.length.amount;
 }
@@ -166,16 +178,44 @@ bool NodeSampler::isCompleteByError() {
 }
 
 void NodeSampler::timeOut() {
-  const bool is_known = options_.length.until == TakeLength::Until::kStandardError && collected_ >= kFewestByError;
-  if (is_known && !motion()) {
-    finish();
-    if (state_ != TakeState::kDone) return;
-    message_ = "mean known to " + format("%.2g mm", 1e3 * standardError_m(*statistics_, samples_)) + ", not to " +
-               textOf(options_.length) + format(", after %g s", options_.time_limit_s);
-    return;
-  }
+  can_keep_ = canAverage();
+  message_ = shortfall();
+  state_ = TakeState::kHeld;
+  if (options_.holds_at_time_limit) return;
+  if (isKnown() && can_keep_) return keep();
   state_ = TakeState::kFailed;
-  message_ = timeLimitReason();
+}
+
+bool NodeSampler::canAverage() const {
+  const bool by_error = options_.length.until == TakeLength::Until::kStandardError;
+  return collected_ >= (by_error ? kFewestByError : kFewestByTime) && !motion();
+}
+
+void NodeSampler::keep() {
+  const std::string text = message_;
+  finish();
+  if (state_ == TakeState::kDone) message_ = text;
+}
+
+void NodeSampler::waitLonger() {
+  state_ = TakeState::kCollecting;
+  first_time_s_.reset();
+  was_held_ = true;
+  ++limits_;
+  message_.clear();
+}
+
+double NodeSampler::allowed_s() const { return limits_ * timeLimit_s(options_); }
+
+bool NodeSampler::isKnown() const {
+  return options_.length.until == TakeLength::Until::kStandardError && collected_ >= kFewestByError;
+}
+
+std::string NodeSampler::shortfall() const {
+  const auto averaged = averageSamples(samples_, options_.averaging);
+  if (!isKnown() || !can_keep_ || !averaged) return timeLimitReason();
+  return "mean known to " + format("%.2g mm", 1e3 * standardError_m(*averaged, samples_)) + ", not to " +
+         textOf(options_.length) + format(", after %g s", allowed_s());
 }
 
 std::optional<std::string> NodeSampler::motion() const {
@@ -199,12 +239,17 @@ std::optional<std::string> NodeSampler::motion() const {
 }
 
 void NodeSampler::startOver(const std::string& motion) {
-  state_ = TakeState::kCollecting;
-  statistics_.reset();
   ++restarts_;
   last_motion_ = motion;
-  message_ = "retaking: " + motion;
+  beginAgain(motion);
+}
+
+void NodeSampler::beginAgain(const std::string& why) {
+  state_ = TakeState::kCollecting;
+  statistics_.reset();
+  message_ = "retaking: " + why;
   collected_ = 0;
+  held_s_ = 0.0;
   next_look_ = options_.block;
   for (auto* part : {&samples_, &watched_}) {
     abandoned_.insert(abandoned_.end(), part->begin(), part->end());
@@ -229,9 +274,10 @@ std::string NodeSampler::timeLimitReason() const {
   if (silent_s >= kSilent_s)
     return format("silent for the last %.0f s: ", silent_s) + std::to_string(collected_) + " of " +
            std::to_string(wanted_) + " good samples";
-  std::string text = format("not finished within %g s: ", timeLimit_s(options_)) + std::to_string(collected_) + " of " +
+  std::string text = format("not finished within %g s: ", allowed_s()) + std::to_string(collected_) + " of " +
                      std::to_string(wanted_) + " good samples";
   if (restarts_ > 0) text += ", started over " + times(restarts_) + " (" + last_motion_ + "); let the sensor rest";
+  if (restarts_ == 0 && passed_over_ > 0 && collected_ == 0) text += ", it never rested: let the sensor rest";
   if (bad_ > 0) {
     text += ", " + std::to_string(bad_) + " not usable";
     if (!last_status_.empty()) text += " (the tracker reports error " + last_status_ + ")";

@@ -23,10 +23,17 @@ struct SamplerOptions {
   /// Without enough good samples by then, beyond the time that was asked for, the take fails with its reason; one whose
   /// mean is not known as well as was asked for ends with what it has, and says so.
   double time_limit_s = 30.0;
+  bool holds_at_time_limit = false;  ///< Instead it is held there: keep(), waitLonger() or start() goes on.
   AveragingOptions averaging;
 };
 
-enum class TakeState { kIdle, kCollecting, kDone, kFailed };
+enum class TakeState {
+  kIdle,
+  kCollecting,
+  kHeld,  ///< Its time is over before it has what was asked for, and what becomes of it is not said yet.
+  kDone,
+  kFailed
+};
 
 /// Collects the good samples of one sensor for a take of one place. Pure: samples in, state out; no clock, no thread.
 ///
@@ -40,16 +47,23 @@ class NodeSampler {
   TakeState add(const Sample& sample);
   /// One that is done looks on: motion starts it over, and nothing else of the sample counts.
   void watch(const Sample& sample);
+  /// A reading of a jig that has not come to rest: it is no sample.
+  TakeState passOver(const Sample& sample);
   /// Time goes on, also for a sensor that says nothing. @param time_s of the clock of the samples
   TakeState passTime(double time_s);
+  bool canKeep() const { return state_ == TakeState::kHeld && can_keep_; }  ///< What it has can be averaged.
+  void keep();        ///< A held one is done with what it has, and says in what it fell short.
+  void waitLonger();  ///< A held one goes on, for as long again.
   /// What is collected counts no more, even where that was enough. @param motion what was seen: "moved 3 mm"
   void startOver(const std::string& motion);
+  /// The same, for another reason than motion: that is no reason to suspect the take.
+  void beginAgain(const std::string& why);
   TakeState state() const { return state_; }
   int collected() const { return collected_; }  ///< Good samples so far.
   int wanted() const { return wanted_; }        ///< Good samples; so far estimated where they are not counted.
   int restarts() const { return restarts_; }    ///< Times motion made it start over.
   const std::string& lastMotion() const { return last_motion_; }
-  /// Why it restarted or failed, what it waits for; in what it fell short where it is done all the same.
+  /// Why it restarted, failed or is held, what it waits for; in what it fell short where it is done all the same.
   const std::string& message() const { return message_; }
   const std::vector<Sample>& samples() const {
     return samples_;
@@ -69,6 +83,10 @@ class NodeSampler {
   void timeOut();
   std::optional<std::string> motion() const;
   void finish();
+  double allowed_s() const;
+  bool canAverage() const;
+  bool isKnown() const;  ///< The mean, if not as well as was asked for.
+  std::string shortfall() const;
   std::string timeLimitReason() const;
 
   SamplerOptions options_;
@@ -77,10 +95,15 @@ class NodeSampler {
   int wanted_ = 0;
   int next_look_ = 0;  ///< Good samples at which the next block ends.
   int restarts_ = 0;
-  int bad_ = 0;  ///< Samples with an error status since start(), over all restarts.
+  int bad_ = 0;          ///< Samples with an error status since start(), over all restarts.
+  int passed_over_ = 0;  ///< Since start().
   std::string last_status_;
   std::string last_motion_;
-  std::optional<double> first_time_s_;  ///< When the take began.
+  std::optional<double> first_time_s_;  ///< When its time began to run.
+  bool can_keep_ = false;               ///< As it was held.
+  int limits_ = 1;                      ///< Time limits that it was given.
+  bool was_held_ = false;               ///< Since the newest sample.
+  double held_s_ = 0.0;                 ///< Of the time that its samples span.
   std::optional<double> newest_s_;      ///< Of its own samples.
   double now_s_ = 0.0;
   std::string message_;

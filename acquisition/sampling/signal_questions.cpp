@@ -78,6 +78,13 @@ std::string oppositeText(const std::string& hemisphere) {
   return "hemisphere " + std::string(hemisphere[0] == '-' ? "+" : "-") + hemisphere[1] + " in place of " + hemisphere;
 }
 
+/// That there may be less noise than is told.
+std::string leastText(const SignalReport& report) {
+  constexpr double kRounding = 1.001;
+  if (report.noise->sds_m[2] > kRounding * report.least_sd_m) return {};
+  return " (along an axis no less than " + mmText(report.least_sd_m) + " is told)";
+}
+
 std::string lineText(const SignalReport& report) {
   if (!report.spectrum || report.spectrum->lines.empty()) return {};
   const recording::SpectralLine& line = report.spectrum->lines.front();
@@ -191,18 +198,19 @@ Answer noiseAnswer(const SignalReport& report, const std::optional<double>& expe
   }
   const double sd_m = report.noise->sd_m();
   const std::string seen = "SD " + mmText(sd_m) + " at " + fixedText(report.stand->position_m.norm(), 2) + " m";
+  const std::string more = leastText(report) + lineText(report);
   if (report.correlation >= 1.0) {
     return {Verdict::kLook, "every reading is the same: the tracker is stuck, or its step hides its noise"};
   }
   if (!expected_sd_m) {
-    return {Verdict::kNotKnown, seen + "; what this tracker should have there is not known" + lineText(report)};
+    return {Verdict::kNotKnown, seen + "; what this tracker should have there is not known" + more};
   }
   const std::string expected = seen + ", where about " + mmText(*expected_sd_m) + " is to be expected";
   if (sd_m > kTooNoisy * *expected_sd_m) {
     return {Verdict::kLook,
-            "no: " + expected + lineText(report) + ": look for mains, monitors, motors and other transmitters nearby"};
+            "no: " + expected + more + ": look for mains, monitors, motors and other transmitters nearby"};
   }
-  return {Verdict::kGood, "yes: " + expected + lineText(report)};
+  return {Verdict::kGood, "yes: " + expected + more};
 }
 
 }  // namespace fieldtrue::acquisition

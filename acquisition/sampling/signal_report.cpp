@@ -6,6 +6,7 @@
 
 #include "acquisition/sampling/stillness.h"
 #include "calib/core/statistics.h"
+#include "calib/recording/stand_noise.h"
 
 namespace fieldtrue::acquisition {
 
@@ -13,8 +14,12 @@ namespace {
 
 constexpr std::size_t kDriftParts = 10;
 constexpr double kShortestDrift_s = 20.0;
+/// As averageSamples has it where the readings show no step.
+constexpr double kFinestStep_m = 1e-6;
 /// The spectrum pools stops: one stand is cut into as many as it needs at least.
 constexpr std::size_t kSpectrumParts = 4;
+/// A line of parts of the stand may be off by so many of the spectrum's steps.
+constexpr double kStepsOff = 4.0;
 
 std::vector<Sample> goodOfStand(const SensorSignal& signal) {
   std::vector<Sample> good;
@@ -30,7 +35,26 @@ std::optional<recording::SampleSpectrum> spectrumOf(const std::vector<Sample>& s
   table.metadata.rate_hz = rate_hz;
   for (std::size_t i = 0; i < samples.size(); ++i)
     table.rows.push_back({static_cast<int>(i * kSpectrumParts / samples.size()), 0, samples[i]});
-  return recording::sampleSpectrum(recording::sampleVisits(table), table.metadata);
+  auto spectrum = recording::sampleSpectrum(recording::sampleVisits(table), table.metadata);
+  if (!spectrum || spectrum->lines.empty()) return spectrum;
+  for (SampleRow& row : table.rows) row.node = 0;
+  const auto stand = recording::sampleVisits(table);
+  if (stand.size() != 1) return spectrum;
+  const double within_hz = kStepsOff * (spectrum->frequencies_hz[1] - spectrum->frequencies_hz[0]);
+  spectrum->lines =
+      recording::linesOfStand(stand.front().times_s, stand.front().deviations, spectrum->lines, within_hz);
+  return spectrum;
+}
+
+/// Positions of what was averaged, a row each.
+Eigen::MatrixXd positionsOf_m(const std::vector<Sample>& samples, const NodeStatistics& statistics) {
+  std::vector<bool> is_left_out(samples.size(), false);
+  for (const Rejection& rejection : statistics.rejections) is_left_out[rejection.sample] = true;
+  Eigen::MatrixXd positions_m(static_cast<Eigen::Index>(statistics.n_used), 3);
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    if (!is_left_out[i]) positions_m.row(row++) = samples[i].tracker_from_sensor.position_m;
+  return positions_m;
 }
 
 double rateOf(const std::vector<Sample>& samples) {
@@ -49,7 +73,8 @@ void addStand(const SensorSignal& signal, SignalReport& report) {
   report.noise = noiseEllipsoid(statistics->covariance_m2, statistics->mean.position_m);
   report.sd_rot_rad = statistics->sd_rot_rad;
   report.correlation = statistics->autocorrelation;
-  report.worth = statistics->n_effective;
+  report.worth = recording::independentReadings(positionsOf_m(good, *statistics));
+  report.least_sd_m = (statistics->quantum_m > 0.0 ? statistics->quantum_m : kFinestStep_m) / std::sqrt(12.0);
   report.of_stand = statistics->n_used;
   report.spectrum = spectrumOf(good, report.rate_hz);
   report.drift = driftOf(signal.seconds);

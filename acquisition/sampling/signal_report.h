@@ -39,9 +39,10 @@ struct SignalReport {
   double rested_s = 0.0;  ///< 0 while it moves; what follows is of the stand and stays empty while it moves.
   std::optional<Pose> stand;
   std::optional<NoiseEllipsoid> noise;
+  double least_sd_m = 0.0;  ///< No less is told along an axis: the step of the readings, or what stands for it.
   double sd_rot_rad = 0.0;
   double correlation = 0.0;  ///< Of successive readings; 1 where all are the same.
-  double worth = 0.0;        ///< Independent readings that those of the stand are worth.
+  double worth = 0.0;        ///< Independent readings that those of the stand are worth, slow noise counted in.
   std::size_t of_stand = 0;
   std::optional<recording::SampleSpectrum> spectrum;
   std::optional<Drift> drift;

@@ -64,7 +64,8 @@ StillnessDetector::StillnessDetector(double window_s, double floor_m) : window_s
 
 void StillnessDetector::add(const Sample& sample) {
   judgement_.reset();
-  if (!samples_.empty() && sample.time_s < samples_.back().time_s) samples_.clear();
+  if (!samples_.empty() && sample.time_s < samples_.back().time_s) clear();
+  step_s_ = samples_.empty() ? 0.0 : sample.time_s - samples_.back().time_s;
   samples_.push_back(sample);
   samples_.erase(samples_.begin(), samples_.end() - static_cast<std::ptrdiff_t>(judgedSamples()));
 }
@@ -96,6 +97,7 @@ StillnessDetector::Judgement StillnessDetector::judge() const {
   const double newest_s = samples_.back().time_s;
   if (newest_good == samples_.rend() || newest_s - newest_good->time_s > kSilence * window_s_) {
     const std::string& status = samples_.back().status;
+    result.rest = Rest::kUntold;
     result.reason = "no signal: the tracker reports " + (status.empty() ? "no position" : "error " + status);
     return result;
   }
@@ -103,15 +105,17 @@ StillnessDetector::Judgement StillnessDetector::judge() const {
   const double span_s = newest_s - samples_.front().time_s;
   result.spread_m = spreadOf(positions);
   if (positions.size() < kMinSamples || span_s < kFullWindow * window_s_) {
+    result.rest = step_s_ > kLongestStep_s ? Rest::kUntold : Rest::kWatching;
     result.reason = "hold still: watching the sensor";
     return result;
   }
   // The means of the two halves lie half the window apart.
   result.speed_m_s = driftBetweenHalves(positions) / (0.5 * span_s);
   const int block = std::max(1, static_cast<int>(positions.size() / 4));
-  result.still =
-      !steadyRun(positions, floor_m_).moved() && !largestShift(positions, block, floor_m_, kStillSigmas).moved();
-  result.reason = result.still ? "still" : movingReason(result.speed_m_s);
+  const bool moves =
+      steadyRun(positions, floor_m_).moved() || largestShift(positions, block, floor_m_, kStillSigmas).moved();
+  result.rest = moves ? Rest::kMoving : Rest::kResting;
+  result.reason = moves ? movingReason(result.speed_m_s) : "still";
   return result;
 }
 
@@ -120,7 +124,7 @@ const StillnessDetector::Judgement& StillnessDetector::judgement() const {
   return *judgement_;
 }
 
-bool StillnessDetector::still() const { return judgement().still; }
+Rest StillnessDetector::rest() const { return judgement().rest; }
 double StillnessDetector::speed_m_s() const { return judgement().speed_m_s; }
 double StillnessDetector::spread_m() const { return judgement().spread_m; }
 std::string StillnessDetector::reason() const { return judgement().reason; }

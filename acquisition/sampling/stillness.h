@@ -11,6 +11,14 @@ namespace fieldtrue::acquisition {
 /// Whether a sample may enter an average: no error status, and finite numbers.
 bool isGood(const Sample& sample);
 
+/// What is seen of a sensor's rest.
+enum class Rest {
+  kUntold,    ///< It sends nothing that tells it: no signal, or too seldom.
+  kWatching,  ///< What it sent is too little yet.
+  kMoving,
+  kResting,
+};
+
 /// Watches the stream of one sensor and says whether it stands still, with the reason in words.
 class StillnessDetector {
  public:
@@ -19,14 +27,15 @@ class StillnessDetector {
   explicit StillnessDetector(double window_s = 0.5, double floor_m = 0.0005);
   void add(const Sample& sample);
   void clear();
-  bool still() const;
+  Rest rest() const;
+  bool still() const { return rest() == Rest::kResting; }
   double speed_m_s() const;    ///< Drift of the mean over the window.
   double spread_m() const;     ///< 3-D SD within the window.
   std::string reason() const;  ///< "still", "hold still: moving 4 mm/s", "no signal: ..."
 
  private:
   struct Judgement {
-    bool still = false;
+    Rest rest = Rest::kWatching;
     double speed_m_s = 0.0;
     double spread_m = 0.0;
     std::string reason = "waiting for the tracker";
@@ -38,6 +47,7 @@ class StillnessDetector {
   double window_s_;
   double floor_m_;
   std::vector<Sample> samples_;
+  double step_s_ = 0.0;                         ///< From the last reading but one to the last.
   mutable std::optional<Judgement> judgement_;  ///< Of samples_, kept until the next sample.
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,14 @@ class TakeSampler {
   void cancel();
   /// Samples of other sensors are passed over.
   TakeState add(const Sample& sample);
+  /// A reading of a jig that has not come to rest: no sensor takes it for a sample.
+  TakeState passOver(const Sample& sample);
   TakeState passTime(double time_s);
+
+  /// Of one that is held, as of each sensor's (NodeSampler).
+  bool canKeep() const;
+  void keep();
+  void waitLonger();
 
   TakeState state() const;
   const std::vector<OfSensor>& ofSensors() const { return of_sensors_; }
@@ -33,18 +41,22 @@ class TakeSampler {
   int collected() const { return farthestBehind().collected(); }
   int wanted() const { return farthestBehind().wanted(); }
   int restarts() const { return farthestBehind().restarts(); }
-  /// Why it restarted or failed: of each sensor that failed, by its number where there are several.
+  /// Why it restarted, failed or is held: of each sensor that did, by its number where there are several.
   std::string message() const;
   /// A reason as it is told of one sensor: by its number where there are several.
   std::string told(const OfSensor& one, const std::string& reason) const;
 
  private:
   const NodeSampler& farthestBehind() const;
+  /// Nothing came of any sensor for so long that the jig may have been anywhere: all begin again.
+  void beginAgainAfterGap(double time_s);
 
   SamplerOptions options_;
   bool runs_ = false;
   NodeSampler none_{options_};  ///< Stands for those that are not known yet.
   std::vector<OfSensor> of_sensors_;
+  std::optional<double> newest_s_;  ///< Of any sensor.
+  double longest_step_s_ = 0.0;     ///< From reading to reading.
 };
 
 }  // namespace fieldtrue::acquisition

@@ -72,7 +72,8 @@ void AcquisitionController::openSession(const QString& path, const QString& crea
 void AcquisitionController::closeSession() { impl_->close(); }
 
 void AcquisitionController::take() {
-  if (impl_->take.collecting()) return;
+  if (impl_->take.runs()) return;
+  impl_->take.times_again = 0;
   if (!impl_->store) {
     emit takeFailed(QStringLiteral("There is no session to record into; make a plan or open a session first."));
   } else if (impl_->store->isReadOnly()) {
@@ -102,13 +103,20 @@ void AcquisitionController::cancelTake() {
   impl_->views.tellSoon();
 }
 
+void AcquisitionController::keepTake() {
+  if (impl_->take.held() && impl_->take.sampler.canKeep()) impl_->keepTake();
+}
+
+void AcquisitionController::waitLonger() {
+  if (impl_->take.held()) impl_->waitLonger();
+}
+
+void AcquisitionController::takeAgain() {
+  if (impl_->take.held()) impl_->takeAgain();
+}
+
 void AcquisitionController::skip() {
-  if (!impl_->store || !impl_->places.current) return;
-  impl_->take.failure.clear();
-  impl_->stopTake();
-  const std::size_t place = *impl_->places.current;
-  if (!impl_->told(impl_->store->skip(place, "skipped by the operator"))) return;
-  if (impl_->told(impl_->reloadPlace(place))) impl_->advance();
+  if (impl_->store && impl_->places.current) impl_->skip("skipped by the operator");
 }
 
 void AcquisitionController::undo() {
@@ -144,8 +152,13 @@ void AcquisitionController::setSetup(const Setup& stated) { impl_->correctSetup(
 void AcquisitionController::setTakeLength(const TakeLength& length) {
   if (!impl_->told(checked(length))) return;
   impl_->take.options.length = length;
-  if (!impl_->take.collecting()) impl_->take.sampler = TakeSampler(impl_->take.options);
+  if (!impl_->take.runs()) impl_->take.sampler = TakeSampler(impl_->take.options);
   impl_->views.tellSoon();
+}
+
+void AcquisitionController::setAtTimeLimit(AtTimeLimit at_time_limit) {
+  impl_->take.at_time_limit = at_time_limit;
+  impl_->take.options.holds_at_time_limit = at_time_limit != AtTimeLimit::kUsual;
 }
 
 void AcquisitionController::setSessionState(const QString& key, const QString& value) {

@@ -13,6 +13,7 @@
 #include "acquisition/devices/tracker_device.h"
 #include "acquisition/plan/place_state.h"
 #include "acquisition/sampling/node_sampler.h"
+#include "acquisition/sampling/time_limit.h"
 #include "acquisition/session/session_store.h"
 #include "acquisition/session/signal_snapshot.h"
 
@@ -62,6 +63,7 @@ struct AcquisitionStatus {
   TakeState take = TakeState::kIdle;
   int collected = 0;  ///< By the sensor that is farthest behind.
   int wanted = 60;
+  bool can_keep = false;   ///< The take is held, and what it has can be averaged.
   bool automatic = false;  ///< Takes by itself when the sensor stands still near the place.
   bool still = false;
   QString reason;          ///< One line: "hold still: moving 4 mm/s", "press space", "retaking: moved 3 mm".
@@ -87,6 +89,11 @@ struct AcquisitionStatus {
   QString other_names;                  ///< Which recorded sensors are others than in the session; empty = none.
   bool takes_settle_sensors = false;    ///< Takes of the session say which are recorded: they go on.
   std::vector<int> of_session;          ///< Those that took its places, the leading one first.
+};
+
+enum class RemarkKind {
+  kNote,
+  kOtherSensors,  ///< Nothing is recorded: numbers of the session's sensors stand for other ones now.
 };
 
 /// Runs an acquisition: device, samplers and store.
@@ -130,6 +137,9 @@ class AcquisitionController : public QObject {
   /// elsewhere, it is refused once; asked for again within a few seconds it is taken, and marked.
   void take();
   void cancelTake();
+  void keepTake();    ///< Of a take that is held: what it has is stored, and marked.
+  void waitLonger();  ///< The same: it goes on, for as long again.
+  void takeAgain();   ///< The same: it begins anew.
   void skip();
   void undo();
   void redo();
@@ -141,6 +151,9 @@ class AcquisitionController : public QObject {
   void setSensors(const std::vector<int>& sensors);
   void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
   void setTakeLength(const fieldtrue::acquisition::TakeLength& length);  ///< Answers with failed where it is none.
+  /// What becomes of a take whose time is over. Asked, a person answers by keepTake, waitLonger, takeAgain, skip or
+  /// cancelTake; the jig that is carried on means keepTake.
+  void setAtTimeLimit(fieldtrue::acquisition::AtTimeLimit at_time_limit);
   /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said
   /// before; a session that is opened later and was begun with another set-up tells so.
   void setSetup(const fieldtrue::Setup& stated);
@@ -156,10 +169,12 @@ class AcquisitionController : public QObject {
   /// The take is on disk: a row a sensor, the leading one first.
   void nodesStored(int place, const std::vector<fieldtrue::Node>& nodes, const QString& suspicious);
   void takeFailed(const QString& reason, int place = -1);  ///< The place, where there is one.
-  void takeRefused(int place, double off_m);               ///< The sensor stands so far from it.
-  void deviceFailed(const QString& text);                  ///< The tracker was lost, or cannot be connected.
-  void deviceBack();                                       ///< The tracker that was lost runs again.
-  void finished();                                         ///< No place is left.
+  /// Its time is over before it has what was asked for, and a person is asked.
+  void takeHeld(int place, const QString& reason, bool can_keep);
+  void takeRefused(int place, double off_m);  ///< The sensor stands so far from it.
+  void deviceFailed(const QString& text);     ///< The tracker was lost, or cannot be connected.
+  void deviceBack();                          ///< The tracker that was lost runs again.
+  void finished();                            ///< No place is left.
   void tablesReady(const fieldtrue::CalibrationTable& table, const fieldtrue::SampleTable& samples);
   /// A take, a skip, undo or redo changed what is stored of a place: the rows of its live take, if it has one, and the
   /// samples.
@@ -172,8 +187,9 @@ class AcquisitionController : public QObject {
   void metadataChanged(const fieldtrue::TableMetadata& metadata);
   void sessionOpened(const QString& path, const QString& page, const QString& plan_json);
   void fitOpened(const QString& ftcal_text);  ///< The newest calibration of the session just opened, if it has one.
-  void remarked(const QString& message);      ///< What the user should know of the session just opened; no failure.
-  void failed(const QString& message);        ///< One sentence for the message line.
+  /// What the user should know of the session and of what records it; no failure.
+  void remarked(const QString& message, fieldtrue::acquisition::RemarkKind kind);
+  void failed(const QString& message);  ///< One sentence for the message line.
 
  private:
   struct Impl;

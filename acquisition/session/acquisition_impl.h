@@ -32,6 +32,7 @@ struct AcquisitionController::Impl {
   /// Sets other_tracker where the session was begun with another one; before the first take that one is forgotten.
   void compareTrackers(TableMetadata& known, const TableMetadata& said);
   void remarkOnTracker();
+  void remark(const std::string& text, RemarkKind kind = RemarkKind::kNote);
   /// Sets other_names where a recorded sensor has another name now; before the first take the names are forgotten.
   void compareNames(TableMetadata& known, const TableMetadata& said);
   /// Those that took the places done go on; before the first take those that a person chose, else all that report.
@@ -75,7 +76,15 @@ struct AcquisitionController::Impl {
   void addSample(const Sample& sample);
   /// The leading sensor's reading. @return whether stillness is to be judged anew
   bool follow(const Sample& sample);
-  void endTake(TakeState state);  ///< Where that is an end.
+  void collect(const Sample& sample, bool is_judged);  ///< A reading while a take runs.
+  void endTake(TakeState state);                       ///< Where that is an end.
+  void atTimeLimit();                                  ///< The take that runs is held: what was said for that is done.
+  void ask();
+  void watchHeldTake();  ///< The jig that is carried on says: keep it.
+  void keepTake();
+  void waitLonger();
+  void takeAgain();
+  void skip(const std::string& why);
   void considerAutomaticTake();
   std::string suspicionOfTake(std::size_t place) const;
   void finishTake();

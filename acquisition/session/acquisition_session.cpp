@@ -57,7 +57,7 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   setCurrent(places.next());
   tellOpened(content->page);
   if (!content->newest_fit.empty()) emit owner->fitOpened(QString::fromStdString(content->newest_fit));
-  for (const std::string& remark : store->remarks()) emit owner->remarked(QString::fromStdString(remark));
+  for (const std::string& text : store->remarks()) remark(text);
   remarkOnTracker();
   remarkOnLeftOut();
 }
@@ -132,6 +132,7 @@ void AcquisitionController::Impl::setCurrent(std::optional<std::size_t> place) {
   places.current = place;
   take.waiting_since_s.reset();
   take.refused_at.reset();
+  take.times_again = 0;
   if (moves) {
     places.spacing = spacing_m(store->places(), *place);
     take.stand.setLeaveDistance(std::clamp(0.25 * places.spacing, kLeaveAtLeast_m, kLeave_m));

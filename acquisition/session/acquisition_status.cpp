@@ -54,6 +54,7 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.take = take.failure.isEmpty() ? take.sampler.state() : TakeState::kFailed;
   result.collected = take.sampler.collected();
   result.wanted = take.sampler.wanted();
+  result.can_keep = take.held() && take.sampler.canKeep();
   result.automatic = take.automatic;
   result.still = take.stillness.still();
   result.reason = reason(&result.attention);
@@ -106,13 +107,21 @@ QString AcquisitionController::Impl::reason(bool* attention) const {
   *attention = !tracker.live && tracker.since_sample.isValid() && tracker.since_sample.elapsed() >= 2000;
   if (*attention) return QStringLiteral("the tracker stopped sending: check its line and its switch");
   if (!places.current) return QStringLiteral("all places are done");
+  *attention = take.held();
+  if (*attention) {
+    const char* onward = take.sampler.canKeep() ? ". Carrying the jig on keeps it" : "";
+    return QString::fromStdString(take.sampler.message() + onward);
+  }
   const std::vector<int> silent = tracker.silentSensors();
   *attention = !silent.empty();
   if (*attention) return QString::fromStdString(silentText(silent));
   if (take.collecting()) {
     const TakeSampler& sampler = take.sampler;
-    *attention = sampler.restarts() > 0 || !take.stillness.still();
-    const bool just_restarted = sampler.restarts() > 0 && sampler.collected() < sampler.wanted() / 2;
+    const bool began_again = !sampler.message().empty();
+    *attention = sampler.restarts() > 0 || began_again || !take.stillness.still();
+    if (take.awaits_rest && !began_again && !take.stillness.still())
+      return QString::fromStdString(take.stillness.reason());
+    const bool just_restarted = began_again && sampler.collected() < sampler.wanted() / 2;
     if (just_restarted) return QString::fromStdString(sampler.message());
     return QStringLiteral("hold still: %1 of %2").arg(sampler.collected()).arg(sampler.wanted());
   }

@@ -15,6 +15,7 @@ constexpr double kRestNear_s = 0.2;     ///< The same beside a place whose posit
 constexpr double kRestFound_s = 3.0;    ///< The same for a sensor found standing at the very start.
 constexpr double kLookEvery_s = 0.02;   ///< Stillness is judged no oftener, for that takes a while.
 constexpr double kFailureShown_s = 8.0;
+constexpr int kTimesAgain = 2;  ///< A take whose time is over is taken again by itself.
 
 }  // namespace
 
@@ -23,6 +24,23 @@ void RunningTake::start(const std::vector<int>& sensors, bool is_away) {
   taken_away = is_away;
   sampler = TakeSampler(options);
   sampler.start(sensors);
+  awaits_rest = mayMove();
+}
+
+bool RunningTake::mayMove() const {
+  const Rest rest = stillness.rest();
+  return rest == Rest::kMoving || rest == Rest::kWatching;
+}
+
+TakeState RunningTake::add(const Sample& sample, bool is_judged) {
+  awaits_rest = awaits_rest && (!is_judged || mayMove());
+  if (awaits_rest) return sampler.passOver(sample);
+  const int restarts = sampler.restarts(), collected = sampler.collected();
+  const TakeState state = sampler.add(sample);
+  awaits_rest = sampler.restarts() > restarts || sampler.collected() < collected;
+  // Of the rest before the motion nothing counts.
+  if (awaits_rest) stillness.clear();
+  return state;
 }
 
 void RunningTake::forgetFailure() {
@@ -34,7 +52,7 @@ bool RunningTake::watch(const Sample& sample, bool has_session) {
   stillness.add(sample);
   const bool look = !looked_at_s || std::abs(sample.time_s - *looked_at_s) >= kLookEvery_s;
   if (look) looked_at_s = sample.time_s;
-  if (has_session && automatic) {
+  if (has_session && (automatic || held())) {
     if (look) stood_still = stillness.still();
     stand.add(sample, stood_still);
   }
@@ -56,9 +74,23 @@ bool RunningTake::waitedInVain(const Sample& live) {
 void AcquisitionController::Impl::addSample(const Sample& sample) {
   const bool look = tracker.leads(sample) && follow(sample);
   if (!other_names.empty()) return;
-  if (take.collecting()) return endTake(take.sampler.add(sample));
+  if (take.collecting()) return collect(sample, look);
   keepLoose(loose.between(sample));
+  if (take.held()) return watchHeldTake();
   if (take.automatic && look) considerAutomaticTake();
+}
+
+void AcquisitionController::Impl::collect(const Sample& sample, bool is_judged) {
+  const bool awaited_rest = take.awaits_rest;
+  const TakeState state = take.add(sample, is_judged);
+  if (awaited_rest && take.awaits_rest) keepLoose(loose.between(sample));
+  // Asked for on the way, it is judged where the jig came to rest.
+  const bool just_rests = awaited_rest && !take.awaits_rest && !take.taken_away;
+  if (const auto off_m = just_rests ? places.tooFar_m(tracker.live) : std::nullopt) {
+    stopTake();
+    return refuse(*off_m);
+  }
+  endTake(state);
 }
 
 bool AcquisitionController::Impl::follow(const Sample& sample) {
@@ -73,6 +105,59 @@ bool AcquisitionController::Impl::follow(const Sample& sample) {
 void AcquisitionController::Impl::endTake(TakeState state) {
   if (state == TakeState::kDone) finishTake();
   if (state == TakeState::kFailed) failTake(take.sampler.message());
+  if (state == TakeState::kHeld) atTimeLimit();
+}
+
+void AcquisitionController::Impl::atTimeLimit() {
+  if (take.at_time_limit == AtTimeLimit::kAsk) return ask();
+  if (take.at_time_limit == AtTimeLimit::kKeep && take.sampler.canKeep()) return keepTake();
+  if (take.at_time_limit == AtTimeLimit::kSkip) return skip(take.sampler.message());
+  const auto place = places.current;
+  const bool again = take.at_time_limit == AtTimeLimit::kAgain && take.times_again < kTimesAgain;
+  failTake(take.sampler.message());
+  // Who was told may have gone on to another place.
+  if (!again || places.current != place || take.runs()) return;
+  ++take.times_again;
+  take.start(tracker.sensors, take.taken_away);
+}
+
+void AcquisitionController::Impl::ask() {
+  const QString why = QString::fromStdString(take.sampler.message());
+  note("take held", placeName(places.here()) + ": " + take.sampler.message());
+  // Where it stands now is what it is carried on from.
+  take.stand.forget();
+  views.tellSoon();
+  emit owner->takeHeld(static_cast<int>(*places.current), why, take.sampler.canKeep());
+}
+
+void AcquisitionController::Impl::watchHeldTake() {
+  if (!take.stand.left()) return;
+  if (take.sampler.canKeep()) return keepTake();
+  failTake(take.sampler.message() + "; the jig was carried on");
+}
+
+void AcquisitionController::Impl::keepTake() {
+  take.sampler.keep();
+  endTake(take.sampler.state());
+}
+
+void AcquisitionController::Impl::waitLonger() {
+  take.sampler.waitLonger();
+  take.awaits_rest = take.mayMove();
+  views.tellSoon();
+}
+
+void AcquisitionController::Impl::takeAgain() {
+  stopTake();
+  take.start(tracker.sensors, take.taken_away);
+  views.tellSoon();
+}
+
+void AcquisitionController::Impl::skip(const std::string& why) {
+  take.failure.clear();
+  stopTake();
+  if (!told(store->skip(*places.current, why))) return;
+  if (told(reloadPlace(*places.current))) advance();
 }
 
 void AcquisitionController::Impl::considerAutomaticTake() {

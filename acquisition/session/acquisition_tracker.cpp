@@ -163,7 +163,7 @@ void AcquisitionController::Impl::dropDevice() {
   tracker.sensors.clear();
   other_names.clear();
   if (!tracker.device) return;
-  if (take.collecting()) failTake("the tracker was disconnected; this take counts for no place");
+  if (take.runs()) failTake("the tracker was disconnected; this take counts for no place");
   tracker.drop();
   heard.clear();
   take.stillness.clear();
@@ -175,7 +175,7 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
     if (state == DeviceState::kFailed) tracker.retryLater();
     return;
   }
-  const bool was_lost = tracker.lost, was_running = tracker.running(), was_collecting = take.collecting();
+  const bool was_lost = tracker.lost, was_running = tracker.running(), was_taking = take.runs();
   const bool fails = state == DeviceState::kFailed && (state != tracker.state || text != tracker.text);
   const QString why = text.endsWith(QLatin1Char('.')) ? text.chopped(1) : text;
   tracker.lost = state == DeviceState::kFailed && was_running && tracker.reconnects;
@@ -189,7 +189,7 @@ void AcquisitionController::Impl::onDeviceState(DeviceState state, const QString
     heard.clear();
     take.stillness.clear();
     if (fails) emit owner->deviceFailed(tracker.text);
-    if (was_collecting) failTake("the tracker was lost: " + why.toStdString() + ". This take counts for no place");
+    if (was_taking) failTake("the tracker was lost: " + why.toStdString() + ". This take counts for no place");
     if (fails) note("device", "failed: " + text.toStdString());
   }
   if (tracker.lost) {
@@ -244,7 +244,7 @@ void AcquisitionController::Impl::onSamples(const std::vector<Sample>& samples) 
   tracker.since_sample.start();
   for (const Sample& sample : samples) {
     heard.add(sample);
-    const std::vector<Sample> recorded = tracker.recorded(sample, !sensors_are_settled && !take.collecting());
+    const std::vector<Sample> recorded = tracker.recorded(sample, !sensors_are_settled && !take.runs());
     if (take.collecting() && take.sampler.ofSensors().empty()) take.sampler.start(tracker.sensors);
     for (Sample of_sensor : recorded) {
       of_sensor.time_s = sessionTime_s(of_sensor.time_s);
@@ -320,19 +320,18 @@ void AcquisitionController::Impl::goOnWith(const std::vector<int>& sensors) {
   if (!isAmong(leader, going_on) && tracker.running() && isAmong(leader, tracker.reporting()) &&
       !isAmong(leader, tracker.silentSensors())) {
     const std::string led = "Sensor " + std::to_string(leader) + " leads and reports: it cannot be left out.";
-    emit owner->remarked(QString::fromStdString(led));
+    remark(led);
     return;
   }
   if (!told(store->setState(kGoingOnState, textOf(sensors)))) return;
   const std::string text = goingOnText(of_session, going_on);
   note("tracker", text);
-  emit owner->remarked(QString::fromStdString(text));
+  remark(text);
 }
 
 void AcquisitionController::Impl::remarkOnLeftOut() {
   const std::vector<int> of_session = places.sensors(), going_on = sensorsOfSession();
-  if (going_on.size() < of_session.size())
-    emit owner->remarked(QString::fromStdString(goingOnText(of_session, going_on)));
+  if (going_on.size() < of_session.size()) remark(goingOnText(of_session, going_on));
 }
 
 void AcquisitionController::Impl::noticeLate(const Sample& sample) {
@@ -346,7 +345,7 @@ void AcquisitionController::Impl::noticeLate(const Sample& sample) {
             : sensor + " reports and is not recorded in this session: its takes settled that " +
                   fieldtrue::sensorsText(tracker.sensors) + (tracker.sensors.size() == 1 ? " is" : " are") + ".";
     note("tracker", text);
-    emit owner->remarked(QString::fromStdString(text));
+    remark(text);
   }
 }
 
@@ -360,7 +359,7 @@ void AcquisitionController::Impl::remarkOnMissing() {
                      ", only " + fieldtrue::sensorsText(tracker.reporting()) + ": plug " + (is_one ? "it" : "them") +
                      " in again, or go on without (untick it on Connect; acquire --sensor).";
   text[0] = 'S';
-  emit owner->remarked(QString::fromStdString(text));
+  remark(text);
 }
 
 void AcquisitionController::Impl::compareTrackers(TableMetadata& known, const TableMetadata& said) {
@@ -388,12 +387,15 @@ void AcquisitionController::Impl::compareNames(TableMetadata& known, const Table
 }
 
 void AcquisitionController::Impl::remarkOnTracker() {
-  if (!other_names.empty()) emit owner->remarked(QString::fromStdString(other_names));
+  if (!other_names.empty()) remark(other_names, RemarkKind::kOtherSensors);
   if (!other_tracker) return;
-  emit owner->remarked(
-      QString::fromStdString("This session was begun with " + store->metadata().tracker.value_or("another tracker") +
-                             ", and what is taken now is of " + *other_tracker +
-                             ": one calibration of both is wrong. Connect the first again, or begin a new session."));
+  remark("This session was begun with " + store->metadata().tracker.value_or("another tracker") +
+         ", and what is taken now is of " + *other_tracker +
+         ": one calibration of both is wrong. Connect the first again, or begin a new session.");
+}
+
+void AcquisitionController::Impl::remark(const std::string& text, RemarkKind kind) {
+  emit owner->remarked(QString::fromStdString(text), kind);
 }
 
 Result<void> AcquisitionController::Impl::markOtherTracker() {

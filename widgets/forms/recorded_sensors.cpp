@@ -1,11 +1,14 @@
 #include "widgets/forms/recorded_sensors.h"
 
 #include <QCheckBox>
+#include <QComboBox>
 #include <QGridLayout>
+#include <QHBoxLayout>
 #include <QLabel>
 #include <QVBoxLayout>
 #include <algorithm>
 #include <set>
+#include <vector>
 
 #include "acquisition/session/recorded_sensors.h"
 #include "widgets/workbench/workbench.h"
@@ -39,6 +42,16 @@ RecordedSensors::RecordedSensors(Workbench& workbench, QWidget* parent) : QWidge
   rows->addWidget(new QLabel(tr("Recorded sensors"), this));
   grid_ = new QGridLayout;
   rows->addLayout(grid_);
+  leader_ = new QComboBox(this);
+  leader_->setObjectName(QStringLiteral("leadingSensor"));
+  leader_->setAccessibleName(tr("Leading sensor"));
+  leader_->setToolTip(tr("By it rest, the distance to go and the place are judged."));
+  auto* leader_row = new QHBoxLayout;
+  leader_row->addWidget(new QLabel(tr("Leads"), this));
+  leader_row->addWidget(leader_);
+  leader_row->addStretch();
+  rows->addLayout(leader_row);
+  connect(leader_, &QComboBox::activated, this, [this] { lead(leader_->currentData().toInt()); });
   hint_ = new QLabel(this);
   hint_->setObjectName(QStringLiteral("recordedSensorsHint"));
   hint_->setProperty("role", "muted");
@@ -65,6 +78,7 @@ void RecordedSensors::onStatus(const acquisition::AcquisitionStatus& status) {
     box->setEnabled(mayChange(status, sensor, is_recorded ? &*recorded : nullptr));
     box->setText(is_recorded && recorded->silent ? tr("Sensor %1, silent").arg(sensor) : tr("Sensor %1").arg(sensor));
   }
+  showLeader(status);
   hint_->setText(
       status.takes_settle_sensors
           ? tr("The places of this session were taken by these. One that is silent may be left out from here on.")
@@ -85,16 +99,45 @@ void RecordedSensors::makeBoxes(const std::vector<int>& sensors) {
   }
 }
 
+void RecordedSensors::showLeader(const acquisition::AcquisitionStatus& status) {
+  std::vector<int> recorded, listed;
+  for (const acquisition::SensorProgress& one : status.sensors) recorded.push_back(one.sensor);
+  const int leading = recorded.front();
+  std::sort(recorded.begin(), recorded.end());
+  for (int i = 0; i < leader_->count(); ++i) listed.push_back(leader_->itemData(i).toInt());
+  if (listed != recorded) {
+    leader_->clear();
+    for (const int sensor : recorded) leader_->addItem(tr("Sensor %1").arg(sensor), sensor);
+  }
+  leader_->setCurrentIndex(leader_->findData(leading));
+  // The takes of a session were led by it.
+  leader_->setEnabled(!status.takes_settle_sensors && recorded.size() > 1);
+}
+
 void RecordedSensors::choose(int sensor, bool recorded) {
-  std::set<int> sensors;
-  for (const acquisition::SensorProgress& one : workbench_.status().sensors) sensors.insert(one.sensor);
-  if (recorded)
-    sensors.insert(sensor);
-  else
-    sensors.erase(sensor);
-  // All that there are: one that is plugged in later is recorded too.
-  const bool all = sensors.size() == boxes_.size();
-  workbench_.setSensors(all ? std::vector<int>() : std::vector<int>(sensors.begin(), sensors.end()));
+  std::vector<int> sensors;
+  for (const acquisition::SensorProgress& one : workbench_.status().sensors)
+    if (one.sensor != sensor) sensors.push_back(one.sensor);
+  // One that was chosen to lead goes on leading; else the lowest does.
+  const bool is_led_by_choice = !sensors.empty() && sensors.front() == workbench_.status().sensors.front().sensor &&
+                                sensors.front() != *std::min_element(sensors.begin(), sensors.end());
+  if (recorded) sensors.push_back(sensor);
+  std::sort(sensors.begin() + (is_led_by_choice ? 1 : 0), sensors.end());
+  record(sensors);
+}
+
+void RecordedSensors::lead(int sensor) {
+  std::vector<int> sensors{sensor};
+  for (const acquisition::SensorProgress& one : workbench_.status().sensors)
+    if (one.sensor != sensor) sensors.push_back(one.sensor);
+  std::sort(sensors.begin() + 1, sensors.end());
+  record(sensors);
+}
+
+void RecordedSensors::record(const std::vector<int>& sensors) {
+  // All that there are, led as they are by themselves: one that is plugged in later is recorded too.
+  const bool all = sensors.size() == boxes_.size() && std::is_sorted(sensors.begin(), sensors.end());
+  workbench_.setSensors(all ? std::vector<int>() : sensors);
 }
 
 }  // namespace fieldtrue::widgets

@@ -2,10 +2,12 @@
 
 #include <QWidget>
 #include <map>
+#include <vector>
 
 #include "acquisition/session/acquisition_controller.h"
 
 class QCheckBox;
+class QComboBox;
 class QGridLayout;
 class QLabel;
 
@@ -13,7 +15,8 @@ namespace fieldtrue::widgets {
 
 class Workbench;
 
-/// Which of a tracker's sensors are recorded, a box each; to be seen only where there are several.
+/// Which of a tracker's sensors are recorded, a box each, and which of them leads; to be seen only where there are
+/// several.
 class RecordedSensors : public QWidget {
   Q_OBJECT
  public:
@@ -22,10 +25,15 @@ class RecordedSensors : public QWidget {
  private:
   void onStatus(const acquisition::AcquisitionStatus& status);
   void makeBoxes(const std::vector<int>& sensors);
+  void showLeader(const acquisition::AcquisitionStatus& status);
   void choose(int sensor, bool recorded);
+  void lead(int sensor);
+  /// @param sensors the leading one first
+  void record(const std::vector<int>& sensors);
 
   Workbench& workbench_;
   QGridLayout* grid_;
+  QComboBox* leader_;
   QLabel* hint_;
   std::map<int, QCheckBox*> boxes_;  ///< By sensor.
 };

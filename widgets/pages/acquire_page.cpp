@@ -15,6 +15,7 @@
 #include <algorithm>
 
 #include "widgets/forms/empty_page.h"
+#include "widgets/forms/held_take.h"
 #include "widgets/pages/place_list_model.h"
 #include "widgets/style/icons.h"
 #include "widgets/style/theme.h"
@@ -55,6 +56,7 @@ SampleRing::State ringState(acquisition::TakeState take) {
       return SampleRing::State::kCollecting;
     case acquisition::TakeState::kDone:
       return SampleRing::State::kDone;
+    case acquisition::TakeState::kHeld:
     case acquisition::TakeState::kFailed:
       return SampleRing::State::kFailed;
   }
@@ -68,6 +70,11 @@ QString bannerState(const acquisition::AcquisitionStatus& status) {
   return status.take == acquisition::TakeState::kCollecting ? QStringLiteral("collecting") : QStringLiteral("next");
 }
 
+/// A take runs, or is held.
+bool takes(const acquisition::AcquisitionStatus& status) {
+  return status.take == acquisition::TakeState::kCollecting || status.take == acquisition::TakeState::kHeld;
+}
+
 /// More sensors than there is room for below each other.
 bool standSideBySide(const acquisition::AcquisitionStatus& status) { return status.sensors.size() > kMostLines; }
 
@@ -77,7 +84,7 @@ QString sensorCells(const acquisition::SensorProgress& one, const acquisition::A
   const QString name =
       leads ? AcquirePage::tr("Sensor %1, leads").arg(one.sensor) : AcquirePage::tr("Sensor %1").arg(one.sensor);
   QString doing = AcquirePage::tr("ready");
-  if (status.take == acquisition::TakeState::kCollecting)
+  if (takes(status))
     doing = (standSideBySide(status) ? QStringLiteral("%1/%2") : AcquirePage::tr("%1 of %2"))
                 .arg(one.collected)
                 .arg(one.wanted);
@@ -115,8 +122,9 @@ AcquirePage::AcquirePage(Workbench& workbench, QWidget* parent) : QWidget(parent
   layout->setContentsMargins(0, 0, 0, 0);
   layout->addWidget(stack_);
 
-  addShortcut(Qt::Key_Space, [this] { workbench_.take(); });
-  addShortcut(Qt::Key_PageDown, [this] { workbench_.take(); });
+  addShortcut(Qt::Key_Space, [this] { onTakeKey(); });
+  addShortcut(Qt::Key_PageDown, [this] { onTakeKey(); });
+  for (const Qt::Key key : {Qt::Key_W, Qt::Key_PageUp}) addShortcut(key, [this] { held_->waitKey(); });
   addShortcut(Qt::Key_Escape, [this] { workbench_.cancelTake(); });
   connect(room_, &RoomView::placeClicked, list_, &QTableView::selectRow);
   connect(&workbench_, &Workbench::sessionChanged, this, &AcquirePage::onSession);
@@ -150,6 +158,8 @@ QWidget* AcquirePage::makeBanner() {
     label->setSizePolicy(QSizePolicy::Ignored, label == reason_ ? QSizePolicy::Fixed : QSizePolicy::Preferred);
     texts->addWidget(label);
   }
+  held_ = new HeldTake(workbench_, banner_);
+  texts->addWidget(held_);
   layout->addLayout(texts, 1);
   auto* distance = new QVBoxLayout;
   distance->setSpacing(0);
@@ -225,6 +235,7 @@ QWidget* AcquirePage::makeInspector() {
   skip_ = addAction(QStringLiteral("skip"), tr("Skip"), QStringLiteral("skip"), QStringLiteral("S"),
                     [this] { workbench_.skip(); });
   retake_ = addAction(QStringLiteral("retake"), tr("Retake"), QStringLiteral("retake"), QStringLiteral("R"), [this] {
+    if (held_->againKey()) return;
     const QModelIndex row = list_->currentIndex();
     if (row.isValid()) workbench_.goTo(row.row());
   });
@@ -263,6 +274,10 @@ QWidget* AcquirePage::makeInspector() {
   layout->addWidget(list_, 1);
   inspector->setMinimumWidth(kInspectorWidth);
   return inspector;
+}
+
+void AcquirePage::onTakeKey() {
+  if (!held_->takeKey()) workbench_.take();
 }
 
 void AcquirePage::onSession() {
@@ -314,6 +329,10 @@ void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
     detail = status.current ? tr("next: %1").arg(name) : name;
     name = status.reconnecting ? tr("Tracker lost - reconnecting") : tr("Tracker is back");
   }
+  if (status.take == acquisition::TakeState::kHeld) {
+    detail = tr("at %1").arg(name);
+    name = tr("Time is up - what now?");
+  }
   place_->setText(name);
   position_->setText(detail);
   showDistance(status);
@@ -334,7 +353,7 @@ void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
 
 void AcquirePage::showDistance(const acquisition::AcquisitionStatus& status) {
   const bool far = status.distance_known && status.distance_m.value_or(0.0) > kWorthTelling_m;
-  const bool shown = status.current && far && status.take != acquisition::TakeState::kCollecting;
+  const bool shown = status.current && far && !takes(status);
   to_go_->setVisible(shown);
   to_go_caption_->setVisible(shown);
   if (!shown) return;
@@ -395,7 +414,7 @@ void AcquirePage::showButtons(const acquisition::AcquisitionStatus& status) {
           .arg(total)
           .arg(status.recorded->n_skipped > 0 ? tr(", %1 skipped").arg(status.recorded->n_skipped) : QString()));
   const bool running = status.device == acquisition::DeviceState::kRunning;
-  take_->setEnabled(running && status.current && status.take != acquisition::TakeState::kCollecting);
+  take_->setEnabled(running && status.current && !takes(status));
   skip_->setEnabled(status.current.has_value());
   undo_->setEnabled(status.recorded->can_undo);
   redo_->setEnabled(status.recorded->can_redo);
@@ -413,6 +432,7 @@ void AcquirePage::fitText() {
   setPixelHeight(position_, static_cast<int>(window_height * kPositionTextShare));
   setPixelHeight(to_go_, static_cast<int>(window_height * kToGoTextShare));
   setPixelHeight(to_go_caption_, static_cast<int>(window_height * kReasonTextShare));
+  held_->setLetters(static_cast<int>(window_height * kReasonTextShare));
   fitPlace();
   fitReason();
   const int ring = static_cast<int>(window_height * 0.17);

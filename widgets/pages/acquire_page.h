@@ -14,6 +14,7 @@ class QTableView;
 
 namespace fieldtrue::widgets {
 
+class HeldTake;
 class PlaceListModel;
 class RoomView;
 class SampleRing;
@@ -35,6 +36,7 @@ class AcquirePage : public QWidget {
   QPushButton* addAction(const QString& name, const QString& label, const QString& icon_name, const QString& keys,
                          const std::function<void()>& action);
   void addShortcut(const QKeySequence& keys, const std::function<void()>& action);
+  void onTakeKey();
   void onSession();
   void onStatus(const acquisition::AcquisitionStatus& status);
   void showPlace(const acquisition::AcquisitionStatus& status);
@@ -54,6 +56,7 @@ class AcquirePage : public QWidget {
   QLabel* place_;
   QLabel* position_;
   QLabel* reason_;
+  HeldTake* held_;
   QLabel* to_go_;
   QLabel* to_go_caption_;
   SampleRing* ring_;

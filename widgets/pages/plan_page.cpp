@@ -150,6 +150,7 @@ QWidget* PlanPage::makeForm() {
   until_->setAccessibleName(tr("What a take is counted in"));
   connect(until_, &QComboBox::currentIndexChanged, this, &PlanPage::onUntil);
   onUntil();
+  makeAtTimeLimit();
 
   problem_ = new QLabel(panel);
   problem_->setObjectName(QStringLiteral("planProblem"));
@@ -171,6 +172,7 @@ QWidget* PlanPage::makeForm() {
   form->addRow(tr("Orientations"), orientations_);
   form->addRow(tr("Seatings"), reseat_);
   form->addRow(tr("Each take"), inRow({samples_, amount_, until_}));
+  form->addRow(tr("Time is up"), at_time_limit_);
   layout->addLayout(form);
 
   summary_ = new QLabel(panel);
@@ -295,6 +297,23 @@ QString PlanPage::summary(const acquisition::Plan& now, const std::vector<Planne
   if (!pipes.isEmpty()) text += tr(" Pipes: %1.").arg(pipes.join(QStringLiteral(", ")));
   const std::string orientations = evaluation::plannedOrientations(planned, Pose{}).text;
   return text + QStringLiteral("\n\n") + QString::fromStdString(orientations);
+}
+
+void PlanPage::makeAtTimeLimit() {
+  using acquisition::AtTimeLimit;
+  at_time_limit_ = new QComboBox(this);
+  at_time_limit_->setObjectName(QStringLiteral("atTimeLimit"));
+  at_time_limit_->setAccessibleName(tr("What becomes of a take that is not complete within its time"));
+  at_time_limit_->setToolTip(tr("A take that is not complete within 30 s, and the time that was asked for"));
+  const auto add = [this](const QString& label, AtTimeLimit at_time_limit) {
+    at_time_limit_->addItem(label, static_cast<int>(at_time_limit));
+  };
+  add(tr("ask: keep, wait or again"), AtTimeLimit::kAsk);
+  add(tr("keep what it has"), AtTimeLimit::kKeep);
+  add(tr("take it again, up to twice"), AtTimeLimit::kAgain);
+  add(tr("skip the place"), AtTimeLimit::kSkip);
+  connect(at_time_limit_, &QComboBox::currentIndexChanged, this,
+          [this] { workbench_.setAtTimeLimit(static_cast<AtTimeLimit>(at_time_limit_->currentData().toInt())); });
 }
 
 void PlanPage::onUntil() {

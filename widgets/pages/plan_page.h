@@ -32,6 +32,7 @@ class PlanPage : public QWidget {
   void onUnit();
   void onUntil();
   acquisition::TakeLength takeLength() const;
+  void makeAtTimeLimit();
   void onChanged();
   void loadPlanFile();
   /// Fills the form; a plan beyond the fields' usual ranges widens them rather than being changed.
@@ -55,6 +56,7 @@ class PlanPage : public QWidget {
   QSpinBox* samples_;
   QDoubleSpinBox* amount_;  ///< In place of it where a take is not counted in samples.
   QComboBox* until_;
+  QComboBox* at_time_limit_;
   QLabel* summary_ = nullptr;
   QLabel* problem_;
   QDoubleSpinBox* pipe_foot_;

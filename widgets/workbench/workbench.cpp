@@ -44,6 +44,7 @@ Workbench::Workbench(QObject* parent) : QObject(parent) {
   table_timer_.setSingleShot(true);
   connect(&table_timer_, &QTimer::timeout, this, &Workbench::tableChanged);
   controller_ = new acquisition::AcquisitionController;
+  controller_->setAtTimeLimit(acquisition::AtTimeLimit::kAsk);
   controller_->moveToThread(&thread_);
   connect(&thread_, &QThread::finished, controller_, &QObject::deleteLater);
   wireController();
@@ -424,6 +425,12 @@ void Workbench::openSession(const QString& path) {
 }
 
 void Workbench::take() { post(&acquisition::AcquisitionController::take); }
+void Workbench::keepTake() { post(&acquisition::AcquisitionController::keepTake); }
+void Workbench::waitLonger() { post(&acquisition::AcquisitionController::waitLonger); }
+void Workbench::takeAgain() { post(&acquisition::AcquisitionController::takeAgain); }
+void Workbench::setAtTimeLimit(acquisition::AtTimeLimit at_time_limit) {
+  post(&acquisition::AcquisitionController::setAtTimeLimit, at_time_limit);
+}
 void Workbench::cancelTake() { post(&acquisition::AcquisitionController::cancelTake); }
 void Workbench::skip() { post(&acquisition::AcquisitionController::skip); }
 void Workbench::undo() { post(&acquisition::AcquisitionController::undo); }

@@ -98,6 +98,10 @@ class Workbench : public QObject {
   void createSession(const QString& path, const acquisition::Plan& plan, const acquisition::TakeLength& length = {});
   void openSession(const QString& path);
   void take();
+  void keepTake();
+  void waitLonger();
+  void takeAgain();
+  void setAtTimeLimit(acquisition::AtTimeLimit at_time_limit);  ///< At first a person is asked.
   void cancelTake();
   void skip();
   void undo();

@@ -124,6 +124,61 @@ class NodeSamplerTest : public QObject {
     FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"known to 0.017 mm", "not to 0.001mm", "after 30 s"}));
   }
 
+  void aTakeIsHeldWhereThatIsAskedFor() {
+    SamplerOptions options;
+    options.length = {TakeLength::Until::kStandardError, 1e-6};
+    options.holds_at_time_limit = true;
+    NodeSampler sampler(options);
+    sampler.start();
+    NoisySensor sensor(1e-3, 0.0, 2);
+    while (sampler.add(sensor.next()) == TakeState::kCollecting) {
+    }
+    QVERIFY(sampler.state() == TakeState::kHeld && sampler.canKeep());
+    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"known to 0.017 mm", "not to 0.001mm", "after 30 s"}));
+    const int collected = sampler.collected();
+    sampler.add(sensor.next());
+    QCOMPARE(sampler.collected(), collected);
+    sampler.waitLonger();
+    while (sampler.add(sensor.next()) == TakeState::kCollecting) {
+    }
+    QVERIFY(sampler.state() == TakeState::kHeld);
+    QCOMPARE(sampler.collected(), 2 * collected);
+    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"not to 0.001mm", "after 60 s"}));
+    sampler.keep();
+    QVERIFY(sampler.state() == TakeState::kDone && !sampler.message().empty());
+  }
+
+  /// A take of 1.5 s that had half a second of good readings when its time was over, and a person who answers a minute
+  /// later.
+  void aPauseIsNoTimeOfATake() {
+    SamplerOptions options;
+    options.length = {TakeLength::Until::kSeconds, 1.5};
+    options.holds_at_time_limit = true;
+    NodeSampler sampler(options);
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 4);
+    const auto next = [&](double later_s, bool is_good) {
+      Sample sample = sensor.next();
+      sample.time_s += later_s;
+      if (!is_good) sample.status = "k";
+      return sample;
+    };
+    while (sampler.state() == TakeState::kCollecting) {
+      const Sample sample = next(0.0, true);
+      if (sample.time_s > 31.0)
+        sampler.add(sample);
+      else
+        sampler.passTime(sample.time_s);
+    }
+    QVERIFY(sampler.state() == TakeState::kHeld && sampler.canKeep());
+    QCOMPARE(sampler.collected(), 60);
+    sampler.waitLonger();
+    while (sampler.add(next(60.0, true)) == TakeState::kCollecting) {
+    }
+    QVERIFY(sampler.state() == TakeState::kDone);
+    QVERIFY2(sampler.collected() >= 180, qPrintable(QString::number(sampler.collected())));
+  }
+
   void sixtyGoodSamplesAreAveraged() {
     NodeSampler sampler;
     QVERIFY(sampler.state() == TakeState::kIdle);

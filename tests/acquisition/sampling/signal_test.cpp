@@ -61,6 +61,7 @@ class SignalTest : public QObject {
   void axes();
   void warmUp();
   void noise();
+  void theLeastNoiseThatIsTold();
 };
 
 void SignalTest::theWindowForgets() {
@@ -278,6 +279,16 @@ void SignalTest::noise() {
   FT_VERIFY_MATCH(
       holdsAll(noiseAnswer(reportOf(lying(10.0, Eigen::Vector3d::Zero())), 1e-4).text, {"every reading is the same"}));
   QVERIFY(noiseAnswer(SignalReport{}, 1e-4).verdict == Verdict::kNotKnown);
+}
+
+void SignalTest::theLeastNoiseThatIsTold() {
+  // Noise of a nanometre: a step of a micrometre, uniform, has an SD of 1/sqrt(12) = 0.29 um.
+  const SignalReport report = reportOf(lying(10.0, {1e-9, 1e-9, 1e-9}));
+  QVERIFY(std::abs(report.least_sd_m - 1e-6 / std::sqrt(12.0)) < 1e-12);
+  QVERIFY(std::abs(report.noise->sds_m[2] - report.least_sd_m) < 1e-10);
+  FT_VERIFY_MATCH(holdsAll(noiseAnswer(report, std::nullopt).text, {"along an axis no less than 0.00029 mm is told"}));
+  const Answer loud = noiseAnswer(reportOf(lying(10.0, {1e-4, 1e-4, 1e-4})), std::nullopt);
+  QVERIFY2(loud.text.find("no less than") == std::string::npos, loud.text.c_str());
 }
 
 FIELDTRUE_TEST(SignalTest)

@@ -91,7 +91,7 @@ class ControllerBarrierTest : public QObject {
     ThrowingTracker* tracker = owned.get();
     bench.tracker = tracker;
     bench.controller.adoptDevice(std::move(owned));
-    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.2);
     QCOMPARE(bench.controller.status().take, TakeState::kCollecting);
@@ -114,7 +114,7 @@ class ControllerBarrierTest : public QObject {
     const QString path = newPath();
     Bench bench(path);
     bench.takeHere();
-    bench.tracker->carryTo(bench.placePose(1));
+    bench.tracker->setDownAt(bench.placePose(1));
     bench.controller.take();
     bench.tracker->stand(0.2);
     QString given = path;

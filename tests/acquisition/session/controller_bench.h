@@ -44,6 +44,8 @@ class FakeTracker : public acquisition::TrackerDevice {
   }
 
   void restartClock() { n_ = 0; }
+  /// Time in which nothing is sent.
+  void pass(double seconds) { n_ += static_cast<std::uint64_t>(seconds * rate_hz); }
   void send(const Pose& pose, const std::string& status = {}) {
     const double time_s = static_cast<double>(n_++) / rate_hz;
     std::vector<Sample> samples;
@@ -67,6 +69,11 @@ class FakeTracker : public acquisition::TrackerDevice {
       true_pose = {from.position_m + s * (place.position_m - from.position_m), place.orientation};
       send(true_pose);
     }
+  }
+  /// Carried there, and at rest for as long as it takes to see that.
+  void setDownAt(const Pose& place) {
+    carryTo(place);
+    stand(0.6);
   }
   void lose() { emit stateChanged(acquisition::DeviceState::kFailed, "The cable was pulled."); }
   void comeBack() {
@@ -131,7 +138,7 @@ struct Bench {
   }
   /// Carries the jig to the current place and takes it as an operator does with the space bar.
   void takeHere() {
-    tracker->carryTo(placePose(*controller.status().current));
+    tracker->setDownAt(placePose(*controller.status().current));
     controller.take();
     tracker->stand(0.51);
   }

@@ -109,6 +109,7 @@ class LooseSamplesTest : public QObject {
   void failedAndRestartedTakesAreKept() {
     Bench bench(newPath());
     bench.tracker->true_pose = bench.placePose(0);
+    bench.tracker->stand(0.6);
     bench.controller.take();
     bench.tracker->stand(0.25);
     bench.tracker->lose();
@@ -117,6 +118,7 @@ class LooseSamplesTest : public QObject {
     const std::string status = "cancelled:" + std::to_string(bench.controller.status().session->places[0].node);
     QCOMPARE(countByStatus(bench.samples).at(status), 30);
     // A take that starts over because it was moved: what came before is kept, the rest is the take.
+    bench.tracker->stand(0.6);
     bench.controller.take();
     bench.tracker->stand(0.25);
     bench.tracker->true_pose.position_m.x() += 0.05;

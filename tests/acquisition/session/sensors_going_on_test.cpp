@@ -125,7 +125,7 @@ class SensorsGoingOnTest : public QObject {
 
   void aSensorPluggedInDuringATakeIsNot() {
     TwoSensors bench(newPath());
-    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.1);
     bench.tracker->on_jig[2] = kThird;

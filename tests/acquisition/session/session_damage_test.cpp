@@ -128,8 +128,9 @@ class SessionDamageTest : public QObject {
     const int before = static_cast<int>(bench.stored.size());
     bench.readTables();
     damage(path, leafOf("actions", 0.5));
+    bench.tracker->true_pose = bench.placePose(0);
     bench.controller.take();
-    bench.tracker->stand(0.6);
+    bench.tracker->stand(1.2);
     QCOMPARE(static_cast<int>(bench.stored.size()), before);
     QCOMPARE(bench.take_failures.size(), 1);
     QVERIFY2(bench.take_failures[0].contains("damaged"), qPrintable(bench.take_failures[0]));

@@ -74,7 +74,7 @@ class SessionGrowthTest : public QObject {
     // The reading that completes a take: what it costs is the storing, and all that follows from it. Taken in turn, so
     // that a busy machine bears on both alike.
     const auto cost_s = [](Bench& bench) {
-      bench.tracker->carryTo(bench.placePose(*bench.controller.status().current));
+      bench.tracker->setDownAt(bench.placePose(*bench.controller.status().current));
       bench.controller.take();
       for (int n = 0; n < 59; ++n) bench.tracker->send(bench.tracker->true_pose);
       const double before_s = computed_s();

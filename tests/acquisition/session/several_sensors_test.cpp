@@ -94,7 +94,7 @@ class SeveralSensorsTest : public QObject {
 
   void oneThatFallsSilentEndsTheTakeAndIsNamed() {
     TwoSensors bench(newPath());
-    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.2);
     bench.tracker->on_jig[1].is_plugged = false;
@@ -145,7 +145,7 @@ class SeveralSensorsTest : public QObject {
 
   void theLeadingOneMayFallSilentToo() {
     TwoSensors bench(newPath());
-    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.2);
     bench.tracker->on_jig[0].is_plugged = false;
@@ -157,11 +157,11 @@ class SeveralSensorsTest : public QObject {
 
   void motionStartsAllOver() {
     TwoSensors bench(newPath());
-    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.3);
     bench.tracker->true_pose.position_m.x() += 0.003;
-    bench.tracker->stand(0.8);
+    bench.tracker->stand(1.2);
     QCOMPARE(bench.nodes.size(), std::size_t{2});
     FT_VERIFY_MATCH(holdsAll(bench.suspicions[0].toStdString(), {"sensor 0: moved once while sampling"}));
     for (const Node& node : bench.nodes) {
@@ -174,7 +174,7 @@ class SeveralSensorsTest : public QObject {
   void oneThatHasEnoughGoesOnWatching() {
     TwoSensors bench(newPath());
     bench.tracker->on_jig[1].every = 4;
-    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     // Sensor 0 has its 60 readings after half a second, sensor 1 after two.
     bench.tracker->stand(1.0);
@@ -182,7 +182,7 @@ class SeveralSensorsTest : public QObject {
     bench.tracker->on_jig[0].jig_from_sensor.position_m.x() += 0.003;
     bench.tracker->stand(1.1);
     QVERIFY2(bench.nodes.empty(), "what the sensor saw of the slip started all over");
-    bench.tracker->stand(1.2);
+    bench.tracker->stand(1.6);
     QCOMPARE(bench.nodes.size(), std::size_t{2});
     FT_VERIFY_MATCH(holdsAll(bench.suspicions[0].toStdString(), {"sensor 0: moved once while sampling"}));
     const Pose stood = inverse(bench.tracker->reference_from_tracker) * bench.tracker->true_pose;
@@ -247,7 +247,7 @@ class SeveralSensorsTest : public QObject {
     bench.tracker->carryTo(bench.placePose(0));
     bench.tracker->true_pose.position_m.z() += 0.002;
     bench.controller.take();
-    bench.tracker->stand(0.51);
+    bench.tracker->stand(1.2);
     bench.readTables();
     QCOMPARE(bench.table.nodes.size(), std::size_t{4});
     QCOMPARE(bench.readingsAtPlaces(), std::size_t{240});
@@ -320,13 +320,13 @@ class SeveralSensorsTest : public QObject {
     bench.tracker->true_pose = bench.placePose(0);
     bench.controller.take();
     QCOMPARE(bench.controller.status().take, TakeState::kCollecting);
-    bench.tracker->stand(0.55);
+    bench.tracker->stand(1.2);
     QCOMPARE(bench.nodes.size(), std::size_t{2});
   }
 
   void aLostTrackerFailsTheTakeOfAll() {
     TwoSensors bench(newPath());
-    bench.tracker->carryTo(bench.placePose(0));
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.2);
     bench.tracker->lose();
