@@ -52,8 +52,9 @@ enum class ResponseAt { kModel, kHalfWayIfBent };
 class Linearized {
  public:
   /// @param block of each row, 0..n-1
+  /// @param predicted GapPhysics::predictions of the state; empty = not known yet
   Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening, std::span<const int> block,
-             ResponseAt response = ResponseAt::kModel);
+             ResponseAt response = ResponseAt::kModel, std::vector<Pose> predicted = {});
 
   Eigen::Index size() const { return residual_.size(); }
   const Eigen::VectorXd& residual() const { return residual_; }
