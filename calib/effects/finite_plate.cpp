@@ -10,6 +10,7 @@
 #include "calib/effects/parameters.h"
 #include "calib/effects/room_search.h"
 #include "calib/effects/rows.h"
+#include "calib/effects/sheet_field.h"
 #include "calib/field/metal_response.h"
 #include "calib/field/sheet_mesh.h"
 
@@ -103,6 +104,28 @@ class FinitePlate final : public field::CouplingDistortion {
   }
 
   bool admits(const Eigen::Vector3d& p_sensor_m) const override { return frame_.distance_m(p_sensor_m) > 0.005; }
+
+  /// As `at` of each setting, all at once.
+  void respond(std::span<const field::SensorSetting> settings, std::span<field::EffectResponse> responses) const {
+    const auto count = static_cast<Eigen::Index>(settings.size());
+    Eigen::MatrixX3d p_m(count, 3);
+    Eigen::Matrix<double, Eigen::Dynamic, 9> sum = Eigen::Matrix<double, Eigen::Dynamic, 9>::Zero(count, 9);
+    for (Eigen::Index i = 0; i < count; ++i)
+      p_m.row(i) = frame_.inPlate(settings[static_cast<std::size_t>(i)].tracker_from_sensor.position_m);
+    const SheetField field{p_m.col(0).data(), p_m.col(1).data(), p_m.col(2).data(), settings.size(), sum.data()};
+    for (std::size_t j = 0; j < ring_centers_m_.size(); ++j)
+      addDipole({ring_centers_m_[j].x(), ring_centers_m_[j].y(), moments_.row(static_cast<Eigen::Index>(j)).data()},
+                field);
+    for (std::size_t j = 0; j < charge_centers_m_.size(); ++j)
+      addCharge({charge_centers_m_[j].x(), charge_centers_m_[j].y(), charges_.row(static_cast<Eigen::Index>(j)).data()},
+                field);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      Eigen::Matrix3d in_plate;
+      in_plate << sum(i, 0), sum(i, 1), sum(i, 2), sum(i, 3), sum(i, 4), sum(i, 5), sum(i, 6), sum(i, 7), sum(i, 8);
+      responses[static_cast<std::size_t>(i)] = {};
+      responses[static_cast<std::size_t>(i)].field_per_m3 = frame_.tracker_from_plate * in_plate;
+    }
+  }
 
  private:
   template <typename OfPlace>
@@ -263,7 +286,7 @@ class FinitePlateFit final : public EffectFit {
     }
     const field::SheetMesh& mesh = square.mesh;
     const FinitePlate plate(frame, mesh.ringCenters_m(), mesh.chargeCenters_m(), size_m, answer, 1.0);
-    for (std::size_t i = 0; i < at.size(); ++i) responses[i] = plate.at(at[i]);
+    plate.respond(at, responses);
   }
 
   FittedEffect describe(const Eigen::VectorXd& searched, const Eigen::VectorXd& linear) const override {

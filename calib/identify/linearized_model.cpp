@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "calib/field/tracker_model.h"
 
@@ -188,12 +189,12 @@ std::vector<Vector6d> movedBy(std::span<const field::SensorSetting> at, std::spa
 }  // namespace
 
 Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening,
-                       std::span<const int> block, ResponseAt response)
+                       std::span<const int> block, ResponseAt response, std::vector<Pose> predicted)
     : channels_(physics.rows().channels()), order_(physics.size()) {
   std::iota(order_.begin(), order_.end(), std::size_t{0});
   std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) { return block[a] < block[b]; });
   const std::vector<field::SensorSetting> at = physics.settings(state.alignment);
-  const std::vector<Pose> reported = physics.predictions(state);
+  const std::vector<Pose> reported = predicted.empty() ? physics.predictions(state) : std::move(predicted);
   const std::vector<Vector6d> residuals = physics.residuals(reported);
   const auto n = static_cast<Eigen::Index>(order_.size());
   const GapRows& rows = physics.rows();
@@ -302,8 +303,9 @@ void Linearized::addTerms(const GapModel& state) {
 }
 
 Eigen::Matrix<double, 6, 1> Linearized::whitenedChange(std::size_t k, const field::EffectResponse& response) const {
-  Eigen::Matrix<double, 6, 1> change =
-      white_by_field_[k] * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(response.field_per_m3.data());
+  Eigen::Matrix<double, 6, 1> change = white_by_field_[k].col(0) * response.field_per_m3(0);
+  for (Eigen::Index i = 1; i < 9; ++i) change += white_by_field_[k].col(i) * response.field_per_m3(i);
+  if (response.shift_m.isZero(0.0) && response.turn_rad.isZero(0.0)) return change;
   if (!white_by_placing_.empty()) {
     change += white_by_placing_[k].leftCols<3>() * response.shift_m;
     change += white_by_placing_[k].rightCols<3>() * response.turn_rad;

@@ -52,8 +52,9 @@ enum class ResponseAt { kModel, kHalfWayIfBent };
 class Linearized {
  public:
   /// @param block of each row, 0..n-1
+  /// @param predicted GapPhysics::predictions of the state; empty = not known yet
   Linearized(const GapPhysics& physics, const GapModel& state, const Whitening& whitening, std::span<const int> block,
-             ResponseAt response = ResponseAt::kModel);
+             ResponseAt response = ResponseAt::kModel, std::vector<Pose> predicted = {});
 
   /// The same with other residuals, whitened and sorted as residual() is: "what if the readings showed this?"
   Linearized withResidual(Eigen::VectorXd residual) const;

@@ -182,23 +182,39 @@ class JointFit {
   JointFit(const GapPhysics& physics, const Whitening& whitening, const RefineOptions& options)
       : physics_(physics), whitening_(whitening), options_(options), block_(physics.size(), 0) {}
 
-  RefinedModel run(GapModel model) {
-    double cost = adaptedCostOf(model);
+  RefinedModel run(const GapModel& start) {
+    State state = stateOf(start);
+    double cost = adaptedCostOf(state);
     double damping = kFirstDamping;
     for (int step = 0; step < options_.most_steps; ++step) {
-      const System system = systemAt(model);
-      const double fall = descend(system, model, cost, damping);
+      const System system = systemAt(state);
+      const double fall = descend(system, state, cost, damping);
       if (fall <= 0.0) break;
-      cost = adaptedCostOf(model);
+      cost = adaptedCostOf(state);
       if (fall < kEnough) break;
     }
-    return finished(std::move(model), cost);
+    return finished(std::move(state), cost);
   }
 
  private:
   bool isUsed(std::size_t row) const { return options_.used.empty() || options_.used[row] != 0; }
 
   static constexpr double kFirstDamping = 1e-3;
+
+  /// A model and what a tracker reports in it, which is most of the work.
+  struct State {
+    GapModel model;
+    std::vector<Pose> predicted;
+  };
+
+  State stateOf(GapModel model) const {
+    std::vector<Pose> predicted = physics_.predictions(model);
+    return {std::move(model), std::move(predicted)};
+  }
+
+  Linearized linearizedAt(const State& state) const {
+    return Linearized(physics_, state.model, whitening_, block_, ResponseAt::kModel, state.predicted);
+  }
 
   enum class Applied { kFully, kAtTolerance, kForbidden };
 
@@ -211,8 +227,8 @@ class JointFit {
     int n_alignment = 0;
   };
 
-  System systemAt(const GapModel& model) const {
-    const Linearized at(physics_, model, whitening_, block_);
+  System systemAt(const State& state) const {
+    const Linearized at = linearizedAt(state);
     System system;
     system.center_m = alignmentCenter_m(at.settings());
     system.n_alignment = at.nAlignment();
@@ -221,26 +237,27 @@ class JointFit {
     if (options_.frozen) J.col(*options_.frozen).setZero();
     system.normal = J.transpose() * w.asDiagonal() * J;
     system.right = J.transpose() * (w.asDiagonal() * at.residual());
-    addPriors(model, at.nAlignment(), system.normal, system.right);
+    addPriors(state.model, at.nAlignment(), system.normal, system.right);
     system.scale = system.normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
     return system;
   }
 
   /// One damped step downhill. @return fall of the cost; 0 where none was found
-  double descend(const System& system, GapModel& model, double& cost, double& damping) const {
+  double descend(const System& system, State& state, double& cost, double& damping) const {
     const Eigen::MatrixXd scaled = system.scale.asDiagonal() * system.normal * system.scale.asDiagonal();
     for (int attempt = 0; attempt < 7; ++attempt) {
       Eigen::MatrixXd damped = scaled;
       damped.diagonal().array() += damping + 1e-10;
       for (const bool moves_rig : {true, false}) {
         const Eigen::VectorXd y = stepOf(damped, system.right, system.scale, moves_rig ? 0 : system.n_alignment);
-        GapModel next = model;
+        GapModel moved = state.model;
         const Applied applied =
-            y.allFinite() ? apply(y, system.center_m, system.n_alignment, next) : Applied::kForbidden;
-        const double next_cost = applied == Applied::kForbidden ? cost : costOf(next);
+            y.allFinite() ? apply(y, system.center_m, system.n_alignment, moved) : Applied::kForbidden;
+        State next = applied == Applied::kForbidden ? State{} : stateOf(std::move(moved));
+        const double next_cost = applied == Applied::kForbidden ? cost : costAt(usedResiduals(next), next.model);
         if (next_cost < cost) {
           const double fall = cost - next_cost;
-          model = std::move(next);
+          state = std::move(next);
           cost = next_cost;
           damping = std::max(1e-9, 0.2 * damping);
           return fall;
@@ -300,22 +317,21 @@ class JointFit {
     return is_moved ? Applied::kAtTolerance : Applied::kFully;
   }
 
-  /// Sum over rows of the residual law's penalty at the present scales, and that of the priors.
-  double costOf(const GapModel& model) const { return costAt(usedResiduals(model), model); }
-  double adaptedCostOf(const GapModel& model) {
-    const std::vector<Vector6d> used = usedResiduals(model);
+  double adaptedCostOf(const State& state) {
+    const std::vector<Vector6d> used = usedResiduals(state);
     scale_ = devianceOf(used, physics_.rows().has_orientation, options_.law).scale;
-    return costAt(used, model);
+    return costAt(used, state.model);
   }
 
-  std::vector<Vector6d> usedResiduals(const GapModel& model) const {
-    const std::vector<Vector6d> whitened = whitenedResiduals(physics_, model, whitening_);
+  std::vector<Vector6d> usedResiduals(const State& state) const {
+    const std::vector<Vector6d> all = whitened(physics_.residuals(state.predicted), whitening_);
     std::vector<Vector6d> used;
-    for (std::size_t i = 0; i < whitened.size(); ++i)
-      if (isUsed(i)) used.push_back(whitened[i]);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (isUsed(i)) used.push_back(all[i]);
     return used;
   }
 
+  /// Sum over rows of the residual law's penalty at the present scales, and that of the priors.
   double costAt(std::span<const Vector6d> used, const GapModel& model) const {
     const bool both = physics_.rows().has_orientation;
     const double nu = options_.law.degrees_of_freedom;
@@ -346,12 +362,12 @@ class JointFit {
     return w;
   }
 
-  RefinedModel finished(GapModel model, double cost) const {
-    const Linearized at(physics_, model, whitening_, block_);
+  RefinedModel finished(State state, double cost) const {
+    const Linearized at = linearizedAt(state);
     const Eigen::MatrixXd& J = at.nuisance();
     Eigen::MatrixXd normal = J.transpose() * weights(at).asDiagonal() * J;
     Eigen::VectorXd unused = Eigen::VectorXd::Zero(J.cols());
-    addPriors(model, at.nAlignment(), normal, unused);
+    addPriors(state.model, at.nAlignment(), normal, unused);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
     normal = scale.asDiagonal() * normal * scale.asDiagonal();
     normal.diagonal().array() += 1e-9;
@@ -359,7 +375,7 @@ class JointFit {
     refined.covariance =
         scale.asDiagonal() * normal.ldlt().solve(Eigen::MatrixXd::Identity(J.cols(), J.cols())) * scale.asDiagonal();
     refined.n_alignment = at.nAlignment();
-    refined.model = std::move(model);
+    refined.model = std::move(state.model);
     refined.cost = cost;
     return refined;
   }

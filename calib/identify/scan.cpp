@@ -10,40 +10,76 @@ namespace {
 /// Cross products of the columns [nuisance, effect, residual] over some rows.
 using Gram = Eigen::MatrixXd;
 
-struct Solution {
-  Eigen::VectorXd x;
-  double gain = 0.0;  ///< b^T x: what the fit takes off the sum of squares.
+/// What effects are added to: least squares of the residual by the nuisance alone, columns scaled to unit length; a
+/// column that others make up gets next to nothing.
+class NuisanceFit {
+ public:
+  /// @param gram of [nuisance, residual]
+  explicit NuisanceFit(const Gram& gram) {
+    const Eigen::Index q = gram.cols() - 1;
+    scale_ = unitScales(gram.diagonal().head(q));
+    Eigen::MatrixXd normal = scale_.asDiagonal() * gram.topLeftCorner(q, q) * scale_.asDiagonal();
+    normal.diagonal().array() += kRidge;
+    factor_.compute(normal);
+    forward_ = factor_.matrixL().solve(scale_.cwiseProduct(gram.col(q).head(q)));
+  }
+
+  struct Solution {
+    Eigen::VectorXd nuisance;
+    Eigen::VectorXd effect;
+    double gain = 0.0;  ///< What the effect takes off the sum of squares beyond the nuisance.
+  };
+
+  Solution alone() const { return {scale_.cwiseProduct(factor_.matrixU().solve(forward_)), {}, 0.0}; }
+
+  /// @param own Gram matrix of the effect's columns
+  /// @param mixed products of these (rows) and [nuisance, residual]
+  Solution with(const Gram& own, const Gram& mixed, const LinearPrior& prior) const {
+    const Eigen::Index q = scale_.size();
+    const Eigen::Index m = own.cols();
+    const Eigen::VectorXd scale = unitScales(own.diagonal());
+    const Eigen::MatrixXd across = factor_.matrixL().solve(
+        Eigen::MatrixXd(scale_.asDiagonal() * mixed.leftCols(q).transpose() * scale.asDiagonal()));
+    Eigen::MatrixXd rest = scale.asDiagonal() * own * scale.asDiagonal();
+    rest.noalias() -= across.transpose().lazyProduct(across);
+    rest.diagonal().array() += kRidge;
+    rest.diagonal() += scale.cwiseAbs2().cwiseProduct(prior.precision);
+    const Eigen::VectorXd pull = scale.cwiseProduct(mixed.col(q)) - across.transpose() * forward_;
+    Eigen::VectorXd y = rest.llt().solve(pull);
+    if (m == 1) {
+      const double x = std::clamp(scale[0] * y[0], prior.low, prior.high);
+      if (x != scale[0] * y[0]) y[0] = scale[0] > 0.0 ? x / scale[0] : 0.0;
+    }
+    Solution solution;
+    solution.gain = 2.0 * pull.dot(y) - y.dot(rest * y);
+    solution.effect = scale.cwiseProduct(y);
+    solution.nuisance = scale_.cwiseProduct(factor_.matrixU().solve(forward_ - across * y));
+    return solution;
+  }
+
+ private:
+  static constexpr double kRidge = 1e-9;
+
+  static Eigen::VectorXd unitScales(const Eigen::VectorXd& squares) {
+    return squares.unaryExpr([](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
+  }
+
+  Eigen::VectorXd scale_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::VectorXd forward_;
 };
 
-/// Least squares from cross products by columns scaled to unit length; a column that others make up gets next to
-/// nothing. The last columns are those that `prior` is about.
-Solution solve(const Gram& gram, const LinearPrior& prior = {}) {
-  const Eigen::Index n = gram.cols() - 1;
-  Eigen::VectorXd scale(n);
-  for (Eigen::Index j = 0; j < n; ++j) scale[j] = gram(j, j) > 0.0 ? 1.0 / std::sqrt(gram(j, j)) : 0.0;
-  Eigen::MatrixXd normal = scale.asDiagonal() * gram.topLeftCorner(n, n) * scale.asDiagonal();
-  normal.diagonal().array() += 1e-9;
-  const Eigen::Index m = prior.precision.size();
-  normal.diagonal().tail(m) += scale.tail(m).cwiseAbs2().cwiseProduct(prior.precision);
-  const Eigen::VectorXd right = scale.asDiagonal() * gram.col(n).head(n);
-  Eigen::VectorXd y = normal.llt().solve(right);
-  Solution solution;
-  solution.x = scale.asDiagonal() * y;
-  if (m == 1 && (solution.x[n - 1] < prior.low || solution.x[n - 1] > prior.high)) {
-    solution.x[n - 1] = std::clamp(solution.x[n - 1], prior.low, prior.high);
-    y[n - 1] = scale[n - 1] > 0.0 ? solution.x[n - 1] / scale[n - 1] : 0.0;
-    const Eigen::VectorXd rest = right.head(n - 1) - normal.col(n - 1).head(n - 1) * y[n - 1];
-    y.head(n - 1) = normal.topLeftCorner(n - 1, n - 1).llt().solve(rest);
-    solution.x = scale.asDiagonal() * y;
-  }
-  solution.gain = 2.0 * right.dot(y) - y.dot(normal * y);
-  return solution;
-}
-
-/// Residual sum of squares of a solution on other rows.
+/// Residual sum of squares of the nuisance of a solution on other rows.
 double heldOut(const Gram& gram, const Eigen::VectorXd& x) {
   const Eigen::Index n = x.size();
   return gram(n, n) - 2.0 * x.dot(gram.col(n).head(n)) + x.dot(gram.topLeftCorner(n, n) * x);
+}
+
+/// The same with an effect.
+double heldOut(const Gram& gram, const Gram& own, const Gram& mixed, const NuisanceFit::Solution& x) {
+  const Eigen::Index q = x.nuisance.size();
+  const Eigen::VectorXd of_nuisance = mixed.leftCols(q) * x.nuisance - mixed.col(q);
+  return heldOut(gram, x.nuisance) + x.effect.dot(own * x.effect) + 2.0 * x.effect.dot(of_nuisance);
 }
 
 class Scanner {
@@ -54,13 +90,11 @@ class Scanner {
     fixed_.leftCols(q) = at.nuisance();
     fixed_.col(q) = at.residual();
     for (const Segment& segment : blocks()) fixed_grams_.push_back(product(segment, fixed_, fixed_));
-    const std::vector<Gram> all = fixed_grams_;
-    const Gram total = sum(all);
-    base_gain_ = solve(total).gain;
+    const Gram total = sum(fixed_grams_);
+    fits_.emplace_back(total);
     for (std::size_t b = 0; b < at.segments().size(); ++b) {
-      const Solution without = solve(total - all[b]);
-      base_without_.push_back(without.gain);
-      base_held_out_.push_back(heldOut(all[b], without.x));
+      fits_.emplace_back(total - fixed_grams_[b]);
+      base_held_out_.push_back(heldOut(fixed_grams_[b], fits_.back().alone().nuisance));
     }
   }
 
@@ -71,32 +105,20 @@ class Scanner {
   };
 
   Tried tryColumns(const Eigen::MatrixXd& columns, const LinearPrior& prior) const {
-    const Eigen::Index q = at_.nuisance().cols();
-    const Eigen::Index m = columns.cols();
-    std::vector<Gram> grams;
-    const std::vector<Segment> segments = blocks();
-    for (std::size_t b = 0; b < segments.size(); ++b) {
-      const Gram own = product(segments[b], columns, columns);
-      const Gram mixed = product(segments[b], columns, fixed_);
-      const Gram& fixed = fixed_grams_[b];
-      Gram gram(q + m + 1, q + m + 1);
-      gram.topLeftCorner(q, q) = fixed.topLeftCorner(q, q);
-      gram.block(q, q, m, m) = own;
-      gram.block(q, 0, m, q) = mixed.leftCols(q);
-      gram.block(0, q, q, m) = mixed.leftCols(q).transpose();
-      gram.col(q + m).head(q) = fixed.col(q).head(q);
-      gram.col(q + m).segment(q, m) = mixed.col(q);
-      gram.row(q + m) = gram.col(q + m).transpose();
-      gram(q + m, q + m) = fixed(q, q);
-      grams.push_back(std::move(gram));
+    std::vector<Gram> own;
+    std::vector<Gram> mixed;
+    for (const Segment& segment : blocks()) {
+      own.push_back(product(segment, columns, columns));
+      mixed.push_back(product(segment, columns, fixed_));
     }
-    const Gram total = sum(grams);
+    const Gram all_own = sum(own);
+    const Gram all_mixed = sum(mixed);
     Tried tried;
-    tried.gain = solve(total, prior).gain - base_gain_;
+    tried.gain = fits_.front().with(all_own, all_mixed, prior).gain;
     for (std::size_t b = 0; b < at_.segments().size(); ++b) {
-      const Solution without = solve(total - grams[b], prior);
-      tried.without.push_back(without.gain - base_without_[b]);
-      tried.held_out.push_back(base_held_out_[b] - heldOut(grams[b], without.x));
+      const NuisanceFit::Solution without = fits_[b + 1].with(all_own - own[b], all_mixed - mixed[b], prior);
+      tried.without.push_back(without.gain);
+      tried.held_out.push_back(base_held_out_[b] - heldOut(fixed_grams_[b], own[b], mixed[b], without));
     }
     return tried;
   }
@@ -123,8 +145,7 @@ class Scanner {
   const Linearized& at_;
   Eigen::MatrixXd fixed_;
   std::vector<Gram> fixed_grams_;
-  double base_gain_ = 0.0;
-  std::vector<double> base_without_;
+  std::vector<NuisanceFit> fits_;  ///< Of all rows, then without each block.
   std::vector<double> base_held_out_;
 };
 

@@ -2,10 +2,27 @@
 
 #include <algorithm>
 #include <limits>
+#include <list>
 #include <optional>
 
 namespace fieldtrue::identify {
 namespace {
+
+bool isSame(const Pose& a, const Pose& b) {
+  return a.position_m == b.position_m && a.orientation.coeffs() == b.orientation.coeffs();
+}
+
+bool isSame(const GapTerm& a, const GapTerm& b) {
+  return a.fit == b.fit && a.searched == b.searched && a.linear == b.linear;
+}
+
+/// To the bit.
+bool isSame(const GapModel& a, const GapModel& b) {
+  const auto same = [](const auto& one, const auto& other) { return isSame(one, other); };
+  return isSame(a.alignment.tracker_from_reference, b.alignment.tracker_from_reference) &&
+         std::ranges::equal(a.alignment.mount_from_sensor, b.alignment.mount_from_sensor, same) &&
+         std::ranges::equal(a.terms, b.terms, same);
+}
 
 class Selector {
  public:
@@ -15,7 +32,7 @@ class Selector {
   EffectSelection run() {
     none_bic_ = search_.bicOf(search_.none().model);
     if (options_.most_effects < 1) return finished({}, {});
-    const std::vector<TriedEffect> first = search_.rank(search_.none(), control_);
+    const std::vector<TriedEffect>& first = ranked(search_.none());
     const TriedEffect* best = firstWorth(first, thresholds_.least_gain_first);
     if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);
     EffectSelection selection = grown(*best);
@@ -28,6 +45,14 @@ class Selector {
   }
 
  private:
+  /// What GapSearch::rank makes of a model. Exchanging effects and looking for the leading one ask for the same again.
+  const std::vector<TriedEffect>& ranked(const RefinedModel& base) {
+    for (const Ranked& one : ranked_)
+      if (isSame(one.model, base.model)) return one.tried;
+    ranked_.push_back({base.model, search_.rank(base, control_)});
+    return ranked_.back().tried;
+  }
+
   /// The best effect worth adding: enough evidence, believable, and better on what it was not fitted to.
   static const TriedEffect* firstWorth(const std::vector<TriedEffect>& tried, double least_gain) {
     for (const TriedEffect& one : tried) {
@@ -41,7 +66,6 @@ class Selector {
   EffectSelection grown(const TriedEffect& first) {
     EffectSelection selection;
     const TriedEffect* next = &first;
-    std::vector<TriedEffect> following;
     while (next != nullptr && !control_.stop.stop_requested()) {
       EffectSelection grown = selection;
       add(*next, grown);
@@ -53,8 +77,7 @@ class Selector {
       }
       selection = std::move(grown);
       if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
-      following = search_.rank(selection.model, control_);
-      next = firstWorth(following, thresholds_.least_gain_more);
+      next = firstWorth(ranked(selection.model), thresholds_.least_gain_more);
     }
     selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
     return selection;
@@ -101,7 +124,7 @@ class Selector {
     for (std::size_t term = 0; term + 1 < selection.ways.size(); ++term) {
       const double bic = search_.bicOf(selection.model.model);
       const RefinedModel rest = without(selection, term);
-      const std::vector<TriedEffect> tried = search_.rank(rest, control_);
+      const std::vector<TriedEffect>& tried = ranked(rest);
       if (tried.empty()) return;
       const TriedEffect* best = firstWorth(tried, 0.0);
       if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) continue;
@@ -163,7 +186,7 @@ class Selector {
         rest = reduced;
       }
     }
-    selection.alternatives = search_.rank(rest, control_);
+    selection.alternatives = ranked(rest);
     const double bic = search_.bicOf(selection.model.model);
     const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
     if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) return;
@@ -172,11 +195,17 @@ class Selector {
     selection.leading = selection.ways.size() - 1;
   }
 
+  struct Ranked {
+    GapModel model;
+    std::vector<TriedEffect> tried;
+  };
+
   const GapSearch& search_;
   const Thresholds& thresholds_;
   const EffectSelectionOptions& options_;
   const RunControl& control_;
   double none_bic_ = 0.0;
+  std::list<Ranked> ranked_;
 };
 
 }  // namespace

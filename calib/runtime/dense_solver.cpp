@@ -30,6 +30,16 @@ void choleskyInverseInPlace(Eigen::MatrixXd& factor) {
   factor.triangularView<Eigen::Lower>() = inverse;
 }
 
+void lowerInverseInPlace(Eigen::MatrixXd& factor) {
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(factor.rows(), factor.cols());
+  factor.triangularView<Eigen::Lower>().solveInPlace(inverse);
+  factor.triangularView<Eigen::Lower>() = inverse;
+}
+
+void lowerTimesInPlace(const Eigen::MatrixXd& lower, Eigen::MatrixXd& right) {
+  right = lower.triangularView<Eigen::Lower>() * right;
+}
+
 double choleskyLogDeterminant(const Eigen::MatrixXd& factor) { return 2.0 * factor.diagonal().array().log().sum(); }
 
 bool symmetricEigenInPlace(Eigen::MatrixXd& matrix, Eigen::VectorXd& eigenvalues) {

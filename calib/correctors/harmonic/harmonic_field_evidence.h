@@ -13,7 +13,7 @@ inline constexpr Eigen::Index kPerSource = 6;
 using GroupMatrix = Eigen::Matrix<double, kPerSource, kPerSource>;
 
 /// A linear model y = A u + nuisance + noise of unit variance whose unknowns come in groups of kPerSource, as its
-/// normal equations. Of A^T A, most of which no choice of groups looks at, columns are made when they are asked for.
+/// normal equations. Of A^T A, most of which no choice of groups looks at, rows are made when they are asked for.
 class GroupedSystem {
  public:
   /// @param design A, which must outlive this
@@ -29,11 +29,11 @@ class GroupedSystem {
   double unit_m() const { return unit_m_; }
   /// Of A^T A, on the diagonal.
   const GroupMatrix& block(Eigen::Index group) const { return blocks_[static_cast<std::size_t>(group)]; }
-  Eigen::MatrixXd columns(Eigen::Index first_group, Eigen::Index count) const;  ///< Of A^T A, kPerSource each.
+  Eigen::MatrixXd rows(Eigen::Index first_group, Eigen::Index count) const;  ///< Of A^T A, kPerSource each.
 
  private:
   const Eigen::MatrixXd& design_;
-  Eigen::MatrixXd by_nuisance_;  ///< A^T nuisance.
+  Eigen::MatrixXd of_nuisance_;  ///< nuisance^T A.
   std::vector<GroupMatrix> blocks_;
   Eigen::VectorXd right_;
   double y_squared_;

@@ -26,8 +26,7 @@ struct Linearisation {
   Eigen::MatrixXd design;                          ///< d corrected / d amplitude, 3 rows a place.
   Eigen::Matrix<double, Eigen::Dynamic, 6> rigid;  ///< d corrected / d (shift, turn) that does the same to the truth.
   Eigen::VectorXd y;                               ///< True minus corrected, plus what the present amplitudes do.
-  Eigen::VectorXd present;                         ///< Present amplitudes, scaled.
-  Eigen::VectorXd present_effect;                  ///< design * present.
+  Eigen::VectorXd present_effect;                  ///< What the present amplitudes do.
   std::vector<double> scale;                       ///< Of each source: amplitude over tensor.
 };
 
@@ -53,7 +52,7 @@ class Fitter {
   }
 
   Result<HarmonicFit> run() {
-    misfit_m2_ = rigidMisfit(DisturbedField()).mean_square_m2;
+    take(rigidMisfit(DisturbedField()));
     const double without_sources_m2 = misfit_m2_;
     for (int step = 0; step < kMostSteps; ++step) {
       if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The harmonic field's fit was stopped");
@@ -96,10 +95,9 @@ class Fitter {
     const DisturbedField field(sources());
     std::vector<PlaceRow> rows(data_.size());
     control_.parallel_for(rows.size(), [&](std::size_t i) {
-      rows[i].derivative = PlaceDerivative::of(field, data_.p_tracked_m[i]);
-      const Eigen::Vector3d& corrected_m = rows[i].derivative.at_m;
-      rows[i].true_minus_corrected_m = field_from_truth_ * data_.p_true_m[i] - corrected_m;
-      rows[i].whitening = whiteningOf(i, field.trackedJacobian(corrected_m).inverse());
+      rows[i].derivative = PlaceDerivative::at(field, corrected_m_[i]);
+      rows[i].true_minus_corrected_m = field_from_truth_ * data_.p_true_m[i] - corrected_m_[i];
+      rows[i].whitening = whiteningOf(i, rows[i].derivative.by_tracked);
     });
     return rows;
   }
@@ -118,7 +116,6 @@ class Fitter {
     linear.design.resize(3 * n, kPerSource * n_sites);
     linear.rigid.resize(3 * n, 6);
     linear.y.resize(3 * n);
-    linear.present = Eigen::VectorXd::Zero(kPerSource * n_sites);
     linear.scale.resize(sites_.size());
     control_.parallel_for(sites_.size(), [&](std::size_t s) {
       auto columns = linear.design.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(s));
@@ -133,16 +130,16 @@ class Fitter {
       linear.scale[s] = std::sqrt(sum / static_cast<double>(n));
       columns /= linear.scale[s];
     });
+    linear.present_effect = Eigen::VectorXd::Zero(3 * n);
     for (std::size_t k = 0; k < chosen_.sites.size(); ++k)
-      linear.present.segment<kPerSource>(kPerSource * chosen_.sites[k]) =
-          linear.scale[static_cast<std::size_t>(chosen_.sites[k])] * chosen_.tensors[k];
+      linear.present_effect += linear.design.middleCols<kPerSource>(kPerSource * chosen_.sites[k]) *
+                               (linear.scale[static_cast<std::size_t>(chosen_.sites[k])] * chosen_.tensors[k]);
     for (Eigen::Index i = 0; i < n; ++i) {
       const PlaceRow& row = rows[static_cast<std::size_t>(i)];
       const Eigen::Vector3d p_true_m = row.derivative.at_m + row.true_minus_corrected_m;
       linear.rigid.middleRows<3>(3 * i) = row.whitening * effectOfMotion(p_true_m, center_m_);
       linear.y.segment<3>(3 * i) = row.whitening * row.true_minus_corrected_m;
     }
-    linear.present_effect = linear.design * linear.present;
     linear.y += linear.present_effect;
     // What has come to stand among the places is not offered again.
     for (std::size_t s = 0; s < sites_.size(); ++s)
@@ -154,6 +151,7 @@ class Fitter {
   /// How far the truth is from the positions that a field corrects, after the best rigid motion.
   struct Misfit {
     Pose field_from_truth;
+    std::vector<Eigen::Vector3d> corrected_m;
     double mean_square_m2 = 0.0;  ///< Per axis.
   };
 
@@ -161,11 +159,17 @@ class Fitter {
     std::vector<Eigen::Vector3d> corrected_m(data_.size());
     control_.parallel_for(data_.size(),
                           [&](std::size_t i) { corrected_m[i] = field.truePosition_m(data_.p_tracked_m[i]); });
-    Misfit misfit{fitRigid(data_.p_true_m, corrected_m).value_or(field_from_truth_)};
+    Misfit misfit{fitRigid(data_.p_true_m, corrected_m).value_or(field_from_truth_), std::move(corrected_m)};
     for (std::size_t i = 0; i < data_.size(); ++i)
-      misfit.mean_square_m2 += (misfit.field_from_truth * data_.p_true_m[i] - corrected_m[i]).squaredNorm() /
+      misfit.mean_square_m2 += (misfit.field_from_truth * data_.p_true_m[i] - misfit.corrected_m[i]).squaredNorm() /
                                (3.0 * static_cast<double>(data_.size()));
     return misfit;
+  }
+
+  /// What the field found so far makes of the places.
+  void take(Misfit misfit) {
+    misfit_m2_ = misfit.mean_square_m2;
+    corrected_m_ = std::move(misfit.corrected_m);
   }
 
   /// Variance of the noise, in units of the one stated, for one step's choice of sources: while the field is far off,
@@ -186,12 +190,12 @@ class Fitter {
         selectGroups(system, {options_.least_gain, options_.most_sources, noiseForStep(), unknown, n_chosen}, control_);
     noise_factor_ = std::clamp(selection.noise_factor, 1e-16, 1e16);
 
-    Eigen::VectorXd amplitudes = Eigen::VectorXd::Zero(linear.present.size());
+    Eigen::VectorXd effect = Eigen::VectorXd::Zero(linear.y.size());
     for (std::size_t k = 0; k < selection.groups.size(); ++k)
-      amplitudes.segment(kPerSource * selection.groups[k], kPerSource) =
-          selection.amplitudes.segment(kPerSource * static_cast<Eigen::Index>(k), kPerSource);
-    const Eigen::VectorXd change = linear.design * amplitudes - linear.present_effect;
-    const Eigen::Matrix<double, 6, 1> motion = qr.solve(linear.y - linear.design * amplitudes);
+      effect += linear.design.middleCols<kPerSource>(kPerSource * selection.groups[k]) *
+                selection.amplitudes.segment<kPerSource>(kPerSource * static_cast<Eigen::Index>(k));
+    const Eigen::VectorXd change = effect - linear.present_effect;
+    const Eigen::Matrix<double, 6, 1> motion = qr.solve(linear.y - effect);
     moveTruth(motion);
     const bool whole = keep(selection, linear);
     refine(selection.gain, step);
@@ -224,7 +228,7 @@ class Fitter {
       whole = false;
     }
     if (!whole) field_from_truth_ = misfit.field_from_truth;
-    misfit_m2_ = misfit.mean_square_m2;
+    take(std::move(misfit));
     return whole;
   }
 
@@ -262,9 +266,10 @@ class Fitter {
 
   void forgetSources() {
     chosen_ = Chosen();
-    const Misfit misfit = rigidMisfit(DisturbedField());
+    Misfit misfit = rigidMisfit(DisturbedField());
     field_from_truth_ = misfit.field_from_truth;
     noise_factor_ = std::max(noise_factor_, misfit.mean_square_m2 / (jig_sd_m_ * jig_sd_m_));
+    take(std::move(misfit));
   }
 
   /// Candidates of the next step: those chosen, their closer neighbours, and of the rest those that offered most; all
@@ -330,7 +335,8 @@ class Fitter {
   double noise_factor_ = 1.0;
   std::vector<Site> sites_;
   Chosen chosen_;
-  double misfit_m2_ = 0.0;  ///< Of the field found so far.
+  double misfit_m2_ = 0.0;                    ///< Of the field found so far.
+  std::vector<Eigen::Vector3d> corrected_m_;  ///< By the field found so far.
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calib/core/error.h"
+#include "calib/correctors/numerics/dense_solver.h"
 #include "calib/field/dipole_field.h"
 #include "calib/field/tracker_model.h"
 
@@ -80,8 +81,8 @@ PlaceDerivative PlaceDerivative::of(const DisturbedField& field, const Eigen::Ve
 PlaceDerivative PlaceDerivative::at(const DisturbedField& field, const Eigen::Vector3d& p_true_m) {
   PlaceDerivative place;
   place.at_m = p_true_m;
-  place.by_field =
-      -field.trackedJacobian(place.at_m).inverse() * field::solvedPositionDerivative(field.at(place.at_m), place.at_m);
+  place.by_tracked = field.trackedJacobian(place.at_m).inverse();
+  place.by_field = -place.by_tracked * field::solvedPositionDerivative(field.at(place.at_m), place.at_m);
   return place;
 }
 
@@ -134,11 +135,12 @@ FieldPosterior posteriorOf(std::span<const PlaceRow> rows, std::span<const Field
   FT_CHECK(sources.size() == priors.size());
   const std::vector<ChosenSource> chosen(sources.begin(), sources.end());
   const auto n_unknowns = kPerChosen * static_cast<Eigen::Index>(sources.size()) + 6;
-  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(n_unknowns, n_unknowns);
-  for (const PlaceRow& row : rows) {
-    const Eigen::MatrixXd effects = row.whitening * allEffects(row.derivative, chosen, about_m);
-    precision.noalias() += effects.transpose() * effects / noise_factor;
-  }
+  Eigen::MatrixXd effects(n_unknowns, 3 * static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    effects.middleCols<3>(3 * static_cast<Eigen::Index>(i)) =
+        (rows[i].whitening * allEffects(rows[i].derivative, chosen, about_m)).transpose();
+  Eigen::MatrixXd precision = timesOwnTranspose(effects) / noise_factor;
+  completeSymmetric(precision);
   for (std::size_t k = 0; k < priors.size(); ++k) {
     auto diagonal = precision.diagonal().segment<kPerChosen>(kPerChosen * static_cast<Eigen::Index>(k)).array();
     diagonal.head<kPerSource>() += 1.0 / priors[k].amplitude_variance;

@@ -23,6 +23,7 @@ FieldSource sourceOf(const Eigen::Vector3d& at_m, const TensorAmplitudes& amplit
 struct PlaceDerivative {
   Eigen::Vector3d at_m = Eigen::Vector3d::Zero();  ///< Where the field counts, transmitter frame.
   field::PositionDerivative by_field = field::PositionDerivative::Zero();  ///< d corrected / d field matrix.
+  Eigen::Matrix3d by_tracked = Eigen::Matrix3d::Identity();                ///< d corrected / d tracked.
 
   /// At a true position.
   static PlaceDerivative at(const DisturbedField& field, const Eigen::Vector3d& p_true_m);

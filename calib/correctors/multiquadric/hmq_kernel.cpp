@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "calib/correctors/numerics/clones.h"
+#include "calib/core/clones.h"
 
 namespace fieldtrue::correctors {
 

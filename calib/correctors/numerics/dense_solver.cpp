@@ -108,6 +108,19 @@ void choleskyInverseInPlace(Eigen::MatrixXd& factor) {
   FT_CHECK(info == 0);
 }
 
+void lowerInverseInPlace(Eigen::MatrixXd& factor) {
+  const int n = sizeOf(factor);
+  if (n > 0) invertLower(factor.data(), n, n);
+}
+
+void lowerTimesInPlace(const Eigen::MatrixXd& lower, Eigen::MatrixXd& right) {
+  const int n = sizeOf(lower);
+  FT_CHECK(right.rows() == lower.rows());
+  if (right.size() > 0)
+    cblas_dtrmm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, static_cast<int>(right.cols()),
+                1.0, lower.data(), n, right.data(), n);
+}
+
 double choleskyLogDeterminant(const Eigen::MatrixXd& factor) { return 2.0 * factor.diagonal().array().log().sum(); }
 
 bool symmetricEigenInPlace(Eigen::MatrixXd& matrix, Eigen::VectorXd& eigenvalues) {

@@ -22,6 +22,12 @@ void choleskyForward(const Eigen::MatrixXd& factor, Eigen::VectorXd& right);
 /// The inverse of L L^T in the lower triangle. @param factor in: what choleskyInPlace left; out: the inverse
 void choleskyInverseInPlace(Eigen::MatrixXd& factor);
 
+/// L^-1 in the lower triangle. @param factor in: what choleskyInPlace left; out: the inverse
+void lowerInverseInPlace(Eigen::MatrixXd& factor);
+
+/// L B for a lower triangular L. @param right in: B; out: the product
+void lowerTimesInPlace(const Eigen::MatrixXd& lower, Eigen::MatrixXd& right);
+
 /// log det(L L^T)
 double choleskyLogDeterminant(const Eigen::MatrixXd& factor);
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "calib/correctors/numerics/clones.h"
+#include "calib/core/clones.h"
 
 namespace fieldtrue::correctors {
 namespace {

@@ -9,6 +9,7 @@
 #include "calib/correctors/harmonic/harmonic_field_evidence.h"
 #include "calib/correctors/harmonic/harmonic_field_linear.h"
 #include "calib/correctors/harmonic/harmonic_field_physics.h"
+#include "calib/correctors/harmonic/six_columns.h"
 #include "calib/effects/compact_metal.h"
 #include "calib/field/pose_solver.h"
 #include "calib/field/tracker_model.h"
@@ -133,6 +134,7 @@ class HarmonicFieldTest : public QObject {
   void followsTheFieldWithASource();
   void followsASourceThatMoves();
   void believesNoShiftFarAboveTheLargestSeen();
+  void multipliesSixColumns();
   void addsAGroupByItsEvidence();
   void removesWhatMetalDoes();
   void isFarBetterThanASmoothFit();
@@ -248,6 +250,22 @@ void HarmonicFieldTest::believesNoShiftFarAboveTheLargestSeen() {
   QVERIFY2(most_m < 2.1 * largest_m, qPrintable(QString("%1 of %2").arg(most_m).arg(largest_m)));
   QVERIFY2(most_m > largest_m, "the probes must reach where the shift is large");
   QVERIFY(most_sd_m < 3.0 * largest_m);
+}
+
+// Against Eigen's product, for counts that fill no register.
+void HarmonicFieldTest::multipliesSixColumns() {
+  RandomGeometry random(14);
+  const auto filled = [&random](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&random] { return random.normal(); }).eval();
+  };
+  for (const Eigen::Index rows : {1, 7, 64, 171})
+    for (const Eigen::Index count : {1, 2, 5}) {
+      const Eigen::MatrixXd six = filled(rows, 6), wide = filled(rows, count);
+      Eigen::MatrixXd products(6, count);
+      sixColumnsTimes(six.data(), wide.data(), static_cast<std::size_t>(rows), static_cast<std::size_t>(count),
+                      products.data());
+      FT_VERIFY_MATCH(near(products, Eigen::MatrixXd(six.transpose() * wide), 1e-11));
+    }
 }
 
 // With six orthogonal columns of squared length s and the pull q on one of them the log evidence at prior variance v is
