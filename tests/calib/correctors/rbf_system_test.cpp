@@ -102,10 +102,10 @@ class RbfSystemTest : public QObject {
     Eigen::MatrixXd solved = root;
     choleskySolve(lower, solved);
     FT_VERIFY_MATCH(near(Eigen::MatrixXd(matrix * solved), root, 1e-10));
-    Eigen::MatrixXd root = lower.triangularView<Eigen::Lower>();
-    lowerInverseInPlace(root);
+    Eigen::MatrixXd of_lower = lower.triangularView<Eigen::Lower>();
+    lowerInverseInPlace(of_lower);
     Eigen::MatrixXd product = lower.triangularView<Eigen::Lower>();
-    lowerTimesInPlace(root, product);
+    lowerTimesInPlace(of_lower, product);
     FT_VERIFY_MATCH(near(product, Eigen::MatrixXd(Eigen::MatrixXd::Identity(7, 7)), 1e-12));
     choleskyInverseInPlace(lower);
     completeSymmetric(lower);
