@@ -93,7 +93,7 @@ void RecordedSensors::makeBoxes(const std::vector<int>& sensors) {
     auto* box = new QCheckBox(this);
     box->setObjectName(QStringLiteral("recordSensor%1").arg(sensor));
     const int n = static_cast<int>(boxes_.size());
-    grid_->addWidget(box, n / kBoxesInARow, n % kBoxesInARow);
+    grid_->addWidget(box, n / kBoxesInARow, n % kBoxesInARow, Qt::AlignLeft);
     connect(box, &QCheckBox::clicked, this, [this, sensor](bool recorded) { choose(sensor, recorded); });
     boxes_[sensor] = box;
   }

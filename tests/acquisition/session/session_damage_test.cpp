@@ -128,9 +128,12 @@ class SessionDamageTest : public QObject {
     const int before = static_cast<int>(bench.stored.size());
     bench.readTables();
     damage(path, leafOf("actions", 0.5));
-    bench.tracker->true_pose = bench.placePose(0);
+    bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
-    bench.tracker->stand(1.2);
+    bench.tracker->stand(3.0);
+    // The takes of this copy are made up, and what is far from them is asked for twice.
+    bench.controller.take();
+    bench.tracker->stand(3.0);
     QCOMPARE(static_cast<int>(bench.stored.size()), before);
     QCOMPARE(bench.take_failures.size(), 1);
     QVERIFY2(bench.take_failures[0].contains("damaged"), qPrintable(bench.take_failures[0]));
