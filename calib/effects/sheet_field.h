@@ -21,9 +21,9 @@ struct SheetSource {
   const double* strength;
 };
 
-/// Adds the field of a dipole. The sums are those of one place after the other, to the bit.
+/// Adds the field of a dipole.
 void addDipole(const SheetSource& source, const SheetField& field);
-/// Adds the field of a charge, as addDipole.
+/// Adds the field of a charge.
 void addCharge(const SheetSource& source, const SheetField& field);
 
 }  // namespace fieldtrue::effects
