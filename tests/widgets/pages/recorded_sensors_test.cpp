@@ -111,7 +111,7 @@ class RecordedSensorsTest : public WindowDriver {
     workbench.createSession(folder_.filePath(name + ".fieldtrue"), plan);
     workbench.connectDevice("trace:" + recording + ",rate=2", {});
     // Once it is heard, all are recorded as they are by themselves, whatever the session before had.
-    QTRY_VERIFY((workbench.setSensors({}), recorded() == std::vector<int>{0, 1, 2}));
+    QTRY_VERIFY_WITH_TIMEOUT((workbench.setSensors({}), recorded() == std::vector<int>{0, 1, 2}), 30000);
     click("step_connect");
   }
 };
