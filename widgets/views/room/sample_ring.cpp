@@ -9,6 +9,8 @@
 namespace fieldtrue::widgets {
 namespace {
 
+/// A take that would need more is not expected to come to an end by itself.
+constexpr int kMostForeseen = 100000;
 constexpr int kFlash_ms = 450;
 constexpr double kThickness = 0.13;  ///< Of the ring's diameter.
 constexpr int kTop = 90 * 16;        ///< Qt counts sixteenths of a degree from three o'clock.
@@ -89,7 +91,8 @@ void SampleRing::paintEvent(QPaintEvent*) {
   small.setPixelSize(std::max(8, static_cast<int>(0.12 * side)));
   painter.setFont(small);
   painter.setPen(theme().text_muted);
-  painter.drawText(outline.translated(0, below), Qt::AlignCenter, tr("of %1").arg(wanted_));
+  const QString of = wanted_ > kMostForeseen ? tr("so far") : tr("of %1").arg(wanted_);
+  painter.drawText(outline.translated(0, below), Qt::AlignCenter, of);
 }
 
 }  // namespace fieldtrue::widgets
