@@ -8,8 +8,8 @@ namespace {
 using identify::Thresholds;
 
 template <auto Member>
-Deciding one(const char* name, bool acts_on_one = true) {
-  return {name, acts_on_one, [](const Thresholds& thresholds) { return static_cast<double>(thresholds.*Member); },
+Deciding one(const char* name, bool is_tried = true) {
+  return {name, is_tried, [](const Thresholds& thresholds) { return static_cast<double>(thresholds.*Member); },
           [](Thresholds& thresholds, double factor) {
             auto& value = thresholds.*Member;
             value = static_cast<std::remove_reference_t<decltype(value)>>(factor * static_cast<double>(value));
@@ -17,7 +17,7 @@ Deciding one(const char* name, bool acts_on_one = true) {
 }
 
 const std::array kDeciding = {
-    one<&Thresholds::fewest_places>("fewest_places"),
+    one<&Thresholds::fewest_places>("fewest_places", false),
     one<&Thresholds::fewest_places_for_causes>("fewest_places_for_causes"),
     one<&Thresholds::astray>("astray"),
     one<&Thresholds::mirrored>("mirrored"),
@@ -50,8 +50,8 @@ const std::array kDeciding = {
     one<&Thresholds::cost_of_unselected>("cost_of_unselected"),
     one<&Thresholds::nameless_margin>("nameless_margin"),
     one<&Thresholds::mostly_scattered>("mostly_scattered"),
-    one<&Thresholds::same_on_design>("same_on_design"),
-    one<&Thresholds::hard_on_design>("hard_on_design"),
+    one<&Thresholds::same_on_design>("same_on_design", false),
+    one<&Thresholds::hard_on_design>("hard_on_design", false),
     one<&Thresholds::share_of_size>("share_of_size"),
     one<&Thresholds::share_of_distance>("share_of_distance"),
     one<&Thresholds::widest_place_m>("widest_place_m"),
@@ -63,8 +63,8 @@ const std::array kDeciding = {
     one<&Thresholds::told_place>("told_place"),
     one<&Thresholds::sure_thing>("sure_thing"),
     one<&Thresholds::silent_axis>("silent_axis"),
-    one<&Thresholds::open_cause>("open_cause"),
-    one<&Thresholds::least_separation>("least_separation"),
+    one<&Thresholds::open_cause>("open_cause", false),
+    one<&Thresholds::least_separation>("least_separation", false),
     one<&Thresholds::sure_of_change>("sure_of_change", false),
     one<&Thresholds::far_surer>("far_surer", false),
     one<&Thresholds::told_rig_moved_mm>("told_rig_moved_mm", false),

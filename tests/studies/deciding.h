@@ -10,8 +10,9 @@ namespace fieldtrue::testing {
 /// One member of Thresholds.
 struct Deciding {
   std::string name;
-  /// Whether it acts on one recording; else on what changed between two.
-  bool acts_on_one = true;
+  /// Whether half and double of it are tried: else it acts between two recordings, on plans, or on what to measure
+  /// next.
+  bool is_tried = true;
   double (*value)(const identify::Thresholds& thresholds) = nullptr;
   void (*scale)(identify::Thresholds& thresholds, double factor) = nullptr;
 };

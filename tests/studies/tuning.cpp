@@ -110,10 +110,10 @@ std::vector<Deciding> chosen(const std::vector<std::string>& names) {
   std::vector<Deciding> ones;
   for (const Deciding& one : decidingOnes()) {
     const bool is_named = names.empty() || std::find(names.begin(), names.end(), one.name) != names.end();
-    if (is_named && one.acts_on_one) ones.push_back(one);
+    if (is_named && one.is_tried) ones.push_back(one);
   }
   if (!names.empty() && ones.size() != names.size())
-    throw std::invalid_argument("not every name is one of a figure that acts on one recording");
+    throw std::invalid_argument("not every name is one of a figure that is tried");
   return ones;
 }
 
@@ -144,7 +144,9 @@ json scoreOf(const blind::Session& session) {
   const auto where = [](bool applies, auto value) { return applies ? json(value) : json(nullptr); };
   const std::vector<bool> held = is_single ? blind::locationCoverage(session) : std::vector<bool>();
   const auto n_held = static_cast<double>(std::count(held.begin(), held.end(), true));
-  const auto forecast = is_set ? blind::forecastOf(session) : std::nullopt;
+  // What single readings show is not looked for here.
+  const bool is_foretold = is_set && session.shelf != "signals";
+  const auto forecast = is_foretold ? blind::forecastOf(session) : std::nullopt;
   const double error = forecast ? forecast->probability - (forecast->is_right ? 1.0 : 0.0) : 0.0;
   return {{"first_right", where(is_single, blind::isRight(session, blind::firstNamed(session)))},
           {"other_named", where(is_in_catalogue, blind::namesOtherCause(session))},
@@ -200,17 +202,24 @@ std::string tuningTable(const std::vector<fs::path>& folders, const std::vector<
   }
   std::string table =
       head + " words changed, of " + std::to_string(usual.size()) + " |\n" + line + "---|\n" + first + " |\n";
+  std::string idle;
   for (const Deciding& one : ones) {
     const Scores& half = scores_of["half of " + one.name];
     const Scores& twice = scores_of["double of " + one.name];
-    table += "| `" + one.name + "` | " + formatNumber(one.value({})) + " |";
+    std::vector<std::string> cells;
     for (const Column& column : kColumns)
-      table += " " + pairText(figureOf(half, column), figureOf(twice, column), figureOf(usual, column)) + " |";
-    table += " " +
-             pairText(std::to_string(changedWords(usual, half)), std::to_string(changedWords(usual, twice)), "0") +
-             " |\n";
+      cells.push_back(pairText(figureOf(half, column), figureOf(twice, column), figureOf(usual, column)));
+    cells.push_back(
+        pairText(std::to_string(changedWords(usual, half)), std::to_string(changedWords(usual, twice)), "0"));
+    if (std::all_of(cells.begin(), cells.end(), [](const std::string& cell) { return cell == "="; })) {
+      idle += (idle.empty() ? "`" : ", `") + one.name + "`";
+      continue;
+    }
+    table += "| `" + one.name + "` | " + formatNumber(one.value({})) + " |";
+    for (const std::string& cell : cells) table += " " + cell + " |";
+    table += "\n";
   }
-  return table;
+  return table + (idle.empty() ? "" : "\nNothing changes with half and double of " + idle + ".\n");
 }
 
 }  // namespace fieldtrue::testing

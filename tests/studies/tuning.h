@@ -17,7 +17,7 @@ struct Trial {
   identify::Thresholds thresholds;
 };
 
-/// Those that act on one recording, or of these the named ones.
+/// Those that are tried, or of these the named ones.
 /// @param names empty = all
 /// @error std::invalid_argument for a name that none has
 std::vector<Deciding> chosen(const std::vector<std::string>& names);
