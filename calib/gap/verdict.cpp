@@ -113,7 +113,7 @@ bool decide(const identify::GapSearch& search, const Judgement& judgement, std::
 std::string shown(double value) {
   const double size = std::abs(value);
   const double scale = size >= 10.0 ? 1.0 : size >= 1.0 ? 10.0 : 100.0;
-  return formatNumber(std::round(value * scale) / scale);
+  return formatNumber(std::round(value * scale) / scale + 0.0);  // Never minus nothing.
 }
 
 std::string whyRefused(const Judgement& judgement) {

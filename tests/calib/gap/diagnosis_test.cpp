@@ -152,6 +152,18 @@ class DiagnosisTest : public QObject {
     FT_VERIFY_MATCH(near(sum, 1.0, 1e-9));
   }
 
+  /// However sure the evidence, a share of a thing's name is left to what the catalogue does not hold.
+  void noNameIsSurerThanTheCatalogueIsWhole() {
+    const Withheld made = withheldFrom("compact_metal", kBody);
+    const auto report = diagnose(made.table, nullptr, &made.believed);
+    FT_VERIFY_OK(report);
+    const GapCandidate& first = report->candidates.front();
+    QCOMPARE(first.effect, std::string("compact_metal"));
+    const double most = 1.0 - identify::Thresholds{}.unknown_as_thing;
+    QVERIFY2(first.probability <= most + 1e-9 && first.probability > 0.5,
+             qPrintable(QString::number(first.probability)));
+  }
+
   void believesWhatTheSceneHas() {
     const Withheld made = withheldFrom("compact_metal", kBody);
     simulation::Scene complete = made.believed;

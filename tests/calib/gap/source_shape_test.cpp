@@ -87,6 +87,13 @@ class SourceShapeTest : public QObject {
     }
   }
 
+  void aSentenceHasNoMinusNothing() {
+    SourceShape shape;
+    shape.shape = Shape::kFlatOrLoop;
+    shape.axes.col(0) = Eigen::Vector3d(0.6, -0.001, 0.8);
+    QVERIFY(sourceShapeText(shape).find("(0.6, 0, 0.8)") != std::string::npos);
+  }
+
   void withoutAThingInTheRoomThereIsNoShape() {
     const simulation::Scene scene = gapScene();
     const auto report = diagnose(recordedIn(scene, gapPlan()), nullptr, &scene);
