@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace fieldtrue::gap {
@@ -44,16 +45,16 @@ class FoldFitter {
   void run(int block, const RunControl& control) const {
     std::vector<char> used(blocks_.size());
     for (std::size_t i = 0; i < used.size(); ++i) used[i] = blocks_[i] != block ? 1 : 0;
-    identify::GapModel model;
-    model.alignment = search_.none().model.alignment;
-    model = search_.refined(model, used).model;
-    std::vector<identify::Vector6d> left = search_.physics().residuals(model);
-    score(left, used, scores_.step[0]);
-    scoreBeside({&laws_.alone, 1}, left, used, scores_.smooth);
-    for (std::size_t s = 0; s < selection_.ways.size(); ++s) {
-      if (control.stop.stop_requested()) return;
-      if (addBest(block, used, s, model)) left = search_.physics().residuals(model);
-      score(left, used, scores_.step[s + 1]);
+    identify::GapModel none;
+    none.alignment = search_.none().model.alignment;
+    none = search_.refined(none, used).model;
+    const std::vector<identify::GapModel> steps = likelierOf(block, used, none, control);
+    if (control.stop.stop_requested()) return;
+    std::vector<identify::Vector6d> left;
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+      left = search_.physics().residuals(steps[s]);
+      score(left, used, scores_.step[s]);
+      if (s == 0) scoreBeside({&laws_.alone, 1}, left, used, scores_.smooth);
     }
     const std::array either = {laws_.alone, laws_.beside};
     scoreBeside(either, left, used, scores_.both);
@@ -65,8 +66,41 @@ class FoldFitter {
     return identify::scan(at, *one.fit, one.fit->starts(), 1, {});
   }
 
-  /// Adds the effect that the fold's own rows like best, if they like any.
-  bool addBest(int block, std::span<const char> used, std::size_t step, identify::GapModel& model) const {
+  /// The models after none, one, two ... effects, which the fold's own rows choose. Taking the best at each step can
+  /// end at a poor set, where one thing passes for two others: the set that the whole recording names is fitted to the
+  /// fold's rows too, and these decide between the two.
+  std::vector<identify::GapModel> likelierOf(int block, std::span<const char> used, const identify::GapModel& none,
+                                             const RunControl& control) const {
+    const std::vector<identify::GapModel> best = steps(block, used, none, Choice::kBest, control);
+    const auto& named = selection_.ways;
+    const auto is_named = [&](const identify::GapTerm& term) {
+      return std::any_of(named.begin(), named.end(),
+                         [&](std::size_t way) { return search_.ways()[way].effect == term.effect; });
+    };
+    const auto& chosen = best.back().terms;
+    const bool is_same = chosen.size() == named.size() && std::all_of(chosen.begin(), chosen.end(), is_named);
+    if (named.size() < 2 || is_same || control.stop.stop_requested()) return best;
+    const std::vector<identify::GapModel> own = steps(block, used, none, Choice::kNamed, control);
+    return search_.bicOf(own.back(), used) < search_.bicOf(best.back(), used) ? own : best;
+  }
+
+  enum class Choice {
+    kBest,   ///< At each step what the fold's rows like best.
+    kNamed,  ///< At each step what the whole recording names there, liked or not.
+  };
+
+  std::vector<identify::GapModel> steps(int block, std::span<const char> used, const identify::GapModel& none,
+                                        Choice choice, const RunControl& control) const {
+    std::vector<identify::GapModel> models = {none};
+    for (std::size_t s = 0; s < selection_.ways.size() && !control.stop.stop_requested(); ++s) {
+      models.push_back(models.back());
+      addOne(block, used, s, choice, models.back());
+    }
+    return models;
+  }
+
+  /// Adds the effect that the fold's own rows like best, if they like any, or the one that is named at this step.
+  void addOne(int block, std::span<const char> used, std::size_t step, Choice choice, identify::GapModel& model) const {
     const identify::GapModel from = search_.seenFrom(step == 0 ? search_.none().model : model);
     const identify::Linearized at(search_.physics(), from, search_.whitening(), blocks_,
                                   identify::ResponseAt::kHalfWayIfBent);
@@ -81,7 +115,8 @@ class FoldFitter {
     for (std::size_t w = 0; w < ways_.size(); ++w) {
       const identify::EffectWay& way = search_.ways()[ways_[w]];
       const auto is_there = [&](const identify::GapTerm& term) { return term.effect == way.effect; };
-      if (std::any_of(model.terms.begin(), model.terms.end(), is_there)) continue;
+      if (choice == Choice::kNamed ? w != step : std::any_of(model.terms.begin(), model.terms.end(), is_there))
+        continue;
       const identify::ScanResult scan = step == 0 ? first_[w] : scanned(at, ways_[w]);
       if (scan.without_block.size() <= held_out) continue;
       const identify::ScanResult::Start& start = scan.without_block[held_out];
@@ -94,12 +129,13 @@ class FoldFitter {
     const auto is_own = [&](const Start& start) { return start.way == ways_[step]; };
     const auto others = starts.begin() + static_cast<std::ptrdiff_t>(std::min(starts.size(), kSearchedAFold));
     starts.erase(std::stable_partition(others, starts.end(), is_own), starts.end());
-    const double base = search_.bicOf(model, used);
     const identify::Thresholds& thresholds = search_.thresholds();
-    double best = base - (step == 0 ? thresholds.least_gain_first : thresholds.least_gain_more) * n /
-                             static_cast<double>(used.size() * static_cast<std::size_t>(channels()));
+    double best = std::numeric_limits<double>::infinity();
+    if (choice == Choice::kBest) {
+      best = search_.bicOf(model, used) - (step == 0 ? thresholds.least_gain_first : thresholds.least_gain_more) * n /
+                                              static_cast<double>(used.size() * static_cast<std::size_t>(channels()));
+    }
     const identify::GapModel before = search_.seenFrom(model);
-    bool is_added = false;
     for (const Start& start : starts) {
       const identify::EffectWay& way = search_.ways()[start.way];
       const identify::LocalFit local = identify::refineLocally(at, *way.fit, start.searched, held_out);
@@ -110,9 +146,7 @@ class FoldFitter {
       if (bic >= best) continue;
       best = bic;
       model = tried;
-      is_added = true;
     }
-    return is_added;
   }
 
   int channels() const { return search_.physics().rows().channels(); }
