@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <random>
 
 namespace fieldtrue::gap {
@@ -67,40 +66,41 @@ class FoldFitter {
   }
 
   /// The models after none, one, two ... effects, which the fold's own rows choose. Taking the best at each step can
-  /// end at a poor set, where one thing passes for two others: the set that the whole recording names is fitted to the
-  /// fold's rows too, and these decide between the two.
+  /// end at a poor set, where one thing passes for two others, or at a poor place of the right one: what the whole
+  /// recording names is fitted to the fold's rows too, and these decide between the two.
   std::vector<identify::GapModel> likelierOf(int block, std::span<const char> used, const identify::GapModel& none,
                                              const RunControl& control) const {
-    const std::vector<identify::GapModel> best = steps(block, used, none, Choice::kBest, control);
-    const auto& named = selection_.ways;
-    const auto is_named = [&](const identify::GapTerm& term) {
-      return std::any_of(named.begin(), named.end(),
-                         [&](std::size_t way) { return search_.ways()[way].effect == term.effect; });
-    };
-    const auto& chosen = best.back().terms;
-    const bool is_same = chosen.size() == named.size() && std::all_of(chosen.begin(), chosen.end(), is_named);
-    if (named.size() < 2 || is_same || control.stop.stop_requested()) return best;
-    const std::vector<identify::GapModel> own = steps(block, used, none, Choice::kNamed, control);
-    return search_.bicOf(own.back(), used) < search_.bicOf(best.back(), used) ? own : best;
-  }
-
-  enum class Choice {
-    kBest,   ///< At each step what the fold's rows like best.
-    kNamed,  ///< At each step what the whole recording names there, liked or not.
-  };
-
-  std::vector<identify::GapModel> steps(int block, std::span<const char> used, const identify::GapModel& none,
-                                        Choice choice, const RunControl& control) const {
-    std::vector<identify::GapModel> models = {none};
+    std::vector<identify::GapModel> chosen = {none};
     for (std::size_t s = 0; s < selection_.ways.size() && !control.stop.stop_requested(); ++s) {
-      models.push_back(models.back());
-      addOne(block, used, s, choice, models.back());
+      chosen.push_back(chosen.back());
+      addBest(block, used, s, chosen.back());
     }
-    return models;
+    if (selection_.ways.empty() || control.stop.stop_requested()) return chosen;
+    std::vector<identify::GapModel> named = {selection_.model.model};
+    named.front() = search_.refined(named.front(), used).model;
+    if (!(priceOf(named.front(), used) < priceOf(chosen.back(), used))) return chosen;
+    while (!named.front().terms.empty()) {
+      const identify::GapModel fewer = identify::withoutTerm(named.front(), named.front().terms.size() - 1);
+      named.insert(named.begin(), fewer.terms.empty() ? none : search_.refined(fewer, used).model);
+    }
+    return named;
   }
 
-  /// Adds the effect that the fold's own rows like best, if they like any, or the one that is named at this step.
-  void addOne(int block, std::span<const char> used, std::size_t step, Choice choice, identify::GapModel& model) const {
+  /// The criterion on the fold's rows, and what each effect must at least be worth of them.
+  double priceOf(const identify::GapModel& model, std::span<const char> used) const {
+    double price = search_.bicOf(model, used);
+    for (std::size_t s = 0; s < model.terms.size(); ++s) price += leastGain(s, used);
+    return price;
+  }
+
+  double leastGain(std::size_t step, std::span<const char> used) const {
+    const identify::Thresholds& thresholds = search_.thresholds();
+    return (step == 0 ? thresholds.least_gain_first : thresholds.least_gain_more) *
+           static_cast<double>(std::count(used.begin(), used.end(), 1)) / static_cast<double>(used.size());
+  }
+
+  /// Adds the effect that the fold's own rows like best, if they like any.
+  void addBest(int block, std::span<const char> used, std::size_t step, identify::GapModel& model) const {
     const identify::GapModel from = search_.seenFrom(step == 0 ? search_.none().model : model);
     const identify::Linearized at(search_.physics(), from, search_.whitening(), blocks_,
                                   identify::ResponseAt::kHalfWayIfBent);
@@ -111,12 +111,11 @@ class FoldFitter {
       double gain = 0.0;
     };
     std::vector<Start> starts;
-    const double n = channelsOf(used);
+    const auto n = static_cast<double>(std::count(used.begin(), used.end(), 1) * channels());
     for (std::size_t w = 0; w < ways_.size(); ++w) {
       const identify::EffectWay& way = search_.ways()[ways_[w]];
       const auto is_there = [&](const identify::GapTerm& term) { return term.effect == way.effect; };
-      if (choice == Choice::kNamed ? w != step : std::any_of(model.terms.begin(), model.terms.end(), is_there))
-        continue;
+      if (std::any_of(model.terms.begin(), model.terms.end(), is_there)) continue;
       const identify::ScanResult scan = step == 0 ? first_[w] : scanned(at, ways_[w]);
       if (scan.without_block.size() <= held_out) continue;
       const identify::ScanResult::Start& start = scan.without_block[held_out];
@@ -129,12 +128,7 @@ class FoldFitter {
     const auto is_own = [&](const Start& start) { return start.way == ways_[step]; };
     const auto others = starts.begin() + static_cast<std::ptrdiff_t>(std::min(starts.size(), kSearchedAFold));
     starts.erase(std::stable_partition(others, starts.end(), is_own), starts.end());
-    const identify::Thresholds& thresholds = search_.thresholds();
-    double best = std::numeric_limits<double>::infinity();
-    if (choice == Choice::kBest) {
-      best = search_.bicOf(model, used) - (step == 0 ? thresholds.least_gain_first : thresholds.least_gain_more) * n /
-                                              static_cast<double>(used.size() * static_cast<std::size_t>(channels()));
-    }
+    double best = search_.bicOf(model, used) - leastGain(step, used);
     const identify::GapModel before = search_.seenFrom(model);
     for (const Start& start : starts) {
       const identify::EffectWay& way = search_.ways()[start.way];
@@ -150,9 +144,6 @@ class FoldFitter {
   }
 
   int channels() const { return search_.physics().rows().channels(); }
-  double channelsOf(std::span<const char> used) const {
-    return static_cast<double>(std::count(used.begin(), used.end(), 1) * channels());
-  }
 
   void score(std::span<const identify::Vector6d> left, std::span<const char> used, std::vector<UnseenRow>& rows) const {
     const std::vector<identify::Vector6d> white = identify::whitened({left.begin(), left.end()}, search_.whitening());

@@ -35,12 +35,9 @@ class Selector {
     const std::vector<TriedEffect>& first = ranked(search_.none());
     const TriedEffect* best = firstWorth(first, thresholds_.least_gain_first);
     if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);
-    EffectSelection selection = grown(*best);
-    const TriedEffect* other = firstOfOtherKind(first, *best);
-    if (other != nullptr && !control_.stop.stop_requested()) {
-      EffectSelection second = grown(*other);
-      if (second.bic_gain > selection.bic_gain) selection = std::move(second);
-    }
+    EffectSelection selection = grown({}, best);
+    EffectSelection second = grownOfOtherKind(first, *best);
+    if (second.bic_gain > selection.bic_gain) selection = std::move(second);
     return finished(std::move(selection), first);
   }
 
@@ -54,18 +51,19 @@ class Selector {
   }
 
   /// The best effect worth adding: enough evidence, believable, and better on what it was not fitted to.
-  static const TriedEffect* firstWorth(const std::vector<TriedEffect>& tried, double least_gain) {
+  const TriedEffect* firstWorth(const std::vector<TriedEffect>& tried, double least_gain) const {
     for (const TriedEffect& one : tried) {
       if (one.bic_gain < least_gain) break;
+      if (only_kind_ && isInRoom(one) != *only_kind_) continue;
       if (one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
     }
     return nullptr;
   }
 
-  /// Starts with one effect and adds others while they are worth it.
-  EffectSelection grown(const TriedEffect& first) {
-    EffectSelection selection;
-    const TriedEffect* next = &first;
+  static bool isInRoom(const TriedEffect& tried) { return tried.fitted.location_m.has_value(); }
+
+  /// Adds the next effect, and others while they are worth it.
+  EffectSelection grown(EffectSelection selection, const TriedEffect* next) {
     while (next != nullptr && !control_.stop.stop_requested()) {
       EffectSelection grown = selection;
       add(*next, grown);
@@ -79,19 +77,21 @@ class Selector {
       if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
       next = firstWorth(ranked(selection.model), thresholds_.least_gain_more);
     }
-    selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
+    selection.bic_gain = selection.ways.empty() ? 0.0 : none_bic_ - search_.bicOf(selection.model.model);
     return selection;
   }
 
-  /// One flexible thing in the room can pass for two errors of the instrument, and the other way round: the best of the
-  /// other kind is worth a start of its own where it explains a good part.
-  const TriedEffect* firstOfOtherKind(const std::vector<TriedEffect>& tried, const TriedEffect& best) const {
-    const auto is_in_room = [&](const TriedEffect& one) { return one.fitted.location_m.has_value(); };
-    for (const TriedEffect& one : tried) {
-      if (one.bic_gain < std::max(thresholds_.least_gain_first, thresholds_.other_kind_share * best.bic_gain)) break;
-      if (is_in_room(one) != is_in_room(best) && one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
-    }
-    return nullptr;
+  /// One flexible thing in the room can pass for two errors of the instrument, and the other way round. Grown step by
+  /// step the two are never met, as the first of them falls behind that thing: so the other kind is grown by itself,
+  /// and with the rest of the catalogue from where it explains a good part.
+  EffectSelection grownOfOtherKind(const std::vector<TriedEffect>& first, const TriedEffect& best) {
+    only_kind_ = !isInRoom(best);
+    const double least = std::max(thresholds_.least_gain_first, thresholds_.other_kind_start * best.bic_gain);
+    EffectSelection selection = grown({}, firstWorth(first, least));
+    only_kind_.reset();
+    if (selection.bic_gain < std::max(least, thresholds_.other_kind_share * best.bic_gain)) return {};
+    if (static_cast<int>(selection.ways.size()) >= options_.most_effects) return selection;
+    return grown(selection, firstWorth(ranked(selection.model), thresholds_.least_gain_more));
   }
 
   EffectSelection finished(EffectSelection selection, const std::vector<TriedEffect>& first) {
@@ -205,6 +205,7 @@ class Selector {
   const EffectSelectionOptions& options_;
   const RunControl& control_;
   double none_bic_ = 0.0;
+  std::optional<bool> only_kind_;  ///< In the room, or not: what may be added; either where it is empty.
   std::list<Ranked> ranked_;
 };
 

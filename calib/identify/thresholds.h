@@ -56,6 +56,8 @@ struct Thresholds {
   double implausible_cost = 12.0;
   /// Share of the best gain from which the best effect of the other kind (in the room, or not) starts a set of its own.
   /// Set on open sessions with two effects.
+  double other_kind_start = 0.05;
+  /// And from which effects of that kind alone are grown on with all others. Set on open sessions with two effects.
   double other_kind_share = 0.4;
 
   // Which of them are named.

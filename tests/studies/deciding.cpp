@@ -30,6 +30,7 @@ const std::array kDeciding = {
     one<&Thresholds::least_gain_more>("least_gain_more"),
     one<&Thresholds::least_gain_exchange>("least_gain_exchange"),
     one<&Thresholds::implausible_cost>("implausible_cost"),
+    one<&Thresholds::other_kind_start>("other_kind_start"),
     one<&Thresholds::other_kind_share>("other_kind_share"),
     one<&Thresholds::least_nats>("least_nats"),
     one<&Thresholds::least_share>("least_share"),

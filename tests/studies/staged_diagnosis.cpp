@@ -78,6 +78,7 @@ bool StagedDiagnosis::selectsAsUsual(const Thresholds& thresholds, int most_effe
   if (!is_any_worth) return true;
   return thresholds.least_gain_first == usual.least_gain_first && thresholds.least_gain_more == usual.least_gain_more &&
          thresholds.least_gain_exchange == usual.least_gain_exchange &&
+         thresholds.other_kind_start == usual.other_kind_start &&
          thresholds.other_kind_share == usual.other_kind_share;
 }
 
