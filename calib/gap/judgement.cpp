@@ -163,7 +163,7 @@ class Judge {
 LeftOver leftBy(const identify::GapSearch& search, const identify::GapModel& model) {
   const identify::GapRows& rows = search.physics().rows();
   const identify::Linearized at(search.physics(), model, search.whitening(), search.spaceBlocks());
-  return {identify::findStructure(at, rows, false), identify::findTraces(at, rows)};
+  return {identify::findStructure(at, rows, false), identify::findTraces(at, rows, model)};
 }
 
 Judgement judge(const identify::GapSearch& search, identify::EffectSelection selection, const RunControl& control) {

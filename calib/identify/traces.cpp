@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "calib/core/file_io.h"
 #include "calib/field/dipole_field.h"
 
 namespace fieldtrue::identify {
@@ -40,7 +41,11 @@ class TraceTest {
 
   Trace run(const std::string& text, const Responses& responses) const {
     const auto parameters = static_cast<Eigen::Index>(responses.size() / at_.settings().size());
-    Eigen::MatrixXd columns = projected(weight_.asDiagonal() * at_.columnsOf(responses, parameters));
+    return run(text, at_.columnsOf(responses, parameters));
+  }
+
+  Trace run(const std::string& text, const Eigen::MatrixXd& added) const {
+    Eigen::MatrixXd columns = projected(weight_.asDiagonal() * added);
     for (Eigen::Index j = 0; j < columns.cols(); ++j) {
       const double norm = columns.col(j).norm();
       if (norm > 1e-9) columns.col(j) /= norm;
@@ -183,6 +188,54 @@ Trace ofChangedSensor(const TraceTest& test, const Linearized& at) {
   return likeliest(traces);
 }
 
+/// Whether each part of the session saw places over most of the region: else what follows the time follows the place.
+bool seesTheRegion(const std::vector<std::vector<Eigen::Vector3d>>& parts_m) {
+  constexpr double kLeastShare = 0.5;  // Of the variance.
+  const auto varianceOf = [](const std::vector<Eigen::Vector3d>& places_m) {
+    Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
+    double square_m2 = 0.0;
+    for (const Eigen::Vector3d& p_m : places_m) mean_m += p_m / static_cast<double>(places_m.size());
+    for (const Eigen::Vector3d& p_m : places_m)
+      square_m2 += (p_m - mean_m).squaredNorm() / static_cast<double>(places_m.size());
+    return square_m2;
+  };
+  std::vector<Eigen::Vector3d> all_m;
+  for (const auto& part_m : parts_m) all_m.insert(all_m.end(), part_m.begin(), part_m.end());
+  const double least_m2 = kLeastShare * varianceOf(all_m);
+  return std::all_of(parts_m.begin(), parts_m.end(),
+                     [&](const auto& part_m) { return part_m.size() > 1 && varianceOf(part_m) > least_m2; });
+}
+
+/// A thing in the room that is named, with a strength of its own in each of a few parts of the session.
+Trace ofStrengthInTime(const TraceTest& test, const Linearized& at, const GapTerm& term) {
+  constexpr std::size_t kParts = 6;
+  const std::vector<std::size_t> order = inTime(at);
+  const Eigen::VectorXd signal = at.columns(*term.fit, term.searched) * term.linear;
+  Eigen::MatrixXd in_part = Eigen::MatrixXd::Zero(signal.size(), kParts);
+  std::vector<std::vector<Eigen::Vector3d>> places_m(kParts);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::size_t part = kParts * i / order.size();
+    const auto row = static_cast<Eigen::Index>(order[i]) * at.channels();
+    in_part.col(static_cast<Eigen::Index>(part)).segment(row, at.channels()) = signal.segment(row, at.channels());
+    places_m[part].push_back(at.settings()[order[i]].tracker_from_sensor.position_m);
+  }
+  if (!seesTheRegion(places_m)) return {};
+  constexpr double kFaint = 0.01;  // Of the signal's square in the part where it is strongest.
+  const double least = std::max(1e-12, kFaint * in_part.colwise().squaredNorm().maxCoeff());
+  std::string strengths;
+  for (Eigen::Index part = 0; part < in_part.cols(); ++part) {
+    const auto shape = in_part.col(part);
+    const double square = shape.squaredNorm();
+    const double strength = std::round(10.0 * (1.0 + shape.dot(at.residual()) / std::max(least, square))) / 10.0;
+    strengths += (strengths.empty() ? "" : ", ") + (square < least ? "none" : formatNumber(strength + 0.0));
+  }
+  return test.run("what is named (" + effects::labelOf(term.effect->id) +
+                      ") did not stand there alike all the time; its strength in six equal parts of the session, 1 "
+                      "as named: " +
+                      strengths,
+                  in_part);
+}
+
 Trace ofGainByPlace(const TraceTest& test, const Linearized& at) {
   Eigen::AlignedBox3d box;
   for (const field::SensorSetting& s : at.settings()) box.extend(s.tracker_from_sensor.position_m);
@@ -228,13 +281,15 @@ double tailOfF(double f, double d1, double d2) {
   return 0.5 * std::erfc(z / std::numbers::sqrt2);
 }
 
-std::vector<Trace> findTraces(const Linearized& at, const GapRows& rows) {
+std::vector<Trace> findTraces(const Linearized& at, const GapRows& rows, const GapModel& state) {
   const TraceTest test(at);
   std::vector<Trace> traces{ofLayers(test, at), ofGainByPlace(test, at)};
   if (rows.has_times && spanOf(at).length_s > 0.0) {
     traces.push_back(ofMemory(test, at));
     traces.push_back(ofDriftingCoils(test, at));
     traces.push_back(ofChangedSensor(test, at));
+    for (const GapTerm& term : state.terms)
+      if (term.effect->body != nullptr) traces.push_back(ofStrengthInTime(test, at, term));
   }
   std::stable_sort(traces.begin(), traces.end(), [](const Trace& a, const Trace& b) { return a.p_value < b.p_value; });
   return traces;

@@ -16,10 +16,12 @@ struct Trace {
 };
 
 /// Layers bent or entered wrongly in their own plane, a sensor that remembers the place before, coil gains that change
-/// during the session, a sensor that changed at some time, a gain that follows the place.
+/// during the session, a sensor that changed at some time, a gain that follows the place, a thing in the room that did
+/// not stand there alike all the time.
+/// @param state that `at` is linearised about
 /// @return most significant first
 /// @source F test of added regressors: Seber and Lee 2003, Linear Regression Analysis, section 4.3
-std::vector<Trace> findTraces(const Linearized& at, const GapRows& rows);
+std::vector<Trace> findTraces(const Linearized& at, const GapRows& rows, const GapModel& state);
 
 /// Upper tail of F with d1, d2 degrees of freedom. @source Paulson 1942, Ann. Math. Statist. 13 233
 double tailOfF(double f, double d1, double d2);

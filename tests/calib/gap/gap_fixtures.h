@@ -68,4 +68,19 @@ inline CalibrationTable recordedIn(const simulation::Scene& scene, const std::ve
   return std::move(simulation.table);
 }
 
+/// A transmitter near a corner of the grid, whose coils lean, with a gain that warms up, and a rig 2 % too short.
+inline CalibrationTable instrumentErrors() {
+  simulation::Scene scene;
+  scene.reference_from_tracker.position_m = {-0.003, -0.272, -0.198};
+  scene.rig.tolerance_m = 0.002;
+  scene.rig.tolerance_rad = 0.005;
+  const auto add = [&](const char* id, const char* parameters) {
+    scene.effects.push_back({id, nlohmann::json::parse(parameters)});
+  };
+  add("coil_nonorthogonality", R"({"transmitter_rad": [-0.0061, 0.0129, -0.0031]})");
+  add("gain_drift", R"({"amplitude": -0.03, "time_constant_s": 400})");
+  add("grid_scale", R"({"scale": [-0.02, -0.02, -0.02]})");
+  return recordedIn(scene, gapPlan({.counts = {5, 5, 4}}));
+}
+
 }  // namespace fieldtrue::testing

@@ -2,6 +2,7 @@
 
 #include <QTest>
 #include <algorithm>
+#include <limits>
 
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/matchers.h"
@@ -68,6 +69,23 @@ class SelectionTest : public QObject {
     for (const TriedEffect& more : search.rank(seen.model, {}))
       QVERIFY(more.bic_gain < search.thresholds().least_gain_more || !more.fitted.is_plausible ||
               more.held_out_gain <= 0.0);
+  }
+
+  /// One body with a polarizability of any kind takes more than any one of three errors of the instrument, and is still
+  /// a poor excuse for all of them.
+  void findsErrorsThatOneBodyHides() {
+    const CalibrationTable table = instrumentErrors();
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const QString truth = "coil_nonorthogonality gain_drift grid_scale";
+    Thresholds never;
+    never.other_kind_start = std::numeric_limits<double>::infinity();
+    const GapSearch step_by_step(rows, {}, NoiseFrom::kResiduals, never);
+    const EffectSelection hidden = selectEffects(step_by_step, {}, {});
+    QVERIFY2(namesOf(hidden).contains("compact_metal"), qPrintable(namesOf(hidden)));
+    const EffectSelection seen = selectEffects(GapSearch(rows, {}), {}, {});
+    // A rig that is too short on all axes and a gain of the whole tracker read alike.
+    QCOMPARE(namesOf(seen).replace("global_gain", "grid_scale"), truth);
+    QVERIFY(seen.bic_gain > hidden.bic_gain);
   }
 
   void findsNothingInNoise() {

@@ -18,9 +18,9 @@ const NoisyRows kNoise{.per_axis = 4, .turns = 1, .change = {}};
 std::vector<Trace> tracesIn(const std::vector<Node>& nodes) {
   const GapRows rows = makeGapRows(nodes, {}).value();
   const GapPhysics physics(rows, {});
-  const Linearized at(physics, {initialAlignment(rows), {}}, makeWhitening(rows, kNoise.sd_m, kNoise.sd_rad),
-                      octantBlocks(rows));
-  return findTraces(at, rows);
+  const GapModel state{initialAlignment(rows), {}};
+  const Linearized at(physics, state, makeWhitening(rows, kNoise.sd_m, kNoise.sd_rad), octantBlocks(rows));
+  return findTraces(at, rows, state);
 }
 
 }  // namespace
