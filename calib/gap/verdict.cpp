@@ -92,7 +92,8 @@ bool hasGap(const identify::GapSearch& search, const Judgement& judgement, doubl
 
 GapVerdict verdictOf(const HowFar& far, bool has_effect, bool has_gap, const identify::Thresholds& thresholds) {
   if (!has_effect) return has_gap ? GapVerdict::kUnexplained : GapVerdict::kNoGap;
-  const double surely_left = far.remaining().low90.value_or(0.0);
+  // Where no interval can be told nothing is sure: the figure itself must do.
+  const double surely_left = far.remaining().low90.value_or(far.remaining().value);
   if (surely_left > thresholds.unexplained_left) return GapVerdict::kUnexplained;
   return surely_left > thresholds.partly_left ? GapVerdict::kPartlyExplained : GapVerdict::kExplained;
 }

@@ -1,0 +1,55 @@
+#include "calib/gap/verdict.h"
+
+#include <QTest>
+
+#include "tests/support/test_main.h"
+
+using namespace fieldtrue;
+using namespace fieldtrue::gap;
+using namespace fieldtrue::testing;
+
+namespace {
+
+using Left = std::optional<double>;
+
+HowFar leaving(double value, Left low90) {
+  HowFar far;
+  far.left_of_start = {{1.0, 1.0, 1.0}, {value, low90, low90 ? Left(2.0 * value - *low90) : Left()}};
+  return far;
+}
+
+}  // namespace
+
+class GapVerdictTest : public QObject {
+  Q_OBJECT
+ private slots:
+  /// By what is surely left: more than 0.15 is partly, more than 0.5 is not explained. Where no interval can be told
+  /// the figure itself decides: not knowing must not pass for having explained.
+  void followsWhatIsSurelyLeft_data() {
+    QTest::addColumn<double>("value");
+    QTest::addColumn<Left>("low90");
+    QTest::addColumn<int>("verdict");
+    const auto row = [](const char* name, double value, Left low90, GapVerdict verdict) {
+      QTest::newRow(name) << value << low90 << static_cast<int>(verdict);
+    };
+    row("little left", 0.05, 0.02, GapVerdict::kExplained);
+    row("wide", 0.4, 0.1, GapVerdict::kExplained);
+    row("more left", 0.3, 0.2, GapVerdict::kPartlyExplained);
+    row("most left", 0.7, 0.6, GapVerdict::kUnexplained);
+    row("less than nothing", -0.3, -0.8, GapVerdict::kExplained);
+    row("unsure, little left", 0.05, {}, GapVerdict::kExplained);
+    row("unsure, more left", 0.3, {}, GapVerdict::kPartlyExplained);
+    row("unsure, most left", 0.97, {}, GapVerdict::kUnexplained);
+  }
+  void followsWhatIsSurelyLeft() {
+    QFETCH(double, value);
+    QFETCH(Left, low90);
+    QFETCH(int, verdict);
+    QCOMPARE(static_cast<int>(verdictOf(leaving(value, low90), true, true, {})), verdict);
+    QVERIFY(verdictOf(leaving(value, low90), false, true, {}) == GapVerdict::kUnexplained);
+    QVERIFY(verdictOf(leaving(value, low90), false, false, {}) == GapVerdict::kNoGap);
+  }
+};
+
+FIELDTRUE_TEST(GapVerdictTest)
+#include "gap_verdict_test.moc"
