@@ -1,7 +1,6 @@
-#include "calib/gap/verdict.h"
-
 #include <QTest>
 
+#include "calib/gap/verdict.h"
 #include "tests/support/test_main.h"
 
 using namespace fieldtrue;
