@@ -40,7 +40,7 @@ struct Options {
   std::string role = "dev";
   bool samples = false;
   bool levels = false;
-  bool unforeseen = false;
+  std::size_t batch = 0;  ///< of unforeseen kinds on top; 0: none
 };
 
 std::uint64_t wholeNumber(const std::string& option, const std::string& text, std::uint64_t low, std::uint64_t high) {
@@ -72,8 +72,8 @@ std::string oneOf(const std::string& option, const std::string& text, std::initi
 Options parse(std::span<const std::string> arguments) {
   static constexpr std::string_view kWithValue[] = {"--out",      "--seed",     "--sessions", "--count",
                                                     "--threads",  "--jobs",     "--role",     "--shelf",
-                                                    "--max-rows", "--strength", "--cli"};
-  static constexpr std::string_view kFlags[] = {"--samples", "--levels", "--unforeseen"};
+                                                    "--max-rows", "--strength", "--cli",      "--unforeseen"};
+  static constexpr std::string_view kFlags[] = {"--samples", "--levels"};
   const auto given = optionsOf(arguments, "generate", kWithValue, kFlags);
   Options options;
   for (const auto& [name, text] : given) {
@@ -83,6 +83,7 @@ Options parse(std::span<const std::string> arguments) {
     if (name == "--sessions" || name == "--count") options.sessions = wholeNumber(name, text, 1, 99999);
     if (name == "--threads" || name == "--jobs") options.jobs = wholeNumber(name, text, 1, 256);
     if (name == "--max-rows") options.most_rows = wholeNumber(name, text, 48, 100000);
+    if (name == "--unforeseen") options.batch = wholeNumber(name, text, 1, unforeseenBatches().size());
     if (name == "--strength") options.strength = strengthOf(text);
     if (name == "--role") options.role = oneOf(name, text, {"dev", "test"});
     if (name == "--shelf")
@@ -90,7 +91,6 @@ Options parse(std::span<const std::string> arguments) {
   }
   options.samples = given.count("--samples") > 0;
   options.levels = given.count("--levels") > 0;
-  options.unforeseen = given.count("--unforeseen") > 0;
   if (options.levels && options.strength)
     throw std::invalid_argument("generate: --levels and --strength exclude each other");
   if (options.out.empty()) throw std::invalid_argument("generate: --out DIR is needed, the folder to write");
@@ -102,7 +102,7 @@ Options parse(std::span<const std::string> arguments) {
 
 /// Two sessions of each unforeseen kind at each of the four strengths.
 void wishUnforeseen(const Options& options, std::vector<SessionWish>& wishes) {
-  for (const std::string& kind : unforeseenIds())
+  for (const std::string& kind : unforeseenIds(options.batch))
     for (const double level : kLevels)
       for (int twice = 0; twice < 2; ++twice)
         wishes.push_back({"unforeseen", level, options.samples, options.most_rows, kind});
@@ -122,7 +122,7 @@ std::vector<SessionWish> drawWishes(const Options& options) {
     const auto end = static_cast<std::size_t>(std::llround(upto * static_cast<double>(options.sessions)));
     while (shelves.size() < end) shelves.emplace_back(options.shelf == "all" ? share.shelf : options.shelf);
   }
-  const std::vector<std::string> unforeseen = unforeseenIds();
+  const std::vector<std::string> unforeseen = unforeseenIds(std::max<std::size_t>(options.batch, 1));
   std::map<std::string, std::size_t> seen;
   std::vector<SessionWish> wishes;
   for (const std::string& shelf : shelves) {
@@ -133,7 +133,7 @@ std::vector<SessionWish> drawWishes(const Options& options) {
       wish.level = options.levels && turn < 4 ? std::optional(kLevels[turn]) : options.strength;
     wishes.push_back(std::move(wish));
   }
-  if (options.unforeseen) wishUnforeseen(options, wishes);
+  if (options.batch > 0 && options.shelf != "unforeseen") wishUnforeseen(options, wishes);
   // An order that tells nothing; sessionSeeds() counts these draws.
   Random random(options.seed);
   for (std::size_t n = wishes.size(); n > 1; --n)

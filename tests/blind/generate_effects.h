@@ -67,8 +67,9 @@ const std::vector<Kind>& alignedKinds();
 /// Effects that stand in no catalogue.
 const std::vector<Kind>& foreignKinds();
 
-/// What goes wrong in a laboratory, as somebody thought of who knew neither the catalogue nor the diagnosis.
-const std::vector<Kind>& unforeseenKinds();
+/// What goes wrong in a laboratory, as somebody thought of who knew neither the catalogue nor the diagnosis: a batch
+/// for each time that the diagnosis was frozen, the oldest first. What one set has shown is foreseen in the next.
+std::span<const std::vector<Kind>> unforeseenBatches();
 
 /// Effects that only raw samples show.
 const std::vector<std::string>& signalIds();

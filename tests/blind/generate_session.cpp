@@ -203,8 +203,9 @@ std::vector<Kind> kindsOn(const SessionWish& wish, bool aligned) {
   if (wish.shelf == "off") return foreignKinds();
   if (wish.shelf != "unforeseen") return aligned ? alignedKinds() : catalogueKinds();
   std::vector<Kind> kinds;
-  for (const Kind& kind : unforeseenKinds())
-    if (wish.kind.empty() || kind.id == wish.kind) kinds.push_back(kind);
+  for (const std::vector<Kind>& batch : unforeseenBatches())
+    for (const Kind& kind : batch)
+      if (kind.id == wish.kind) kinds.push_back(kind);
   return kinds;
 }
 
@@ -289,9 +290,9 @@ MadeSession makeSession(const SessionWish& wish, std::uint64_t seed) {
   throw std::runtime_error("no believable geometry reaches the wished strength; another seed is needed");
 }
 
-std::vector<std::string> unforeseenIds() {
+std::vector<std::string> unforeseenIds(std::size_t batch) {
   std::vector<std::string> ids;
-  for (const Kind& kind : unforeseenKinds()) ids.push_back(kind.id);
+  for (const Kind& kind : unforeseenBatches()[batch - 1]) ids.push_back(kind.id);
   return ids;
 }
 

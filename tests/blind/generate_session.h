@@ -53,8 +53,9 @@ World worldOf(const std::vector<Placed>& effects);
 /// Every effect of the catalogue, in order of name.
 std::vector<std::string> catalogueIds();
 
-/// Every unforeseen kind, in their order.
-std::vector<std::string> unforeseenIds();
+/// Every unforeseen kind of a batch, in their order.
+/// @param batch 1 is the oldest
+std::vector<std::string> unforeseenIds(std::size_t batch);
 
 /// Faults of the sample stream of one session; zero or one: none.
 struct StreamFault {

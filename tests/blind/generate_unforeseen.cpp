@@ -1,6 +1,7 @@
 #include "tests/blind/generate_unforeseen.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace blind {
@@ -90,11 +91,11 @@ Drawn drawnOf(const Story& story, std::function<void(World&, double size)> apply
 
 }  // namespace unforeseen
 
-const std::vector<Kind>& unforeseenKinds() {
+std::span<const std::vector<Kind>> unforeseenBatches() {
   using namespace unforeseen;
   constexpr auto kRigAxes = Kind::Needs::kRigAxes;
   constexpr auto kLayers = Kind::Needs::kLayers;
-  static const std::vector<Kind> kinds = {
+  static const std::vector<Kind> kFirst = {
       {"unforeseen:near:steel_door_left_ajar", 1, drawDoor},
       {"unforeseen:hip_pushes_carts_into_contact", 1, drawTouchingCarts},
       {"unforeseen:excess_transmitter_cable_coiled", 1, drawCoiledCable},
@@ -127,7 +128,8 @@ const std::vector<Kind>& unforeseenKinds() {
       {"unforeseen:fused_compass_near_steel", 1, drawFusedCompass},
       {"unforeseen:handover_to_second_transmitter", 1, drawHandover},
   };
-  return kinds;
+  static const std::array kBatches = {kFirst};
+  return kBatches;
 }
 
 }  // namespace blind

@@ -52,7 +52,8 @@ one of the catalogue, two or three at once, one that stands in no catalogue, or 
   --levels         four fifths of the single effects at exactly 0.35, 0.7, 1.4 and 2.8 of gap to noise, the rest between
   --strength X     every single effect at X of gap to noise
   --shelf S        only none, single, pairs, off, unforeseen or signals; default all, the unforeseen left out
-  --unforeseen     on top, eight sessions of each unforeseen kind, two at each strength
+  --unforeseen B   on top, eight sessions of each unforeseen kind of batch B (1 is the oldest), two at each strength;
+                   with --shelf unforeseen the batch that is drawn from (1)
   --samples        sample tables for every session
   --max-rows R     no session with more rows than R (48 or more)
   --role R         dev (default) or test, written into the seal

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Draws and seals a test set, answers it and its negative controls, and scores both:
-#   tests/blind/test_set.sh ENGINE FOLDER [--jobs J] [--parts N] [--sessions K] [--controls N]
+#   tests/blind/test_set.sh ENGINE FOLDER [--jobs J] [--parts N] [--sessions K] [--controls N] [--kinds B]
+# --kinds B is the batch of unforeseen kinds (1, the oldest); a kind that a text or an answered set has shown is foreseen.
 # ENGINE is the whole id of the commit that the diagnosis was frozen at, 40 digits: the seed is the first eight hexadecimal
 # digits of the SHA-256 of it followed by `test`, and names the folder in tests/blind/results where the answers are kept, a
 # hundred sessions a part. FOLDER holds the set while it is worked on and can be thrown away: started again, anywhere, the
@@ -8,8 +9,8 @@
 # FIELDTRUE_APP names the folder of fieldtrue-blind (default build/ci/app), FIELDTRUE_CLI the program that is asked
 # (default beside it), which must be that of ENGINE.
 set -euo pipefail
-[ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
-engine=$1 folder=$2 jobs=$(nproc) parts=1000000 sessions=1850 controls=300
+[ $# -ge 2 ] || { sed -n '2,10s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
+engine=$1 folder=$2 jobs=$(nproc) parts=1000000 sessions=1850 controls=300 kinds=1
 shift 2
 while [ $# -ge 2 ]; do
   case "$1" in
@@ -17,6 +18,7 @@ while [ $# -ge 2 ]; do
     --parts) parts=$2 ;;
     --sessions) sessions=$2 ;;
     --controls) controls=$2 ;;
+    --kinds) kinds=$2 ;;
     *) echo "test_set.sh: unknown option '$1'" >&2; exit 2 ;;
   esac
   shift 2
@@ -50,7 +52,7 @@ answer_parts() {
 }
 
 mkdir -p "$folder"
-[ -f "$folder/set/seal.json" ] || "$blind" generate --seed $((16#$name)) --sessions "$sessions" --unforeseen --levels \
+[ -f "$folder/set/seal.json" ] || "$blind" generate --seed $((16#$name)) --sessions "$sessions" --unforeseen "$kinds" --levels \
   --role "${FIELDTRUE_ROLE:-test}" --cli "$cli" --jobs "$jobs" --out "$folder/set"
 echo "Sealed: $(tr -d '\n' <"$folder/set/seal.json")"
 answer_parts "$folder/set" "$results" 1
