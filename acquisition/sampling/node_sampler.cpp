@@ -28,6 +28,8 @@ constexpr std::size_t kParts = 8;
 constexpr double kMostWanted = 1e6;
 /// Each block's end is compared with all samples: more of them would take longer than the samples of a long take do.
 constexpr int kMostBlocks = 30;
+/// Samples in a block where nothing follows: motion within the last whole block is looked for too.
+constexpr int kLastBlock = 3;
 
 double timeLimit_s(const SamplerOptions& options) {
   return options.time_limit_s + (options.length.until == TakeLength::Until::kSeconds ? options.length.amount : 0.0);
@@ -128,7 +130,7 @@ void NodeSampler::watch(const Sample& sample) {
   watched_.push_back(sample);
   if (looked() < next_look_) return;
   next_look_ = looked() + blockNow();
-  if (const auto moved = motion()) startOver(*moved);
+  if (const auto moved = motion(blockNow())) startOver(*moved);
 }
 
 TakeState NodeSampler::passTime(double time_s) {
@@ -144,7 +146,7 @@ void NodeSampler::look() {
   const bool complete = isComplete(is_due);
   if (!is_due && !complete) return;
   next_look_ = collected_ + blockNow();
-  if (const auto moved = motion()) {
+  if (const auto moved = motion(blockNow())) {
     startOver(*moved);
   } else if (complete) {
     finish();
@@ -188,7 +190,8 @@ void NodeSampler::timeOut() {
 
 bool NodeSampler::canAverage() const {
   const bool by_error = options_.length.until == TakeLength::Until::kStandardError;
-  return collected_ >= (by_error ? kFewestByError : kFewestByTime) && !motion();
+  return collected_ >= (by_error ? kFewestByError : kFewestByTime) &&
+         !motion(std::max(kLastBlock, looked() / kMostBlocks));
 }
 
 void NodeSampler::keep() {
@@ -215,10 +218,10 @@ std::string NodeSampler::shortfall() const {
   const auto averaged = averageSamples(samples_, options_.averaging);
   if (!isKnown() || !can_keep_ || !averaged) return timeLimitReason();
   return "mean known to " + format("%.2g mm", 1e3 * standardError_m(*averaged, samples_)) + ", not to " +
-         textOf(options_.length) + format(", after %g s", allowed_s());
+         format("%g mm", 1e3 * options_.length.amount) + format(", after %g s", allowed_s());
 }
 
-std::optional<std::string> NodeSampler::motion() const {
+std::optional<std::string> NodeSampler::motion(int block) const {
   std::vector<Eigen::Vector3d> positions_m, turns_rad;
   std::optional<Eigen::Quaterniond> first;
   for (const auto* part : {&samples_, &watched_}) {
@@ -231,9 +234,9 @@ std::optional<std::string> NodeSampler::motion() const {
       turns_rad.push_back(rotationVector_rad(orientation * first->conjugate()));
     }
   }
-  const Shift shift = largestShift(positions_m, blockNow(), options_.still_floor_m, options_.still_sigmas);
+  const Shift shift = largestShift(positions_m, block, options_.still_floor_m, options_.still_sigmas);
   if (shift.moved()) return "moved " + millimetres(shift.size);
-  const Shift turn = largestShift(turns_rad, blockNow(), options_.still_floor_rad, options_.still_sigmas);
+  const Shift turn = largestShift(turns_rad, block, options_.still_floor_rad, options_.still_sigmas);
   if (turn.moved()) return "turned " + format("%.1f degrees", turn.size * kDegPerRad);
   return std::nullopt;
 }

@@ -81,7 +81,7 @@ class NodeSampler {
   bool isCompleteByTime();
   bool isCompleteByError();
   void timeOut();
-  std::optional<std::string> motion() const;
+  std::optional<std::string> motion(int block) const;
   void finish();
   double allowed_s() const;
   bool canAverage() const;

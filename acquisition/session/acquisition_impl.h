@@ -37,6 +37,7 @@ struct AcquisitionController::Impl {
   void compareNames(TableMetadata& known, const TableMetadata& said);
   /// Those that took the places done go on; before the first take those that a person chose, else all that report.
   void settleSensors();
+  void keepChoiceOfSensors();  ///< What was chosen before there was a session is of the one that begins.
   std::vector<int> sensorsOfState(const std::string& key);  ///< Chosen by a person; empty = none were.
   std::vector<int> sensorsOfSession();  ///< Those that took its places, but for such as are left out from then on.
   void leadPlaces(const std::vector<int>& going_on);

@@ -50,6 +50,7 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   store.emplace(*std::move(opened));
   places.fill(*content);
   ++views.revision;
+  keepChoiceOfSensors();
   settleSensors();
   mergeMetadata();
   views.told_recorded.reset();

@@ -301,11 +301,18 @@ std::vector<int> AcquisitionController::Impl::sensorsOfState(const std::string& 
   return told(sensors) ? *sensors : std::vector<int>();
 }
 
+void AcquisitionController::Impl::keepChoiceOfSensors() {
+  const std::vector<int> asked = std::exchange(tracker.asked_sensors, {});
+  if (asked.empty() || store->isReadOnly() || !sensorsOfState(kSensorsState).empty()) return;
+  told(store->setState(kSensorsState, textOf(asked)));
+}
+
 void AcquisitionController::Impl::chooseSensors(const std::vector<int>& sensors) {
-  tracker.asked_sensors = sensors;
-  if (store && takes_settle_sensors) {
+  if (!store) {
+    tracker.asked_sensors = sensors;
+  } else if (takes_settle_sensors) {
     goOnWith(sensors);
-  } else if (store) {
+  } else {
     told(store->setState(kSensorsState, textOf(sensors)));
   }
   settleSensors();

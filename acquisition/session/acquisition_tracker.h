@@ -43,7 +43,7 @@ struct TrackerLink {
   QString text;
   /// Those recorded, the leading one first: all that report, unless others are asked for. Empty until it is known.
   std::vector<int> sensors;
-  std::vector<int> asked_sensors;        ///< By a person, the leading one first; empty = all that report.
+  std::vector<int> asked_sensors;        ///< Before there is a session, the leading one first; empty = all that report.
   std::map<int, int> heard;              ///< Readings of each sensor of this stream; of a long one no longer counted.
   std::map<int, double> newest_s;        ///< When each was heard last, by the device's clock.
   std::optional<double> began_s, now_s;  ///< The first and the last reading of any, by the same clock.

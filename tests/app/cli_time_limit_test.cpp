@@ -62,7 +62,7 @@ class CliTimeLimitTest : public QObject {
     QVERIFY(waitForLine(process, "^Next: A1").hasMatch());
     process.write("\n");
     QVERIFY(waitForLine(process,
-                        "^Time is up at A1.*: mean known to .* not to 0.001mm, after 30 s.   Enter keeps it, w waits "
+                        "^Time is up at A1.*: mean known to .* not to 0.001 mm, after 30 s.   Enter keeps it, w waits "
                         "longer, a takes again, s skips, q quits")
                 .hasMatch());
     process.write("w\n");

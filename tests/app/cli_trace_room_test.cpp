@@ -19,7 +19,7 @@ namespace {
 constexpr rlim_t kMiB = 1 << 20;
 
 /// What was said on stderr until a text came.
-bool saysOnStderr(QProcess& process, const QByteArray& text, int timeout_ms = 20000) {
+bool saysOnStderr(QProcess& process, const QByteArray& text, int timeout_ms = 10000) {
   QElapsedTimer timer;
   timer.start();
   process.setReadChannel(QProcess::StandardError);

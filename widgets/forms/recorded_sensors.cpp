@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "acquisition/session/recorded_sensors.h"
+#include "widgets/style/theme.h"
 #include "widgets/workbench/workbench.h"
 
 namespace fieldtrue::widgets {
@@ -76,7 +77,9 @@ void RecordedSensors::onStatus(const acquisition::AcquisitionStatus& status) {
     const bool is_recorded = recorded != status.sensors.end();
     box->setChecked(is_recorded);
     box->setEnabled(mayChange(status, sensor, is_recorded ? &*recorded : nullptr));
-    box->setText(is_recorded && recorded->silent ? tr("Sensor %1, silent").arg(sensor) : tr("Sensor %1").arg(sensor));
+    const bool is_silent = is_recorded && recorded->silent;
+    setStyled(*box, "silent", is_silent);
+    box->setText(is_silent ? tr("Sensor %1, silent").arg(sensor) : tr("Sensor %1").arg(sensor));
   }
   showLeader(status);
   hint_->setText(

@@ -308,7 +308,7 @@ void PlanPage::makeAtTimeLimit() {
   const auto add = [this](const QString& label, AtTimeLimit at_time_limit) {
     at_time_limit_->addItem(label, static_cast<int>(at_time_limit));
   };
-  add(tr("ask: keep, wait or again"), AtTimeLimit::kAsk);
+  add(tr("ask: keep, wait, again, skip"), AtTimeLimit::kAsk);
   add(tr("keep what it has"), AtTimeLimit::kKeep);
   add(tr("take it again, up to twice"), AtTimeLimit::kAgain);
   add(tr("skip the place"), AtTimeLimit::kSkip);

@@ -128,6 +128,7 @@ QWidget* SignalPage::makeHead(QWidget* parent) {
   sensors_->setSelectionMode(QAbstractItemView::SingleSelection);
   sensors_->setShowGrid(false);
   sensors_->setWordWrap(false);
+  sensors_->horizontalHeader()->setDefaultAlignment(Qt::AlignLeft | Qt::AlignVCenter);
   sensors_->horizontalHeader()->setMinimumSectionSize(kNarrowestColumn);
   sensors_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   sensors_->horizontalHeader()->setStretchLastSection(true);

@@ -121,7 +121,7 @@ class NodeSamplerTest : public QObject {
     QVERIFY2(sampler.state() == TakeState::kDone, "what was collected is kept, to be judged by a person");
     QCOMPARE(n, 3600);  // 30 s at 120 a second.
     // 1 mm / sqrt(3601) = 0.017 mm.
-    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"known to 0.017 mm", "not to 0.001mm", "after 30 s"}));
+    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"known to 0.017 mm", "not to 0.001 mm", "after 30 s"}));
   }
 
   void aTakeIsHeldWhereThatIsAskedFor() {
@@ -134,7 +134,7 @@ class NodeSamplerTest : public QObject {
     while (sampler.add(sensor.next()) == TakeState::kCollecting) {
     }
     QVERIFY(sampler.state() == TakeState::kHeld && sampler.canKeep());
-    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"known to 0.017 mm", "not to 0.001mm", "after 30 s"}));
+    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"known to 0.017 mm", "not to 0.001 mm", "after 30 s"}));
     const int collected = sampler.collected();
     sampler.add(sensor.next());
     QCOMPARE(sampler.collected(), collected);
@@ -143,9 +143,34 @@ class NodeSamplerTest : public QObject {
     }
     QVERIFY(sampler.state() == TakeState::kHeld);
     QCOMPARE(sampler.collected(), 2 * collected);
-    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"not to 0.001mm", "after 60 s"}));
+    FT_VERIFY_MATCH(testing::holdsAll(sampler.message(), {"not to 0.001 mm", "after 60 s"}));
     sampler.keep();
     QVERIFY(sampler.state() == TakeState::kDone && !sampler.message().empty());
+  }
+
+  /// Moved since motion was looked for last, it is no take, whatever it has.
+  void whatMovedAtTheEndCannotBeKept_data() {
+    QTest::addColumn<int>("when");
+    QTest::newRow("rests") << 1000;
+    for (const int when : {18, 20, 23, 25}) QTest::addRow("moves with reading %d", when) << when;
+  }
+  void whatMovedAtTheEndCannotBeKept() {
+    QFETCH(int, when);
+    SamplerOptions options;
+    options.holds_at_time_limit = true;
+    NodeSampler sampler(options);
+    sampler.start();
+    NoisySensor sensor(1e-4, 0.0, 4);
+    sensor.path_m = [when](int n) { return stepAt(n, when, 0.05); };
+    // Twenty-nine readings in its 30 s: with the thirtieth motion would be looked for.
+    for (int n = 0; n < 29; ++n) {
+      Sample sample = sensor.next();
+      sample.time_s = n * options.time_limit_s / 28.0;
+      sampler.add(sample);
+    }
+    QVERIFY(sampler.state() == TakeState::kHeld);
+    QCOMPARE(sampler.collected(), 29);
+    QCOMPARE(sampler.canKeep(), when == 1000);
   }
 
   /// A take of 1.5 s that had half a second of good readings when its time was over, and a person who answers a minute

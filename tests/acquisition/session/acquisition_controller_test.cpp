@@ -460,7 +460,7 @@ class AcquisitionControllerTest : public QObject {
     bench.controller.take();
     bench.tracker->stand(31.0);
     QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
-    QVERIFY2(bench.suspicions[1].contains(", not to 0.001mm, after 30 s"), qPrintable(bench.suspicions[1]));
+    QVERIFY2(bench.suspicions[1].contains(", not to 0.001 mm, after 30 s"), qPrintable(bench.suspicions[1]));
     QVERIFY(bench.controller.status().recorded->states[1] == PlaceState::kSuspicious);
   }
 

@@ -20,7 +20,7 @@ namespace {
 constexpr TakeLength kFar{TakeLength::Until::kStandardError, 1e-6};
 constexpr double kLimit_s = 30.0;
 constexpr double kToRest_s = 1.0;
-constexpr const char* kShort = "known to 0.0017 mm, not to 0.001mm";
+constexpr const char* kShort = "known to 0.0017 mm, not to 0.001 mm";
 
 /// A session whose take of the first place has just had its time.
 struct HeldBench : Bench {
@@ -143,6 +143,16 @@ class HeldTakeTest : public QObject {
     QVERIFY2(bench.held[1].contains("after 60 s"), qPrintable(bench.held[1]));
   }
 
+  void whatItHadStaysHoweverLateTheAnswer() {
+    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    const int collected = bench.controller.status().collected;
+    bench.tracker->stand(60.0);
+    bench.controller.waitLonger();
+    bench.tracker->stand(2.0);
+    QVERIFY(bench.controller.status().take == TakeState::kCollecting);
+    QVERIFY2(bench.controller.status().collected > collected, "the wait is no gap of the stream");
+  }
+
   void aJigThatMovedMeanwhileStartsOver() {
     HeldBench bench(newPath(), AtTimeLimit::kAsk);
     bench.tracker->true_pose.position_m.x() += 0.004;
@@ -153,6 +163,19 @@ class HeldTakeTest : public QObject {
     QVERIFY2(bench.controller.status().collected < 7.0 * kRate_hz, "what stood elsewhere counts no more");
     bench.controller.cancelTake();
     QVERIFY(bench.stored.empty());
+  }
+
+  /// Pressed while a hand still corrects the jig, which ends where it was.
+  void longerIsFromRestOn() {
+    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    const int collected = bench.controller.status().collected;
+    const Pose place = bench.placePose(0);
+    bench.tracker->carryTo({place.position_m + Eigen::Vector3d(0.01, 0.0, 0.0), place.orientation}, 0.5);
+    bench.controller.waitLonger();
+    bench.tracker->carryTo(place, 0.5);
+    bench.tracker->stand(2.0);
+    QVERIFY(bench.controller.status().take == TakeState::kCollecting);
+    QVERIFY2(bench.controller.status().collected > collected, "what was read on the way starts nothing over");
   }
 
   void againItBeginsAnew() {
@@ -177,6 +200,24 @@ class HeldTakeTest : public QObject {
     const Pose expected = inverse(bench.tracker->reference_from_tracker) * bench.placePose(0);
     FT_VERIFY_MATCH(testing::near(bench.nodes[0].tracker_from_sensor.position_m, expected.position_m, 1e-4));
     QVERIFY(bench.suspicions[0].contains(kShort));
+  }
+
+  /// The place that was taken before was left long ago: that is no reason to end what is held at the next one.
+  void oneThatIsHeldAtTheNextPlaceStaysSo() {
+    Bench bench(newPath());
+    bench.takeHere();
+    QCOMPARE(bench.stored, std::vector<int>{0});
+    bench.controller.setTakeLength(kFar);
+    bench.controller.setAtTimeLimit(AtTimeLimit::kAsk);
+    bench.tracker->setDownAt(bench.placePose(1));
+    bench.controller.take();
+    bench.tracker->stand(kLimit_s + kToRest_s);
+    QCOMPARE(bench.controller.status().take, TakeState::kHeld);
+    bench.tracker->stand(5.0);
+    QCOMPARE(bench.controller.status().take, TakeState::kHeld);
+    QCOMPARE(bench.stored, std::vector<int>{0});
+    bench.tracker->carryTo(bench.placePose(2));
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
   }
 
   /// A silent sensor has nothing to be kept; back again, it has what was asked for.

@@ -1,5 +1,6 @@
 #include <QTemporaryDir>
 #include <QTest>
+#include <algorithm>
 
 #include "tests/acquisition/session/controller_bench.h"
 #include "tests/support/matchers.h"
@@ -59,6 +60,13 @@ class MovingTakeTest : public QObject {
     const Pose expected = inverse(bench.tracker->reference_from_tracker) * place;
     FT_VERIFY_MATCH(testing::near(bench.nodes[0].tracker_from_sensor.position_m, expected.position_m, kRested_m));
     QCOMPARE(bench.suspicions, QStringList{QString()});
+    // What was passed over, from second 5 to second 8, is kept as what is read between the places is.
+    bench.readTables();
+    const auto on_way = [](const SampleRow& row) {
+      return row.node < 0 && row.sample.time_s > 5.0 && row.sample.time_s < 8.0;
+    };
+    const auto kept = std::count_if(bench.samples.rows.begin(), bench.samples.rows.end(), on_way);
+    QVERIFY2(static_cast<double>(kept) > 0.9 * 3.0 * std::min(rate_hz, 10.0) - 1.0, qPrintable(QString::number(kept)));
   }
 
   void aTakeThatMovedGoesOnWhenTheJigRests() {

@@ -96,8 +96,34 @@ class SensorsGoingOnTest : public QObject {
     bench.controller.setSensors({1});
     bench.takeHere();
     QCOMPARE(bench.sensorsOfTable(), Numbers({1}));
-    // The next session asks anew.
-    bench.controller.setSensors({});
+    // The next session begins as if nothing had been chosen.
+    bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
+    bench.tracker->stand(0.5);
+    QCOMPARE(bench.recorded(), Numbers({0, 1}));
+  }
+
+  void theNextSessionIsNotLedByThatOfTheOneBefore() {
+    TwoSensors bench(newPath());
+    bench.tracker->stand(0.5);
+    bench.controller.setSensors({1, 0});
+    QCOMPARE(bench.recorded(), Numbers({1, 0}));
+    bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
+    bench.tracker->stand(0.5);
+    QCOMPARE(bench.recorded(), Numbers({0, 1}));
+    QCOMPARE(bench.controller.status().live->sensor, 0);
+  }
+
+  void whatIsChosenBeforeASessionIsOfIt() {
+    TwoSensors bench(newPath());
+    bench.tracker->stand(0.5);
+    bench.controller.closeSession();
+    bench.controller.setSensors({1, 0});
+    const QString path = newPath();
+    bench.controller.openSession(path, QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
+    bench.tracker->stand(0.5);
+    QCOMPARE(bench.recorded(), Numbers({1, 0}));
+    bench.controller.closeSession();
+    QCOMPARE(readSensors(SessionStore::open(path)->state(kSensorsState).value()).value(), Numbers({1, 0}));
     bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
     bench.tracker->stand(0.5);
     QCOMPARE(bench.recorded(), Numbers({0, 1}));

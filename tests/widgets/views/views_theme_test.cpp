@@ -1,4 +1,5 @@
 #include <QCheckBox>
+#include <QDoubleSpinBox>
 #include <QRegularExpression>
 #include <QSignalSpy>
 #include <cmath>
@@ -132,6 +133,53 @@ class ViewsThemeTest : public QObject {
     const QString rules = qApp->styleSheet().remove(comment);
     QVERIFY2(!rules.contains('@'), qPrintable(rules.mid(rules.indexOf('@'), 30)));
     applyTheme(*qApp, false);
+  }
+
+  /// What cannot be changed is told from what can, and ticked from unticked, in both themes.
+  void whatIsDisabledIsStillRead_data() {
+    QTest::addColumn<bool>("dark");
+    QTest::newRow("light") << false;
+    QTest::newRow("dark") << true;
+  }
+  void whatIsDisabledIsStillRead() {
+    QFETCH(bool, dark);
+    applyTheme(*qApp, dark);
+    QCheckBox box;
+    box.setEnabled(false);
+    const QImage unticked = box.grab().toImage();
+    box.setChecked(true);
+    const QImage ticked = box.grab().toImage();
+    double strongest = 1.0;
+    for (int y = 0; y < ticked.height(); ++y)
+      for (int x = 0; x < ticked.width(); ++x)
+        strongest = std::max(strongest, contrast(ticked.pixelColor(x, y), unticked.pixelColor(x, y)));
+    QVERIFY2(strongest > 2.0, qPrintable(QString::number(strongest)));
+    QDoubleSpinBox number;
+    number.setEnabled(false);
+    number.ensurePolished();
+    QVERIFY(number.palette().color(QPalette::Disabled, QPalette::Text) != theme().text);
+    applyTheme(*qApp, false);
+  }
+
+  void theRingsNumberStaysWithinIt_data() {
+    QTest::addColumn<int>("collected");
+    for (const int collected : {60, 999, 1801, 36000, 99999}) QTest::addRow("%d", collected) << collected;
+  }
+  void theRingsNumberStaysWithinIt() {
+    QFETCH(int, collected);
+    SampleRing ring;
+    ring.resize(136, 136);
+    // Of so many the part that is drawn is none.
+    ring.setProgress(0, 2000000000, SampleRing::State::kFailed);
+    const QImage before = ring.grab().toImage();
+    ring.setProgress(collected, 2000000000, SampleRing::State::kFailed);
+    const QImage after = ring.grab().toImage();
+    for (int y = 0; y < after.height(); ++y) {
+      for (int x = 0; x < after.width(); ++x) {
+        const bool in_ring = std::hypot(x - 67.5, y - 67.5) > (0.5 - 0.13) * 136 - 1.0;
+        QVERIFY2(!in_ring || after.pixel(x, y) == before.pixel(x, y), qPrintable(QString("%1, %2").arg(x).arg(y)));
+      }
+    }
   }
 
   void ringFillsAndFlashesOnce() {

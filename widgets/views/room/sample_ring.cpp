@@ -13,6 +13,8 @@ namespace {
 constexpr int kMostForeseen = 100000;
 constexpr int kFlash_ms = 450;
 constexpr double kThickness = 0.13;  ///< Of the ring's diameter.
+constexpr double kLetters = 0.27;    ///< The same, of the number within; less for many digits.
+constexpr double kWidest = 0.62;     ///< The same, of that number: wider it would reach into the ring.
 constexpr int kTop = 90 * 16;        ///< Qt counts sixteenths of a degree from three o'clock.
 
 }  // namespace
@@ -81,12 +83,15 @@ void SampleRing::paintEvent(QPaintEvent*) {
     painter.drawArc(outline, kTop, -static_cast<int>(share * 360 * 16));
   }
   QFont large = font();
-  large.setPixelSize(std::max(10, static_cast<int>(0.27 * side)));
   large.setBold(true);
+  const QString number = QString::number(collected_);
+  large.setPixelSize(std::max(10, static_cast<int>(kLetters * side)));
+  const double share_of_room = kWidest * side / QFontMetricsF(large).horizontalAdvance(number);
+  if (share_of_room < 1.0) large.setPixelSize(std::max(8, static_cast<int>(share_of_room * kLetters * side)));
   painter.setFont(large);
   painter.setPen(state_ == State::kFailed ? theme().attention : theme().text);
   const double below = 0.14 * side;
-  painter.drawText(outline.translated(0, -0.06 * side), Qt::AlignCenter, QString::number(collected_));
+  painter.drawText(outline.translated(0, -0.06 * side), Qt::AlignCenter, number);
   QFont small = font();
   small.setPixelSize(std::max(8, static_cast<int>(0.12 * side)));
   painter.setFont(small);

@@ -52,16 +52,18 @@ class HeldTakeWindowTest : public WindowDriver {
     if (QTest::currentTestFailed()) return;
     QCOMPARE(find<QLabel>("bannerPlace")->text(), QString("Time is up - what now?"));
     QVERIFY(find<QLabel>("bannerPosition")->text().startsWith("at "));
-    QVERIFY2(find<QLabel>("bannerReason")->text().contains("not to 0.001mm, after 30 s. Carrying the jig on keeps it"),
+    QVERIFY2(find<QLabel>("bannerReason")->text().contains("not to 0.001 mm, after 30 s. Carrying the jig on keeps it"),
              qPrintable(find<QLabel>("bannerReason")->text()));
     QVERIFY(find<QWidget>("banner")->property("state") == "attention");
-    for (const char* button : {"keepTake", "waitLonger", "takeAgain"}) {
+    for (const char* button : {"keepTake", "waitLonger", "takeAgain", "skipHeld"}) {
       QVERIFY(find<QPushButton>(button)->isVisible() && find<QPushButton>(button)->isEnabled());
       // Letters for 3 m: the reason's.
       QVERIFY(find<QPushButton>(button)->font().pixelSize() >= window_->height() / 30);
     }
     QVERIFY(!find<QPushButton>("take")->isEnabled());
+    QVERIFY2(find<QPushButton>("keepTake")->property("primary").toBool(), "what the space bar does stands out");
     picture("held-take");
+    theAnswersStayInATallWindow();
     QTest::keyClick(window_.get(), Qt::Key_Escape);
     QTRY_VERIFY(!find<QWidget>("heldTake")->isVisible());
     QCOMPARE(status().recorded->n_done, std::size_t{0});
@@ -92,6 +94,7 @@ class HeldTakeWindowTest : public WindowDriver {
     QTest::newRow("keep") << QByteArray("keepTake") << QByteArray("keep");
     QTest::newRow("wait") << QByteArray("waitLonger") << QByteArray("wait");
     QTest::newRow("again") << QByteArray("takeAgain") << QByteArray("again");
+    QTest::newRow("skip") << QByteArray("skipHeld") << QByteArray("skip");
   }
   void aButtonAnswers() {
     QFETCH(QByteArray, button);
@@ -122,6 +125,21 @@ class HeldTakeWindowTest : public WindowDriver {
   }
 
  private:
+  /// Letters grow with the height, and have the width that there is.
+  void theAnswersStayInATallWindow() {
+    const QSize size = window_->size();
+    window_->resize(size.width(), 980);
+    const auto right = [this] {
+      const auto* last = find<QPushButton>("skipHeld");
+      return last->mapTo(find<QWidget>("heldTake"), QPoint(last->width(), 0)).x();
+    };
+    QTRY_VERIFY(window_->height() == 980 && right() <= find<QWidget>("heldTake")->width());
+    for (const char* button : {"keepTake", "waitLonger", "takeAgain", "skipHeld"})
+      QTRY_VERIFY(find<QPushButton>(button)->width() >= find<QPushButton>(button)->sizeHint().width());
+    picture("held-take-tall");
+    window_->resize(size);
+    QTRY_COMPARE(window_->size(), size);
+  }
   const acquisition::AcquisitionStatus& status() { return window_->workbench().status(); }
 
   void begin() {
@@ -166,4 +184,4 @@ class HeldTakeWindowTest : public WindowDriver {
 };
 
 FIELDTRUE_WINDOW_TEST(HeldTakeWindowTest)
-#include "held_take_test.moc"
+#include "held_take_window_test.moc"
