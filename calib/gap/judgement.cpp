@@ -141,11 +141,16 @@ class Judge {
     if (by_both > 0.0) judgement.named_share = by_effects / by_both;
     const bool foretells_better = judgement.unseen_gain.low90.value_or(-1.0) > 0.0;
     const bool foretells_worse = judgement.unseen_gain.high90.value_or(1.0) < 0.0;
-    const bool is_likelier = judgement.nats_over_unnamed >= search_.thresholds().least_nats && !foretells_worse;
+    const bool is_likelier = judgement.nats_over_unnamed >= leastNatsOf(selection.ways.size()) && !foretells_worse;
     if (!foretells_better && !is_likelier)
       judgement.refusal = Refusal::kForetellsNoBetter;
     else if (judgement.named_share < search_.thresholds().least_share)
       judgement.refusal = Refusal::kSmallShare;
+  }
+
+  double leastNatsOf(std::size_t n_effects) const {
+    const identify::Thresholds& thresholds = search_.thresholds();
+    return n_effects < 2 ? thresholds.least_nats : thresholds.least_nats_of_several * static_cast<double>(n_effects);
   }
 
   const identify::GapSearch& search_;

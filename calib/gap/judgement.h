@@ -43,8 +43,8 @@ struct Judgement {
 
 /// Each effect stays only if it makes no unseen place worse on the whole and leaving it out costs evidence; together
 /// they are named only if they foretell unseen blocks better than a field without a name, or, foretelling the same, are
-/// the likelier by Thresholds::least_nats, every parameter counted; and only if they take at least
-/// Thresholds::least_share of what they and such a field together take.
+/// the likelier by Thresholds::least_nats, or, several together, by least_nats_of_several each, every parameter
+/// counted; and only if they take at least Thresholds::least_share of what they and such a field together take.
 Judgement judge(const identify::GapSearch& search, identify::EffectSelection selection, const RunControl& control);
 
 }  // namespace fieldtrue::gap

@@ -123,7 +123,8 @@ std::string whyRefused(const Judgement& judgement) {
       return "";
     case Refusal::kForetellsNoBetter:
       return namesText(judgement.refused) +
-             " would fit, but a smooth field without a name foretells places not seen as well, and is as likely";
+             " would fit, but a smooth field without a name foretells places not seen as well, and " +
+             (judgement.refused.size() > 1 ? "several causes at once must be far likelier than that" : "is as likely");
     case Refusal::kSmallShare:
       return namesText(judgement.refused) + " would fit, but takes only " + shown(100.0 * judgement.named_share) +
              " % of what a smooth field without a name takes beside it";

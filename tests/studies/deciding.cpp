@@ -33,6 +33,7 @@ const std::array kDeciding = {
     one<&Thresholds::other_kind_start>("other_kind_start"),
     one<&Thresholds::other_kind_share>("other_kind_share"),
     one<&Thresholds::least_nats>("least_nats"),
+    one<&Thresholds::least_nats_of_several>("least_nats_of_several"),
     one<&Thresholds::least_share>("least_share"),
     one<&Thresholds::sure_of_structure>("sure_of_structure"),
     one<&Thresholds::sure_nats>("sure_nats"),

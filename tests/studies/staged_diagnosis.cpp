@@ -78,8 +78,7 @@ bool StagedDiagnosis::selectsAsUsual(const Thresholds& thresholds, int most_effe
   if (!is_any_worth) return true;
   return thresholds.least_gain_first == usual.least_gain_first && thresholds.least_gain_more == usual.least_gain_more &&
          thresholds.least_gain_exchange == usual.least_gain_exchange &&
-         thresholds.other_kind_start == usual.other_kind_start &&
-         thresholds.other_kind_share == usual.other_kind_share;
+         thresholds.other_kind_start == usual.other_kind_start && thresholds.other_kind_share == usual.other_kind_share;
 }
 
 /// Where nothing is selected only the floor is weighed; else what the judgement compares with thresholds must fall on
@@ -96,6 +95,11 @@ bool StagedDiagnosis::judgesAsUsual(const Thresholds& thresholds, const Stage& s
   if (thresholds.least_nats != usual.least_nats &&
       (stage.selection.ways.size() > 1 ||
        !isSameSide(judgement.nats_over_unnamed, thresholds.least_nats, usual.least_nats)))
+    return false;
+  const double n_effects = static_cast<double>(judgement.refusal == gap::Refusal::kNone ? stage.selection.ways.size()
+                                                                                        : judgement.refused.size());
+  if (n_effects > 1.0 && !isSameSide(judgement.nats_over_unnamed, n_effects * thresholds.least_nats_of_several,
+                                     n_effects * usual.least_nats_of_several))
     return false;
   return judgement.refusal == gap::Refusal::kForetellsNoBetter ||
          isSameSide(judgement.named_share, thresholds.least_share, usual.least_share);
