@@ -96,8 +96,8 @@ bool StagedDiagnosis::judgesAsUsual(const Thresholds& thresholds, const Stage& s
       (stage.selection.ways.size() > 1 ||
        !isSameSide(judgement.nats_over_unnamed, thresholds.least_nats, usual.least_nats)))
     return false;
-  const double n_effects = static_cast<double>(judgement.refusal == gap::Refusal::kNone ? stage.selection.ways.size()
-                                                                                        : judgement.refused.size());
+  const auto n_effects = static_cast<double>(judgement.refusal == gap::Refusal::kNone ? stage.selection.ways.size()
+                                                                                      : judgement.refused.size());
   if (n_effects > 1.0 && !isSameSide(judgement.nats_over_unnamed, n_effects * thresholds.least_nats_of_several,
                                      n_effects * usual.least_nats_of_several))
     return false;

@@ -19,6 +19,11 @@ class SensorsGoingOnTest : public QObject {
   QTemporaryDir folder_;
   int count_ = 0;
   QString newPath() { return folder_.filePath(QStringLiteral("s%1.fieldtrue").arg(++count_)); }
+  /// A session of its own, and the stream heard in it.
+  static void beginNext(TwoSensors& bench, const QString& path) {
+    bench.controller.openSession(path, QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
+    bench.tracker->stand(0.5);
+  }
 
  private slots:
   void aSessionGoesOnWithItsOwnSensors() {
@@ -97,8 +102,7 @@ class SensorsGoingOnTest : public QObject {
     bench.takeHere();
     QCOMPARE(bench.sensorsOfTable(), Numbers({1}));
     // The next session begins as if nothing had been chosen.
-    bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
-    bench.tracker->stand(0.5);
+    beginNext(bench, newPath());
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
   }
 
@@ -107,8 +111,7 @@ class SensorsGoingOnTest : public QObject {
     bench.tracker->stand(0.5);
     bench.controller.setSensors({1, 0});
     QCOMPARE(bench.recorded(), Numbers({1, 0}));
-    bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
-    bench.tracker->stand(0.5);
+    beginNext(bench, newPath());
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
     QCOMPARE(bench.controller.status().live->sensor, 0);
   }
@@ -119,13 +122,11 @@ class SensorsGoingOnTest : public QObject {
     bench.controller.closeSession();
     bench.controller.setSensors({1, 0});
     const QString path = newPath();
-    bench.controller.openSession(path, QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
-    bench.tracker->stand(0.5);
+    beginNext(bench, path);
     QCOMPARE(bench.recorded(), Numbers({1, 0}));
     bench.controller.closeSession();
     QCOMPARE(readSensors(SessionStore::open(path)->state(kSensorsState).value()).value(), Numbers({1, 0}));
-    bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
-    bench.tracker->stand(0.5);
+    beginNext(bench, newPath());
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
   }
 

@@ -2,7 +2,9 @@
 
 #include <QTest>
 #include <array>
+#include <cmath>
 
+#include "calib/gap/unseen.h"
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/test_main.h"
 
@@ -25,13 +27,23 @@ CalibrationTable recordedWhileABodyStood(const std::array<bool, 6>& parts) {
   return table;
 }
 
+/// A recording and what the search names in it.
+struct Named {
+  explicit Named(const CalibrationTable& table)
+      : rows(identify::makeGapRows(table.nodes, table.metadata).value()),
+        search(rows, {}),
+        selection(identify::selectEffects(search, {}, {})) {}
+
+  identify::GapRows rows;
+  identify::GapSearch search;
+  identify::EffectSelection selection;
+};
+
 QString tracesOf(const CalibrationTable& table) {
-  const identify::GapRows rows = identify::makeGapRows(table.nodes, table.metadata).value();
-  const identify::GapSearch search(rows, {});
-  const identify::EffectSelection selection = identify::selectEffects(search, {}, {});
+  const Named named(table);
   QStringList texts;
-  for (const identify::Trace& trace : leftBy(search, selection.model.model).traces)
-    if (trace.p_value < search.thresholds().sure_trace) texts << QString::fromStdString(trace.text);
+  for (const identify::Trace& trace : leftBy(named.search, named.selection.model.model).traces)
+    if (trace.p_value < named.search.thresholds().sure_trace) texts << QString::fromStdString(trace.text);
   return texts.join("; ");
 }
 
@@ -40,17 +52,56 @@ QString tracesOf(const CalibrationTable& table) {
 class JudgementTest : public QObject {
   Q_OBJECT
  private slots:
-  /// Taking the best at each step, folds take the body that passes for all three errors, which foretells worse than a
-  /// field without a name: what the whole recording names must compete in them.
   void namesErrorsThatOneBodyHides() {
-    const CalibrationTable table = instrumentErrors();
-    const identify::GapRows rows = identify::makeGapRows(table.nodes, table.metadata).value();
-    const identify::GapSearch search(rows, {});
-    const Judgement judgement = judge(search, identify::selectEffects(search, {}, {}), {});
+    const Named named(instrumentErrors());
+    const Judgement judgement = judge(named.search, named.selection, {});
     QVERIFY(judgement.refusal == Refusal::kNone);
     QCOMPARE(judgement.selection.ways.size(), std::size_t{3});
     const double left = judgement.far.remaining().value;
     QVERIFY2(std::abs(left) < 0.1, qPrintable(QString::number(left)));
+  }
+
+  /// Taking the best at each step, folds take the body that passes for these errors; the true set, fitted to the fold's
+  /// rows, is likelier by them. So what is left of unseen rows is what explicit refits of that set leave.
+  void foldsAreNotWorseThanWhatTheRecordingNames() {
+    const Named named(instrumentErrors());
+    const std::vector<int> blocks = scatteredBlocks(named.rows);
+    const UnseenScores scores =
+        scoreUnseen(named.search, named.selection, identify::UnnamedRival(named.search), {}, blocks, {});
+    int n_alike = 0;
+    for (int block = 0; block < 10; ++block) {
+      std::vector<char> used;
+      for (const int of_row : blocks) used.push_back(of_row != block ? 1 : 0);
+      const identify::GapModel refitted = named.search.refined(named.selection.model.model, used).model;
+      const std::vector<identify::Vector6d> left = named.search.physics().residuals(refitted);
+      for (std::size_t i = 0; i < left.size(); ++i) {
+        const double square_m2 = left[i].head<3>().squaredNorm();
+        if (used[i] == 0 && std::abs(scores.step.back()[i].square_m2 - square_m2) < 0.01 * square_m2) ++n_alike;
+      }
+    }
+    QVERIFY2(n_alike >= 90, qPrintable(QStringLiteral("%1 of 100 rows").arg(n_alike)));
+  }
+
+  /// A rig of another scale that leans is as smooth as a field without a name: evidence alone can name the two, and
+  /// what is asked of each decides.
+  void severalCausesNeedEvidenceEach() {
+    simulation::Scene scene = gapScene();
+    scene.effects.push_back({"grid_scale", nlohmann::json::parse(R"({"scale": [0.01, -0.008, 0.004]})")});
+    scene.effects.push_back({"jig_tilt", nlohmann::json::parse(R"({"shear_rad": [0.02, -0.015, 0.0]})")});
+    const CalibrationTable table = recordedIn(scene, gapPlan());
+    const Named named(table);
+    QCOMPARE(named.selection.ways.size(), std::size_t{2});
+    const Judgement usual = judge(named.search, named.selection, {});
+    QVERIFY(usual.refusal == Refusal::kNone);
+    QVERIFY2(*usual.unseen_gain.low90 < 0.0, qPrintable(QString::number(*usual.unseen_gain.low90)));
+    for (const double share : {0.9, 1.1}) {
+      identify::Thresholds thresholds;
+      thresholds.least_nats_of_several = share * usual.nats_over_unnamed / 2.0;
+      const identify::GapSearch search(named.rows, {}, identify::NoiseFrom::kResiduals, thresholds);
+      const Judgement judgement = judge(search, identify::selectEffects(search, {}, {}), {});
+      QVERIFY(judgement.refusal == (share < 1.0 ? Refusal::kNone : Refusal::kForetellsNoBetter));
+      QCOMPARE(judgement.refused.size(), std::size_t{share < 1.0 ? 0U : 2U});
+    }
   }
 
   void whatStoodThereAllTheTimeLeavesNoTrace() {
