@@ -18,13 +18,13 @@ void retire(QObject* owner, std::unique_ptr<Object>& object) {
 
 }  // namespace
 
-LineDevice::LineDevice(LineSetup setup, StartupFactory make_startup, TransportFactory make_line, double clock_speed,
+LineDevice::LineDevice(LineSetup setup, StartupFactory make_startup, TransportFactory make_line, TrackerClock clock,
                        QObject* parent)
     : TrackerDevice(parent),
       setup_(std::move(setup)),
       make_startup_(std::move(make_startup)),
       make_line_(std::move(make_line)),
-      clock_speed_(clock_speed) {
+      clock_(std::move(clock)) {
   watch_.setParent(this);
   connect(&watch_, &QTimer::timeout, this, &LineDevice::watch);
   gap_.setParent(this);
@@ -37,13 +37,11 @@ LineDevice::~LineDevice() {
   if (line_) line_->disconnect(this);
 }
 
-double LineDevice::now_s() const { return static_cast<double>(clock_.nsecsElapsed()) * 1e-9 * clock_speed_; }
-
 void LineDevice::say(const std::string& bytes) {
   if (bytes.empty()) return;
   const QByteArray sent = QByteArray::fromStdString(bytes);
   line_->write(sent);
-  seen(true, sent, now_s());
+  seen(true, sent, clock_.now_s());
 }
 
 void LineDevice::seen(bool sent, const QByteArray& bytes, double at_s) {
@@ -57,14 +55,14 @@ std::optional<Trace> LineDevice::trace() const {
   trace.device = setup_.device_text;
   trace.software = "Fieldtrue " FIELDTRUE_VERSION;
   trace.recorded = QDateTime::currentDateTimeUtc().toString(Qt::ISODate).toStdString();
-  trace.clock_speed = clock_speed_;
+  trace.clock_speed = clock_.speed();
   return trace;
 }
 
 void LineDevice::start() {
   if (line_) return;
   emit stateChanged(DeviceState::kConnecting, "Opening " + QString::fromStdString(setup_.where));
-  if (!clock_.isValid()) clock_.start();
+  clock_.start();
   auto line = make_line_();
   if (line) {
     if (auto opened = (*line)->openLine(); !opened) line = tl::unexpected(opened.error());
@@ -85,7 +83,7 @@ void LineDevice::beginStartup() {
   startup_ = make_startup_(*line_);
   end_ = startup_->farewell();
   connect(startup_.get(), &TrackerStartup::bytesSeen, this,
-          [this](bool sent, const QByteArray& bytes) { seen(sent, bytes, now_s()); });
+          [this](bool sent, const QByteArray& bytes) { seen(sent, bytes, clock_.now_s()); });
   connect(startup_.get(), &TrackerStartup::failed, this, &LineDevice::failWith);
   connect(startup_.get(), &TrackerStartup::finished, this, &LineDevice::startupFinished);
   connect(startup_.get(), &TrackerStartup::progressed, this,
@@ -98,7 +96,7 @@ void LineDevice::startupFinished() {
   StreamPlan plan = startup_->stream();
   const QString text = summary(plan.part);
   trace_.beginStream({0, 0, plan.settings, identity_->rate_hz, text.toStdString(), describe()});
-  reader_ = std::make_unique<StreamReader>(std::move(plan), identity_->rate_hz, clock_speed_, text);
+  reader_ = std::make_unique<StreamReader>(std::move(plan), identity_->rate_hz, clock_.speed(), text);
   quiet_ticks_ = 0;
   heard_since_tick_ = noise_since_reading_ = false;
   answers_ = answers_at_tick_ = 0;
@@ -111,7 +109,7 @@ void LineDevice::startupFinished() {
 void LineDevice::readReady() {
   const QByteArray bytes = line_->readAll();
   if (bytes.isEmpty()) return;
-  const double arrival_s = now_s();
+  const double arrival_s = clock_.now_s();
   seen(false, bytes, arrival_s);
   const auto batch = reader_->read({bytes.constData(), static_cast<std::size_t>(bytes.size())}, arrival_s);
   const StreamPlan& plan = reader_->plan();
@@ -214,7 +212,7 @@ void LineDevice::stop() {
   disconnect(line_.get(), &QIODevice::readyRead, this, nullptr);
   farewell_ = std::make_unique<LineExchange>(*line_);
   connect(farewell_.get(), &LineExchange::bytesSeen, this,
-          [this](bool sent, const QByteArray& bytes) { seen(sent, bytes, now_s()); });
+          [this](bool sent, const QByteArray& bytes) { seen(sent, bytes, clock_.now_s()); });
   const auto closed = [this](const std::string&) {
     closeLine();
     emit stateChanged(DeviceState::kClosed, "Closed");

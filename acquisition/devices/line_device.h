@@ -1,6 +1,5 @@
 #pragma once
 
-#include <QElapsedTimer>
 #include <QTimer>
 #include <functional>
 #include <memory>
@@ -12,6 +11,7 @@
 #include "acquisition/devices/tracker_device.h"
 #include "acquisition/devices/tracker_startup.h"
 #include "acquisition/transports/followed_line.h"
+#include "acquisition/transports/tracker_clock.h"
 #include "acquisition/transports/transport.h"
 
 namespace fieldtrue::acquisition {
@@ -25,8 +25,8 @@ class LineDevice : public TrackerDevice {
   using TransportFactory = std::function<Result<std::unique_ptr<Transport>>()>;
   using StartupFactory = std::function<std::unique_ptr<TrackerStartup>(Transport& line)>;
   /// @param make_line called by start(), in the device's thread
-  /// @param clock_speed the tracker's seconds per second; other than 1 only for an emulated tracker
-  LineDevice(LineSetup setup, StartupFactory make_startup, TransportFactory make_line, double clock_speed = 1.0,
+  /// @param clock the tracker's, or its speed; other than the computer's only for an emulated tracker
+  LineDevice(LineSetup setup, StartupFactory make_startup, TransportFactory make_line, TrackerClock clock = {},
              QObject* parent = nullptr);
   ~LineDevice() override;
 
@@ -47,13 +47,11 @@ class LineDevice : public TrackerDevice {
   void failWith(const QString& text);
   void closeLine();
   void say(const std::string& bytes);
-  double now_s() const;
   QString summary(const QString& part_name) const;
 
   LineSetup setup_;
   StartupFactory make_startup_;
   TransportFactory make_line_;
-  double clock_speed_;
   std::unique_ptr<Transport> line_;
   std::unique_ptr<TrackerStartup> startup_;
   std::unique_ptr<LineExchange> farewell_;
@@ -61,7 +59,7 @@ class LineDevice : public TrackerDevice {
   std::unique_ptr<StreamReader> reader_;
   LineTrace trace_;
   std::string end_;  ///< What ends its stream.
-  QElapsedTimer clock_;
+  TrackerClock clock_;
   QTimer watch_;
   QTimer gap_;  ///< Until it is asked again.
   int quiet_ticks_ = 0;
@@ -75,10 +73,10 @@ class LineDevice : public TrackerDevice {
 /// A tracker whose startup is constructed from a line and the setup.
 template <class Startup, class Setup>
 std::unique_ptr<LineDevice> makeLineDevice(const Setup& setup, LineDevice::TransportFactory make_line,
-                                           double clock_speed = 1.0) {
+                                           TrackerClock clock = {}) {
   return std::make_unique<LineDevice>(
       setup, [setup](Transport& line) { return std::make_unique<Startup>(line, setup); }, std::move(make_line),
-      clock_speed);
+      std::move(clock));
 }
 
 /// The same from what a person wrote, for a row of the registry.

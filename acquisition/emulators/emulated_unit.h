@@ -113,10 +113,10 @@ Result<std::unique_ptr<EmulatorRunner>> makeEmulator(const Emulation& emulation,
 template <class Unit, class Options>
 std::unique_ptr<EmulatorRunner> emulatorOnLine(std::unique_ptr<PoseSource> source,
                                                std::unique_ptr<LoopbackTransport> device_end, const Options& options,
-                                               double speed = 1.0) {
+                                               TrackerClock clock = {}) {
   return std::make_unique<EmulatorRunner>(std::make_unique<Unit>(std::move(source), options),
                                           std::make_unique<LoopbackEndpoint>(std::move(device_end)), options.faults,
-                                          speed);
+                                          std::move(clock));
 }
 
 }  // namespace fieldtrue::acquisition

@@ -11,9 +11,12 @@ constexpr double kLate_s = 0.6;
 }  // namespace
 
 EmulatorRunner::EmulatorRunner(std::unique_ptr<EmulatedTracker> tracker, std::unique_ptr<EmulatorEndpoint> endpoint,
-                               EmulatorFaults faults, double speed, QObject* parent)
-    : QObject(parent), tracker_(std::move(tracker)), endpoint_(endpoint.release()), faults_(faults), speed_(speed) {
-  FT_CHECK(speed_ > 0.0);
+                               EmulatorFaults faults, TrackerClock clock, QObject* parent)
+    : QObject(parent),
+      tracker_(std::move(tracker)),
+      endpoint_(endpoint.release()),
+      faults_(faults),
+      clock_(std::move(clock)) {
   endpoint_->setParent(this);
   timer_.setParent(this);
   timer_.setTimerType(Qt::PreciseTimer);
@@ -31,10 +34,6 @@ Result<void> EmulatorRunner::start() {
   clock_.start();
   if (tracker_->streaming()) timer_.start(kTick_ms);
   return {};
-}
-
-double EmulatorRunner::time_s() const {
-  return clock_.isValid() ? static_cast<double>(clock_.nsecsElapsed()) * 1e-9 * speed_ : 0.0;
 }
 
 void EmulatorRunner::receive(const QByteArray& bytes) {
@@ -81,7 +80,7 @@ void EmulatorRunner::deliver(std::vector<EmulatedOutput>& out) {
   for (auto& piece : out) {
     if (unplugged_) return;
     if (faults_.slow_reply && !piece.record) {
-      late_.push_back({time_s() + kLate_s * speed_, std::move(piece.bytes)});
+      late_.push_back({time_s() + kLate_s * clock_.speed(), std::move(piece.bytes)});
       if (!timer_.isActive()) timer_.start(kTick_ms);
       continue;
     }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <QElapsedTimer>
 #include <QObject>
 #include <QTimer>
 #include <deque>
@@ -10,6 +9,7 @@
 #include "acquisition/emulators/emulated_tracker.h"
 #include "acquisition/emulators/emulator_endpoint.h"
 #include "acquisition/emulators/emulator_faults.h"
+#include "acquisition/transports/tracker_clock.h"
 
 namespace fieldtrue::acquisition {
 
@@ -18,16 +18,16 @@ namespace fieldtrue::acquisition {
 class EmulatorRunner : public QObject {
   Q_OBJECT
  public:
-  /// @param speed the tracker's seconds per second
+  /// @param clock the tracker's, or its speed
   EmulatorRunner(std::unique_ptr<EmulatedTracker> tracker, std::unique_ptr<EmulatorEndpoint> endpoint,
-                 EmulatorFaults faults = {}, double speed = 1.0, QObject* parent = nullptr);
+                 EmulatorFaults faults = {}, TrackerClock clock = {}, QObject* parent = nullptr);
 
   /// Opens the line. @error of the endpoint
   Result<void> start();
   EmulatedTracker& tracker() { return *tracker_; }
   EmulatorEndpoint& endpoint() { return *endpoint_; }
   /// The tracker's clock, zero at start.
-  double time_s() const;
+  double time_s() const { return clock_.now_s(); }
   std::uint64_t recordsSent() const { return records_sent_; }
   void unplug();
 
@@ -51,8 +51,7 @@ class EmulatorRunner : public QObject {
   std::unique_ptr<EmulatedTracker> tracker_;
   EmulatorEndpoint* endpoint_;
   EmulatorFaults faults_;
-  double speed_;
-  QElapsedTimer clock_;
+  TrackerClock clock_;
   QTimer timer_;
   std::mt19937_64 random_{7};
   std::deque<Late> late_;

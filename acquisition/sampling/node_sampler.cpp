@@ -180,7 +180,8 @@ bool NodeSampler::isCompleteByError() {
 }
 
 void NodeSampler::timeOut() {
-  can_keep_ = canAverage();
+  moved_at_end_ = motion(std::max(kLastBlock, looked() / kMostBlocks));
+  can_keep_ = hasEnough() && !moved_at_end_;
   message_ = shortfall();
   state_ = TakeState::kHeld;
   if (options_.holds_at_time_limit) return;
@@ -188,10 +189,9 @@ void NodeSampler::timeOut() {
   state_ = TakeState::kFailed;
 }
 
-bool NodeSampler::canAverage() const {
+bool NodeSampler::hasEnough() const {
   const bool by_error = options_.length.until == TakeLength::Until::kStandardError;
-  return collected_ >= (by_error ? kFewestByError : kFewestByTime) &&
-         !motion(std::max(kLastBlock, looked() / kMostBlocks));
+  return collected_ >= (by_error ? kFewestByError : kFewestByTime);
 }
 
 void NodeSampler::keep() {
@@ -280,6 +280,7 @@ std::string NodeSampler::timeLimitReason() const {
   std::string text = format("not finished within %g s: ", allowed_s()) + std::to_string(collected_) + " of " +
                      std::to_string(wanted_) + " good samples";
   if (restarts_ > 0) text += ", started over " + times(restarts_) + " (" + last_motion_ + "); let the sensor rest";
+  if (restarts_ == 0 && moved_at_end_) text += ", " + *moved_at_end_ + " at the end; let the sensor rest";
   if (restarts_ == 0 && passed_over_ > 0 && collected_ == 0) text += ", it never rested: let the sensor rest";
   if (bad_ > 0) {
     text += ", " + std::to_string(bad_) + " not usable";

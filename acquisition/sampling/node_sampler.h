@@ -84,8 +84,8 @@ class NodeSampler {
   std::optional<std::string> motion(int block) const;
   void finish();
   double allowed_s() const;
-  bool canAverage() const;
-  bool isKnown() const;  ///< The mean, if not as well as was asked for.
+  bool hasEnough() const;  ///< For a mean.
+  bool isKnown() const;    ///< The mean, if not as well as was asked for.
   std::string shortfall() const;
   std::string timeLimitReason() const;
 
@@ -99,12 +99,13 @@ class NodeSampler {
   int passed_over_ = 0;  ///< Since start().
   std::string last_status_;
   std::string last_motion_;
-  std::optional<double> first_time_s_;  ///< When its time began to run.
-  bool can_keep_ = false;               ///< As it was held.
-  int limits_ = 1;                      ///< Time limits that it was given.
-  bool was_held_ = false;               ///< Since the newest sample.
-  double held_s_ = 0.0;                 ///< Of the time that its samples span.
-  std::optional<double> newest_s_;      ///< Of its own samples.
+  std::optional<double> first_time_s_;       ///< When its time began to run.
+  bool can_keep_ = false;                    ///< As it was held.
+  std::optional<std::string> moved_at_end_;  ///< Before it was held, and too late for a block of its own.
+  int limits_ = 1;                           ///< Time limits that it was given.
+  bool was_held_ = false;                    ///< Since the newest sample.
+  double held_s_ = 0.0;                      ///< Of the time that its samples span.
+  std::optional<double> newest_s_;           ///< Of its own samples.
   double now_s_ = 0.0;
   std::string message_;
   std::vector<Sample> samples_;

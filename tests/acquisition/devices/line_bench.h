@@ -55,16 +55,16 @@ Setup quick(Setup setup, const QString& where = "the line") {
 }
 
 /// @param carrier "in process", "pty" or "tcp"
-/// @param speed the tracker's seconds per second
+/// @param clock the tracker's, or its speed
 template <class Unit, class Startup, class Options, class Setup>
 LineBench makeLineBench(const QByteArray& carrier, std::unique_ptr<acquisition::PoseSource> source,
-                        const Options& options, const Setup& setup, double speed = 1.0) {
+                        const Options& options, const Setup& setup, const acquisition::TrackerClock& clock = {}) {
   using namespace acquisition;
   LineBench bench;
   LineDevice::TransportFactory make_line;
   if (carrier == "in process") {
     auto ends = LoopbackTransport::pair();
-    bench.emulator = emulatorOnLine<Unit>(std::move(source), std::move(ends.second), options, speed);
+    bench.emulator = emulatorOnLine<Unit>(std::move(source), std::move(ends.second), options, clock);
     auto host = std::make_shared<std::unique_ptr<Transport>>(std::move(ends.first));
     make_line = [host]() -> Result<std::unique_ptr<Transport>> { return std::move(*host); };
   } else {
@@ -75,14 +75,14 @@ LineBench makeLineBench(const QByteArray& carrier, std::unique_ptr<acquisition::
       endpoint = std::make_unique<PtyEndpoint>(bench.folder->filePath("tracker"));
     }
     bench.emulator = std::make_unique<EmulatorRunner>(std::make_unique<Unit>(std::move(source), options),
-                                                      std::move(endpoint), options.faults, speed);
+                                                      std::move(endpoint), options.faults, clock);
   }
   FT_CHECK(bench.emulator->start().has_value());
   if (!make_line) {
     const std::string address = bench.emulator->endpoint().address().toStdString();
     make_line = [address] { return makeTransport(address); };
   }
-  bench.device = makeLineDevice<Startup>(setup, std::move(make_line), speed);
+  bench.device = makeLineDevice<Startup>(setup, std::move(make_line), clock);
   bench.probe = std::make_unique<DeviceProbe>(*bench.device);
   return bench;
 }

@@ -171,6 +171,7 @@ class NodeSamplerTest : public QObject {
     QVERIFY(sampler.state() == TakeState::kHeld);
     QCOMPARE(sampler.collected(), 29);
     QCOMPARE(sampler.canKeep(), when == 1000);
+    QCOMPARE(testing::holdsAll(sampler.message(), {"moved", "mm at the end", "let the sensor rest"}).ok, when != 1000);
   }
 
   /// A take of 1.5 s that had half a second of good readings when its time was over, and a person who answers a minute
