@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace fieldtrue::gap {
@@ -65,6 +66,8 @@ class FoldFitter {
     return identify::scan(at, *one.fit, one.fit->starts(), 1, {});
   }
 
+  enum class From { kAllWays, kNamedWay };
+
   /// The models after none, one, two ... effects, which the fold's own rows choose. Taking the best at each step can
   /// end at a poor set, where one thing passes for two others, or at a poor place of the right one: what the whole
   /// recording names is fitted to the fold's rows too, and these decide between the two.
@@ -73,17 +76,31 @@ class FoldFitter {
     std::vector<identify::GapModel> chosen = {none};
     for (std::size_t s = 0; s < selection_.ways.size() && !control.stop.stop_requested(); ++s) {
       chosen.push_back(chosen.back());
-      addBest(block, used, s, chosen.back());
+      addBest(block, used, s, From::kAllWays, chosen.back());
     }
     if (selection_.ways.empty() || control.stop.stop_requested()) return chosen;
-    std::vector<identify::GapModel> named = {selection_.model.model};
-    named.front() = search_.refined(named.front(), used).model;
+    std::vector<identify::GapModel> named = {namedOn(block, used)};
     if (!(priceOf(named.front(), used) < priceOf(chosen.back(), used))) return chosen;
     while (!named.front().terms.empty()) {
       const identify::GapModel fewer = identify::withoutTerm(named.front(), named.front().terms.size() - 1);
       named.insert(named.begin(), fewer.terms.empty() ? none : search_.refined(fewer, used).model);
     }
     return named;
+  }
+
+  /// What the whole recording names, fitted to the fold's rows from its places. Where it changes in time it is searched
+  /// anew: which body it was and when it moved is told by so few rows that its places would bring the fold what its own
+  /// rows do not know.
+  identify::GapModel namedOn(int block, std::span<const char> used) const {
+    if (!actsInTime()) return search_.refined(selection_.model.model, used).model;
+    identify::GapModel model = search_.none().model;
+    for (std::size_t s = 0; s < selection_.ways.size(); ++s) addBest(block, used, s, From::kNamedWay, model);
+    return model;
+  }
+
+  bool actsInTime() const {
+    return std::any_of(selection_.ways.begin(), selection_.ways.end(),
+                       [this](std::size_t way) { return search_.ways()[way].needs_time; });
   }
 
   /// The criterion on the fold's rows, and what each effect must at least be worth of them.
@@ -99,8 +116,10 @@ class FoldFitter {
            static_cast<double>(std::count(used.begin(), used.end(), 1)) / static_cast<double>(used.size());
   }
 
-  /// Adds the effect that the fold's own rows like best, if they like any.
-  void addBest(int block, std::span<const char> used, std::size_t step, identify::GapModel& model) const {
+  /// Adds the effect that the fold's own rows like best, if they like any; or what is named at this step, where they
+  /// put it.
+  void addBest(int block, std::span<const char> used, std::size_t step, From from_ways,
+               identify::GapModel& model) const {
     const identify::GapModel from = search_.seenFrom(step == 0 ? search_.none().model : model);
     const identify::Linearized at(search_.physics(), from, search_.whitening(), blocks_,
                                   identify::ResponseAt::kHalfWayIfBent);
@@ -115,7 +134,8 @@ class FoldFitter {
     for (std::size_t w = 0; w < ways_.size(); ++w) {
       const identify::EffectWay& way = search_.ways()[ways_[w]];
       const auto is_there = [&](const identify::GapTerm& term) { return term.effect == way.effect; };
-      if (std::any_of(model.terms.begin(), model.terms.end(), is_there)) continue;
+      const bool is_named = from_ways == From::kNamedWay;
+      if (is_named ? w != step : std::any_of(model.terms.begin(), model.terms.end(), is_there)) continue;
       const identify::ScanResult scan = step == 0 ? first_[w] : scanned(at, ways_[w]);
       if (scan.without_block.size() <= held_out) continue;
       const identify::ScanResult::Start& start = scan.without_block[held_out];
@@ -128,7 +148,8 @@ class FoldFitter {
     const auto is_own = [&](const Start& start) { return start.way == ways_[step]; };
     const auto others = starts.begin() + static_cast<std::ptrdiff_t>(std::min(starts.size(), kSearchedAFold));
     starts.erase(std::stable_partition(others, starts.end(), is_own), starts.end());
-    double best = search_.bicOf(model, used) - leastGain(step, used);
+    double best = from_ways == From::kNamedWay ? std::numeric_limits<double>::infinity()
+                                               : search_.bicOf(model, used) - leastGain(step, used);
     const identify::GapModel before = search_.seenFrom(model);
     for (const Start& start : starts) {
       const identify::EffectWay& way = search_.ways()[start.way];

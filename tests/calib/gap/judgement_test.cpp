@@ -82,6 +82,25 @@ class JudgementTest : public QObject {
     QVERIFY2(n_alike >= 90, qPrintable(QStringLiteral("%1 of 100 rows").arg(n_alike)));
   }
 
+  /// Few rows tell where a body stood that came during the session: a fold may not have its place from all of them. So
+  /// what folds leave does not change when the whole recording's place does.
+  void foldsDoNotKnowThePlaceOfWhatMoved() {
+    simulation::Scene scene = gapScene();
+    scene.effects.push_back({"metal_moved", nlohmann::json::parse(R"({"center_m": [1.2, 0.5, 0.3], "radius_m": 0.15,
+                                                                      "change_s": 200})")});
+    Named named(recordedIn(scene, gapPlan()));
+    QCOMPARE(named.selection.ways.size(), std::size_t{1});
+    const std::vector<int> blocks = scatteredBlocks(named.rows);
+    const auto left = [&] {
+      return scoreUnseen(named.search, named.selection, identify::UnnamedRival(named.search), {}, blocks, {});
+    };
+    const UnseenScores as_found = left();
+    named.selection.model.model.terms.front().searched *= 1.02;
+    const UnseenScores displaced = left();
+    for (std::size_t i = 0; i < named.rows.rows.size(); ++i)
+      QCOMPARE(displaced.step.back()[i].square_m2, as_found.step.back()[i].square_m2);
+  }
+
   /// A rig of another scale that leans is as smooth as a field without a name: evidence alone can name the two, and
   /// what is asked of each decides.
   void severalCausesNeedEvidenceEach() {
