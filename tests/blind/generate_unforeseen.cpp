@@ -66,6 +66,22 @@ std::vector<double> instants(Random& random, const Scene& scene, int count) {
   return list_s;
 }
 
+std::size_t Course::before(const Row& row) const {
+  const auto next = std::lower_bound(start_s.begin(), start_s.end(), row.start_s - 1e-6);
+  return next == start_s.begin() ? 0 : static_cast<std::size_t>(next - start_s.begin() - 1);
+}
+
+Course courseOf(const Setup& setup) {
+  std::vector<Row> rows = setup.rows;
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.start_s < b.start_s; });
+  Course course;
+  for (const Row& row : rows) {
+    course.start_s.push_back(row.start_s);
+    course.poses.push_back(setup.expected(row));
+  }
+  return course;
+}
+
 Matrix3d echo(const Vector3d& at_m, const Matrix3d& polarizability_m3, const Vector3d& p_m) {
   return dipoleField(keptAway(p_m - at_m, 0.12)) * polarizability_m3 * dipoleField(at_m);
 }
@@ -128,7 +144,37 @@ std::span<const std::vector<Kind>> unforeseenBatches() {
       {"unforeseen:fused_compass_near_steel", 1, drawFusedCompass},
       {"unforeseen:handover_to_second_transmitter", 1, drawHandover},
   };
-  static const std::array kBatches = {kFirst};
+  static const std::vector<Kind> kSecond = {
+      {"unforeseen:wristwatch_on_the_left_hand", 1, drawWristwatch},
+      {"unforeseen:table_frame_rises_with_the_places", 1, drawRisingFrame},
+      {"unforeseen:tracker_next_door_beats", 1, drawTrackerNextDoor},
+      {"unforeseen:drive_current_leaks_along_a_pipe", 1, drawLeakToPipe},
+      {"unforeseen:wheelchair_rolls_past", 1, drawWheelchair},
+      {"unforeseen:tuned_gate_drifts_through_resonance", 1, drawTunedGate},
+      {"unforeseen:long_beam_has_a_pole_at_its_end", 1, drawLongBeam},
+      {"unforeseen:air_jet_bends_the_stem", 1, drawAirJet},
+      {"unforeseen:lamp_dragged_after_the_operator", 1, drawDraggedLamp},
+      {"unforeseen:board_cups_once_the_sun_is_on_it", 1, drawCuppedBoard, kRigAxes},
+      {"unforeseen:steel_screws_under_a_few_places", 1, drawScrews},
+      {"unforeseen:each_hole_marked_from_the_last", 1, drawChainedHoles, kRigAxes},
+      {"unforeseen:tape_hook_bent_when_places_were_found", 1, drawBentHook, kRigAxes},
+      {"unforeseen:block_squared_by_eye_from_one_spot", 1, drawSquaredByEye, kRigAxes},
+      {"unforeseen:countdown_too_short_for_long_ways", 1, drawShortCountdown},
+      {"unforeseen:spacers_under_layers_are_wedges", 1, drawWedgedSpacers, kLayers},
+      {"unforeseen:two_sensors_share_a_checkerboard", 1, drawCheckerboard, kLayers},
+      {"unforeseen:cable_winds_up_walking_round", 1, drawWoundCable},
+      {"unforeseen:paper_template_puckers_round_glue", 1, drawPuckeredTemplate, kRigAxes},
+      {"unforeseen:unscreened_sensor_picks_up_voltage", 1, drawCapacitivePickup},
+      {"unforeseen:correction_map_of_another_room_left_on", 1, drawForeignMap},
+      {"unforeseen:output_held_within_a_band", 1, drawHeldOutput},
+      {"unforeseen:broken_strand_opens_when_bent", 1, drawBrokenStrand},
+      {"unforeseen:coordinates_cut_to_few_bits", 1, drawCutBits},
+      {"unforeseen:cable_on_the_floor_detunes_sensor", 1, drawCableOnFloor},
+      {"unforeseen:gain_control_slow_to_release", 1, drawSlowRelease},
+      {"unforeseen:hemisphere_guard_pushes_off_a_plane", 1, drawHemisphereGuard},
+      {"unforeseen:one_coil_slipped_within_the_sensor", 1, drawSlippedCoil},
+  };
+  static const std::array kBatches = {kFirst, kSecond};
   return kBatches;
 }
 

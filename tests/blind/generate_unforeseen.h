@@ -35,6 +35,16 @@ int passed(const std::vector<double>& instants_s, double time_s);
 /// Instants that divide the session, each drawn within its part of it.
 std::vector<double> instants(Random& random, const Scene& scene, int count);
 
+/// Where the sensor was in the order of time.
+struct Course {
+  std::vector<double> start_s;
+  std::vector<SolvedPose> poses;
+
+  /// Index of the last recording that began before a row; at first the first.
+  std::size_t before(const Row& row) const;
+};
+Course courseOf(const Setup& setup);
+
 /// Field at p of metal at one point of given polarizability, per unit moment of each transmitter coil.
 Matrix3d echo(const Vector3d& at_m, const Matrix3d& polarizability_m3, const Vector3d& p_m);
 void addField(const SolvedPose& pose, const Matrix3d& field, Matrix3d& couplings);
@@ -82,5 +92,37 @@ Drawn drawBiasedCore(const Setup& setup, Random& random);
 Drawn drawPhaseSlip(const Setup& setup, Random& random);
 Drawn drawFusedCompass(const Setup& setup, Random& random);
 Drawn drawHandover(const Setup& setup, Random& random);
+
+// The second batch.
+Drawn drawWristwatch(const Setup& setup, Random& random);
+Drawn drawRisingFrame(const Setup& setup, Random& random);
+Drawn drawTrackerNextDoor(const Setup& setup, Random& random);
+Drawn drawLeakToPipe(const Setup& setup, Random& random);
+Drawn drawWheelchair(const Setup& setup, Random& random);
+Drawn drawTunedGate(const Setup& setup, Random& random);
+Drawn drawLongBeam(const Setup& setup, Random& random);
+Drawn drawAirJet(const Setup& setup, Random& random);
+Drawn drawDraggedLamp(const Setup& setup, Random& random);
+
+Drawn drawCuppedBoard(const Setup& setup, Random& random);
+Drawn drawScrews(const Setup& setup, Random& random);
+Drawn drawChainedHoles(const Setup& setup, Random& random);
+Drawn drawBentHook(const Setup& setup, Random& random);
+Drawn drawSquaredByEye(const Setup& setup, Random& random);
+Drawn drawShortCountdown(const Setup& setup, Random& random);
+Drawn drawWedgedSpacers(const Setup& setup, Random& random);
+Drawn drawCheckerboard(const Setup& setup, Random& random);
+Drawn drawWoundCable(const Setup& setup, Random& random);
+Drawn drawPuckeredTemplate(const Setup& setup, Random& random);
+
+Drawn drawCapacitivePickup(const Setup& setup, Random& random);
+Drawn drawForeignMap(const Setup& setup, Random& random);
+Drawn drawHeldOutput(const Setup& setup, Random& random);
+Drawn drawBrokenStrand(const Setup& setup, Random& random);
+Drawn drawCutBits(const Setup& setup, Random& random);
+Drawn drawCableOnFloor(const Setup& setup, Random& random);
+Drawn drawSlowRelease(const Setup& setup, Random& random);
+Drawn drawHemisphereGuard(const Setup& setup, Random& random);
+Drawn drawSlippedCoil(const Setup& setup, Random& random);
 
 }  // namespace blind::unforeseen
