@@ -115,12 +115,10 @@ Drawn drawCheckerboard(const Setup& setup, Random& random);
 Drawn drawWoundCable(const Setup& setup, Random& random);
 Drawn drawPuckeredTemplate(const Setup& setup, Random& random);
 
-Drawn drawCapacitivePickup(const Setup& setup, Random& random);
 Drawn drawForeignMap(const Setup& setup, Random& random);
 Drawn drawHeldOutput(const Setup& setup, Random& random);
 Drawn drawBrokenStrand(const Setup& setup, Random& random);
 Drawn drawCutBits(const Setup& setup, Random& random);
-Drawn drawCableOnFloor(const Setup& setup, Random& random);
 Drawn drawSlowRelease(const Setup& setup, Random& random);
 Drawn drawHemisphereGuard(const Setup& setup, Random& random);
 Drawn drawSlippedCoil(const Setup& setup, Random& random);

@@ -78,8 +78,8 @@ Drawn drawCuppedBoard(const Setup& setup, Random& random) {
     });
   };
   const json parameters = {{"axis", axis}, {"ridge_jig_m", ridge_m}, {"sun_s", sun_s}, {"constant_s", constant_s}};
-  return drawnOf({"board_cups_once_the_sun_is_on_it", "the board cups as the sun dries one face", "curvature_per_m",
-                  1e-5, 3, parameters},
+  return drawnOf({"near:board_cups_once_the_sun_is_on_it", "the board cups as the sun dries one face",
+                  "curvature_per_m", 1e-5, 3, parameters},
                  apply);
 }
 
@@ -106,7 +106,7 @@ Drawn drawScrews(const Setup& setup, Random& random) {
       addField(pose, size * field, couplings);
     });
   };
-  return drawnOf({"steel_screws_under_a_few_places", "a few posts are held by steel screws right under the sensor",
+  return drawnOf({"near:steel_screws_under_a_few_places", "a few posts are held by steel screws right under the sensor",
                   "polarizability_each_m3", 1e-9, 1e-2, json{{"screws", count}}},
                  apply);
 }
@@ -192,9 +192,10 @@ Drawn drawShortCountdown(const Setup& setup, Random& random) {
       if (beyond_m > 0) pose.position_m += std::tanh(size) * beyond_m * back_m.normalized();
     });
   };
-  return drawnOf({"countdown_too_short_for_long_ways", "after a long way recording starts before the place is reached",
-                  "share_missing", 1e-5, 2, json{{"reach_m", reach_m}}},
-                 apply);
+  return drawnOf(
+      {"near:countdown_too_short_for_long_ways", "after a long way recording starts before the place is reached",
+       "share_missing", 1e-5, 2, json{{"reach_m", reach_m}}},
+      apply);
 }
 
 /// Layers are reached by stacking spacers that are neither equally thick nor quite parallel, turned as they come.
@@ -218,9 +219,10 @@ Drawn drawWedgedSpacers(const Setup& setup, Random& random) {
       place_m.z() += size * raised[layer];
     });
   };
-  return drawnOf({"spacers_under_layers_are_wedges", "stacked spacers of unequal thickness tilt each layer its own way",
-                  "thickness_error_m", 1e-6, 0.3, json{{"wedge_rad_per_m", wedge_per_m}, {"raised", raised}}},
-                 apply);
+  return drawnOf(
+      {"near:spacers_under_layers_are_wedges", "stacked spacers of unequal thickness tilt each layer its own way",
+       "thickness_error_m", 1e-6, 0.3, json{{"wedge_rad_per_m", wedge_per_m}, {"raised", raised}}},
+      apply);
 }
 
 /// Two people share the work, each with a sensor of his own: one the black, the other the white squares.

@@ -138,8 +138,8 @@ Drawn drawWheelchair(const Setup& setup, Random& random) {
     });
   };
   const json parameters = {{"pass_s", pass_s}, {"half_pass_s", half_pass_s}, {"rolled_m", listed(rolled_m)}};
-  return drawnOf({"wheelchair_rolls_past", "a wheelchair is rolled past during the session", "polarizability_m3", 1e-6,
-                  10, parameters, nearest_m},
+  return drawnOf({"near:wheelchair_rolls_past", "a wheelchair is rolled past during the session", "polarizability_m3",
+                  1e-6, 10, parameters, nearest_m},
                  apply);
 }
 

@@ -58,20 +58,6 @@ Vector3d held(const Vector3d& before_m, const Vector3d& now_m, const Vector3d& b
 
 }  // namespace
 
-/// Without its screen the sensor also picks up the voltage of the transmitter coils, however it is turned.
-Drawn drawCapacitivePickup(const Setup&, Random& random) {
-  const Vector3d inputs = direction(random);
-  const Eigen::RowVector3d volts = direction(random).transpose();
-  const auto apply = [=](World& world, double size) {
-    world.signal.push_back([=](const Row&, const SolvedPose& pose, Matrix3d& couplings) {
-      couplings += size / std::max(0.1, pose.position_m.norm()) * inputs * volts;
-    });
-  };
-  return drawnOf({"unscreened_sensor_picks_up_voltage", "the sensor picks up the voltage of the transmitter coils",
-                  "pickup_m2", 1e-6, 30, json{{"inputs", listed(inputs)}, {"volts", listed(volts.transpose())}}},
-                 apply);
-}
-
 /// The driver still applies the correction map that was made in another room.
 Drawn drawForeignMap(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
@@ -85,8 +71,8 @@ Drawn drawForeignMap(const Setup& setup, Random& random) {
     });
   };
   const json parameters = {{"spacing_m", {shifts.spacing_m, turns.spacing_m}}, {"turn_rad_per_m", turn_per_m}};
-  return drawnOf({"correction_map_of_another_room_left_on", "the map of another room is still applied", "shift_m", 1e-6,
-                  0.3, parameters},
+  return drawnOf({"near:correction_map_of_another_room_left_on", "the map of another room is still applied", "shift_m",
+                  1e-6, 0.3, parameters},
                  apply);
 }
 
@@ -104,8 +90,8 @@ Drawn drawHeldOutput(const Setup& setup, Random& random) {
       pose.position_m = held(output_m[course.before(row)], pose.position_m, size * bands);
     });
   };
-  return drawnOf({"output_held_within_a_band", "a coordinate is passed on only when it has left a band", "band_m", 1e-6,
-                  0.3, json{{"bands", listed(bands)}}},
+  return drawnOf({"near:output_held_within_a_band", "a coordinate is passed on only when it has left a band", "band_m",
+                  1e-6, 0.3, json{{"bands", listed(bands)}}},
                  apply);
 }
 
@@ -129,8 +115,8 @@ Drawn drawBrokenStrand(const Setup& setup, Random& random) {
     });
   };
   const json parameters = {{"coil", coil}, {"exit", listed(exit)}, {"opens_at_cosine", opens}, {"soft", soft}};
-  return drawnOf({"broken_strand_opens_when_bent", "one coil loses signal where the cable is bent back", "log_loss",
-                  1e-5, 3, parameters, box_m},
+  return drawnOf({"near:broken_strand_opens_when_bent", "one coil loses signal where the cable is bent back",
+                  "log_loss", 1e-5, 3, parameters, box_m},
                  apply);
 }
 
@@ -142,30 +128,8 @@ Drawn drawCutBits(const Setup&, Random& random) {
       for (double& coordinate_m : pose.position_m) coordinate_m -= cutOff_m(coordinate_m, unit_m, size);
     });
   };
-  return drawnOf({"coordinates_cut_to_few_bits", "the last bits of short floating numbers are cut off", "last_bit",
+  return drawnOf({"near:coordinates_cut_to_few_bits", "the last bits of short floating numbers are cut off", "last_bit",
                   1e-5, 1, json{{"unit_m", unit_m}}},
-                 apply);
-}
-
-/// The cable lies on a conducting floor more or less of its length: its capacitance detunes the sensor's coils.
-Drawn drawCableOnFloor(const Setup& setup, Random& random) {
-  const Scene scene = sceneOf(setup);
-  const double floor_m = scene.lowest_m - uniform(random, 0.1, 0.5), length_m = uniform(random, 1.5, 3.0);
-  const Vector3d toward = level(random, scene.up);
-  const Vector3d box_m = scene.middle_m + (extent_m(scene, toward) + uniform(random, 0.2, 0.8)) * toward;
-  const Vector3d detuned(1, uniform(random, 0.3, 1.0), uniform(random, 0.3, 1.0));
-  const auto apply = [=, up = scene.up](World& world, double size) {
-    world.signal.push_back([=](const Row&, const SolvedPose& pose, Matrix3d& couplings) {
-      const double hangs_m = pose.position_m.dot(up) - floor_m;
-      const Vector3d away_m = pose.position_m - box_m;
-      const double spare_m = length_m - hangs_m - (away_m - away_m.dot(up) * up).norm();
-      const double lies_m = 0.3 * std::log1p(std::exp(spare_m / 0.3));
-      for (int coil = 0; coil < 3; ++coil) couplings.row(coil) *= std::exp(size * detuned(coil) * lies_m);
-    });
-  };
-  const json parameters = {{"length_m", length_m}, {"floor_m", floor_m}, {"detuned", listed(detuned)}};
-  return drawnOf({"cable_on_the_floor_detunes_sensor", "the length of cable that lies on the floor detunes the sensor",
-                  "log_gain_per_m", 1e-5, 3, parameters, box_m},
                  apply);
 }
 
@@ -181,8 +145,8 @@ Drawn drawSlowRelease(const Setup& setup, Random& random) {
       couplings *= std::exp(-size * std::max(0.0, fall - tolerated));
     });
   };
-  return drawnOf({"gain_control_slow_to_release", "coming from a strong signal the gain is still too low", "share_left",
-                  1e-5, 3, json{{"tolerated_log_fall", tolerated}}},
+  return drawnOf({"near:gain_control_slow_to_release", "coming from a strong signal the gain is still too low",
+                  "share_left", 1e-5, 3, json{{"tolerated_log_fall", tolerated}}},
                  apply);
 }
 
@@ -220,8 +184,8 @@ Drawn drawSlippedCoil(const Setup&, Random& random) {
       couplings.row(coil) += idealCouplings(slipped).row(coil) - idealCouplings(pose).row(coil);
     });
   };
-  return drawnOf({"one_coil_slipped_within_the_sensor", "one coil of the sensor sits beside the others", "slipped_m",
-                  1e-5, 0.3, json{{"coil", coil}, {"toward", listed(toward)}}},
+  return drawnOf({"near:one_coil_slipped_within_the_sensor", "one coil of the sensor sits beside the others",
+                  "slipped_m", 1e-5, 0.3, json{{"coil", coil}, {"toward", listed(toward)}}},
                  apply);
 }
 
