@@ -70,8 +70,10 @@ class Selector {
       if (grown.ways.size() > 1) {
         exchange(grown);
         prune(grown);
-        // What is added on an estimate can be dropped again once it is fitted, and would be added again for ever.
-        if (!(priceOf(grown) < priceOf(selection))) break;
+        // What is added on an estimate can be dropped again once it is fitted, and would be added again for ever, for
+        // less and less: where there are no more effects than before, it is an exchange, and must gain as much.
+        const double least = grown.ways.size() > selection.ways.size() ? 0.0 : thresholds_.least_gain_exchange;
+        if (!(priceOf(grown) < priceOf(selection) - least)) break;
       }
       selection = std::move(grown);
       if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
