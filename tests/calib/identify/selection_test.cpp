@@ -3,6 +3,7 @@
 #include <QTest>
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/matchers.h"
@@ -69,6 +70,27 @@ class SelectionTest : public QObject {
     for (const TriedEffect& more : search.rank(seen.model, {}))
       QVERIFY(more.bic_gain < search.thresholds().least_gain_more || !more.fitted.is_plausible ||
               more.held_out_gain <= 0.0);
+  }
+
+  /// Bodies that imitate a jig that leans can be added, fitted and dropped again for less and less gain. Two sets are
+  /// grown to four effects at most, and each addition ranks the catalogue once and once more for each effect that is
+  /// there: so often at most it may be ranked.
+  void growingEnds() {
+    simulation::Scene scene = gapScene();
+    scene.effects.push_back({"jig_tilt", nlohmann::json::parse(R"({"shear_rad": [0.05, 0.05, 0.0]})")});
+    const CalibrationTable table = recordedIn(scene, gapPlan({.counts = {6, 6, 3}}, 4), 11);
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const GapSearch search(rows, {});
+    int n_loops = 0;
+    RunControl counting;
+    counting.parallel_for = [&](std::size_t count, const std::function<void(std::size_t)>& body) {
+      ++n_loops;
+      serialFor(count, body);
+    };
+    search.rank(search.none(), counting);
+    const int n_once = std::exchange(n_loops, 0);
+    QCOMPARE(namesOf(selectEffects(search, {}, counting)), QString("jig_tilt"));
+    QVERIFY2(n_loops <= 2 * 4 * 4 * n_once, qPrintable(QStringLiteral("%1 of %2").arg(n_loops).arg(n_once)));
   }
 
   /// One body with a polarizability of any kind takes more than any one of three errors of the instrument, and is still
