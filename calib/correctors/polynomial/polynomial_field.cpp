@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/core/json_reader.h"
+#include "calib/correctors/base/fit_checks.h"
 #include "calib/geometry/geometry.h"
 
 namespace fieldtrue::correctors {
