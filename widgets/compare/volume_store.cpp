@@ -1,5 +1,7 @@
 #include "widgets/compare/volume_store.h"
 
+#include "widgets/style/unit_texts.h"
+
 namespace fieldtrue::widgets {
 
 VolumeStore::VolumeStore(FittedMethods& fitted, QObject* parent) : QObject(parent), fitted_(fitted) {
