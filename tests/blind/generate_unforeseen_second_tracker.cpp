@@ -27,7 +27,8 @@ struct CoarseMap {
       const Eigen::Array3i up(corner & 1, (corner >> 1) & 1, corner >> 2);
       const Eigen::Array3d weights = (up == 1).select(share, 1 - share);
       const Eigen::Array3i to = cell + up;
-      sum += weights.prod() * values[static_cast<std::size_t>((to.x() * kSide + to.y()) * kSide + to.z())];
+      const int entry = (to.x() * kSide + to.y()) * kSide + to.z();
+      sum += weights.prod() * values[static_cast<std::size_t>(entry)];
     }
     return sum;
   }
