@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -297,13 +298,25 @@ nlohmann::json setupDifferencesToJson(const Setup& first, const Setup& second) {
 
 }  // namespace
 
+Result<std::vector<int>> sensorsToChooseFrom(const Corrector& first, const Corrector& second) {
+  if (first.sensorsApart().empty() && second.sensorsApart().empty()) return std::vector<int>();
+  const std::vector<int> of_first = sensorsOf(first.table()), of_second = sensorsOf(second.table());
+  std::vector<int> of_both;
+  std::set_intersection(of_first.begin(), of_first.end(), of_second.begin(), of_second.end(),
+                        std::back_inserter(of_both));
+  if (of_both.empty())
+    return fail(ErrorCode::kUnsupported, "The two calibrations have no sensor in common: one was fitted on " +
+                                             sensorsText(of_first) + ", the other on " + sensorsText(of_second));
+  return of_both;
+}
+
 Result<CalibrationDifference> compareCalibrations(const Corrector& first, const Corrector& second,
                                                   const RunControl& control) {
   for (const Corrector* one : {&first, &second})
     if (!one->sensorsApart().empty())
       return fail(ErrorCode::kUnsupported, "A calibration holds a correction for each of " +
                                                sensorsText(one->sensorsApart()) +
-                                               ": compare one sensor at a time, with difference --sensor N");
+                                               ": compare one sensor at a time, with --sensor N");
   const std::vector<Eigen::Vector3d> points_m = commonPoints(first, second);
   if (points_m.empty())
     return fail(ErrorCode::kUnsupported,

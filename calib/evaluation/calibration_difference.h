@@ -63,11 +63,15 @@ struct CalibrationDifference {
   std::string text;                 ///< The verdict in a sentence or two.
 };
 
+/// Where one of two calibrations holds a correction for each sensor: the sensors that both were fitted on. Else none.
+/// @error kUnsupported when there should be one and is none
+Result<std::vector<int>> sensorsToChooseFrom(const calibration::Corrector& first, const calibration::Corrector& second);
+
 /// Compares two calibrations, the earlier one first. "Changed" if the first is worse at the second's places than the
 /// second's own fits that did not see them (paired 90 % interval above zero), and worse than it was at places of its
 /// own (intervals apart); or if so many of its largest errors are at the second's places that chance is below 1 %.
 /// Where neither holds, but intervals are apart or single places are far off, nobody can tell; otherwise none is shown.
-/// @error kUnsupported when they cover nothing in common; kCancelled
+/// @error kUnsupported when they cover nothing in common, or one holds a correction for each sensor; kCancelled
 Result<CalibrationDifference> compareCalibrations(const calibration::Corrector& first,
                                                   const calibration::Corrector& second, const RunControl& control = {});
 

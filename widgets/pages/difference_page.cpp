@@ -1,5 +1,6 @@
 #include "widgets/pages/difference_page.h"
 
+#include <QComboBox>
 #include <QFileDialog>
 #include <QGridLayout>
 #include <QHBoxLayout>
@@ -8,9 +9,11 @@
 #include <QProgressBar>
 #include <QPushButton>
 #include <QScrollArea>
+#include <QSignalBlocker>
 #include <QSplitter>
 #include <QStyle>
 #include <QVBoxLayout>
+#include <algorithm>
 #include <utility>
 
 #include "widgets/figures/difference_field.h"
@@ -87,15 +90,26 @@ QWidget* DifferencePage::makeHeader() {
   grid->setContentsMargins(0, 4, 0, 0);
   first_ = addFileRow(grid, tr("Earlier"), "differenceFirst");
   second_ = addFileRow(grid, tr("Later"), "differenceSecond");
+  sensor_label_ = new QLabel(tr("Sensor"), files);
+  sensor_ = new QComboBox(files);
+  sensor_->setObjectName(QStringLiteral("differenceSensor"));
+  sensor_->setAccessibleName(tr("Sensor"));
+  showSensors({}, 0);
+  grid->addWidget(sensor_label_, 2, 0);
+  grid->addWidget(sensor_, 2, 1);
   run_ = new QPushButton(files);
   run_->setObjectName(QStringLiteral("differenceRun"));
   progress_ = new QProgressBar(files);
   progress_->setRange(0, kProgressSteps);
   progress_->setAccessibleName(tr("Comparison of calibrations"));
-  grid->addWidget(run_, 2, 2);
-  grid->addWidget(progress_, 2, 1);
+  grid->addWidget(run_, 3, 2);
+  grid->addWidget(progress_, 3, 1);
   layout->addWidget(files, 0, Qt::AlignTop);
   connect(run_, &QPushButton::clicked, this, &DifferencePage::runOrStop);
+  connect(sensor_, &QComboBox::activated, this, [this] {
+    jobs_.stop();
+    run();
+  });
   return header;
 }
 
@@ -143,30 +157,58 @@ void DifferencePage::runOrStop() {
   showButtons();
 }
 
+Result<DifferencePage::Compared> DifferencePage::compare(const calibration::Corrector& first,
+                                                         const calibration::Corrector& second, int wanted,
+                                                         const RunControl& control) {
+  Compared compared;
+  FT_TRY(compared.sensors, evaluation::sensorsToChooseFrom(first, second));
+  if (compared.sensors.empty()) {
+    FT_TRY(compared.difference, evaluation::compareCalibrations(first, second, control));
+    return compared;
+  }
+  const bool is_there = std::find(compared.sensors.begin(), compared.sensors.end(), wanted) != compared.sensors.end();
+  compared.sensor = is_there ? wanted : compared.sensors.front();
+  FT_TRY(const calibration::Corrector of_first, first.ofSensor(compared.sensor));
+  FT_TRY(const calibration::Corrector of_second, second.ofSensor(compared.sensor));
+  FT_TRY(compared.difference, evaluation::compareCalibrations(of_first, of_second, control));
+  return compared;
+}
+
 void DifferencePage::run() {
   progress_->setValue(0);
   using calibration::Corrector;
   const auto session = workbench_.corrector();
   jobs_.run(
-      [first_path = first_->text(), second_path = second_->text(),
-       session](const RunControl& control) -> Result<CalibrationDifference> {
+      [first_path = first_->text(), second_path = second_->text(), session,
+       wanted = sensor_->currentData().toInt()](const RunControl& control) -> Result<Compared> {
         FT_TRY(const Corrector first, Corrector::load(first_path.toStdString()));
-        if (second_path.isEmpty() && session) return evaluation::compareCalibrations(first, *session, control);
+        if (second_path.isEmpty() && session) return compare(first, *session, wanted, control);
         FT_TRY(const Corrector second, Corrector::load(second_path.toStdString()));
-        return evaluation::compareCalibrations(first, second, control);
+        return compare(first, second, wanted, control);
       },
-      [this](Result<CalibrationDifference> result) { onResult(std::move(result)); },
+      [this](Result<Compared> result) { onResult(std::move(result)); },
       [this](double fraction) { progress_->setValue(static_cast<int>(fraction * kProgressSteps)); });
   showButtons();
 }
 
-void DifferencePage::onResult(Result<CalibrationDifference> result) {
+void DifferencePage::onResult(Result<Compared> result) {
   difference_.reset();
-  if (result)
-    difference_ = *std::move(result);
-  else
+  if (result) {
+    showSensors(result->sensors, result->sensor);
+    difference_ = std::move(result->difference);
+  } else {
     workbench_.showMessage({QString::fromStdString(result.error().message), Severity::kDanger, {}, {}});
+  }
   showDifference();
+}
+
+void DifferencePage::showSensors(const std::vector<int>& sensors, int sensor) {
+  const QSignalBlocker quiet(sensor_);
+  sensor_->clear();
+  for (const int one : sensors) sensor_->addItem(tr("Sensor %1").arg(one), one);
+  sensor_->setCurrentIndex(sensor_->findData(sensor));
+  sensor_label_->setVisible(!sensors.empty());
+  sensor_->setVisible(!sensors.empty());
 }
 
 void DifferencePage::onSessionCalibration() {
@@ -174,6 +216,7 @@ void DifferencePage::onSessionCalibration() {
   if (second_->text().isEmpty()) {
     jobs_.stop();
     difference_.reset();
+    showSensors({}, 0);
   }
   showDifference();
 }

@@ -8,6 +8,7 @@
 #include "widgets/workbench/background.h"
 #include "widgets/workbench/workbench.h"
 
+class QComboBox;
 class QGridLayout;
 class QLabel;
 class QLineEdit;
@@ -31,7 +32,16 @@ class DifferencePage : public QWidget {
   void choose(QLineEdit* path);
   void runOrStop();
   void run();
-  void onResult(Result<evaluation::CalibrationDifference> result);
+  struct Compared {
+    std::vector<int> sensors;  ///< To choose from; empty where one correction is for all.
+    int sensor = 0;            ///< Of these.
+    evaluation::CalibrationDifference difference;
+  };
+  /// @param wanted the sensor, where a calibration holds a correction for each; the first of both if it is none of them
+  static Result<Compared> compare(const calibration::Corrector& first, const calibration::Corrector& second, int wanted,
+                                  const RunControl& control);
+  void onResult(Result<Compared> result);
+  void showSensors(const std::vector<int>& sensors, int sensor);
   void onSessionCalibration();
   void showButtons();
   void showDifference();
@@ -43,6 +53,8 @@ class DifferencePage : public QWidget {
   QLabel* sentence_ = nullptr;
   QLineEdit* first_ = nullptr;
   QLineEdit* second_ = nullptr;  ///< Empty: the session's calibration.
+  QLabel* sensor_label_ = nullptr;
+  QComboBox* sensor_ = nullptr;  ///< To be seen only where a calibration holds a correction for each.
   QPushButton* run_ = nullptr;
   QProgressBar* progress_ = nullptr;
   FieldView* field_ = nullptr;

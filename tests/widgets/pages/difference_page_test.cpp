@@ -40,6 +40,16 @@ CalibrationTable recorded(std::uint64_t seed, double bump_m) {
   return table;
 }
 
+/// Sensors 0 and 3 at the same places; only the second meets the metal.
+CalibrationTable ofTwoSensors(std::uint64_t seed, double bump_m) {
+  CalibrationTable table = recorded(seed, 0.0);
+  for (Node node : recorded(seed + 1, bump_m).nodes) {
+    node.sensor = 3;
+    table.nodes.push_back(node);
+  }
+  return table;
+}
+
 }  // namespace
 
 class DifferencePageTest : public WindowDriver {
@@ -106,6 +116,35 @@ class DifferencePageTest : public WindowDriver {
                               kWaitMs);
   }
 
+  void whereEachSensorHasACorrectionOneIsChosen() {
+    write("both_before.ftcal.json", ofTwoSensors(3, 0.0), "2026-03-02", true);
+    write("both_after.ftcal.json", ofTwoSensors(5, 0.03), "2026-09-14", true);
+    auto* sensor = find<QComboBox>("differenceSensor");
+    QVERIFY(!sensor->isVisible());
+    compare("both_before.ftcal.json", "both_after.ftcal.json");
+    QTRY_COMPARE_WITH_TIMEOUT(find<QLabel>("differenceHeadline")->text(), QStringLiteral("No change is shown"),
+                              kWaitMs);
+    QTRY_VERIFY_WITH_TIMEOUT(sensor->isVisible(), kWaitMs);
+    QCOMPARE(sensor->currentText(), QStringLiteral("Sensor 0"));
+    sensor->setFocus();
+    QTest::keyClick(sensor, Qt::Key_Down);
+    QTRY_COMPARE_WITH_TIMEOUT(find<QLabel>("differenceHeadline")->text(), QStringLiteral("The field changed"), kWaitMs);
+    QCOMPARE(sensor->currentText(), QStringLiteral("Sensor 3"));
+    picture("7-changes-of-a-sensor");
+  }
+
+  void aFileOfOneSensorChoosesIt() {
+    CalibrationTable three = ofTwoSensors(6, 0.0);
+    std::erase_if(three.nodes, [](const Node& node) { return node.sensor != 3; });
+    write("three.ftcal.json", three, "2026-09-14");
+    compare("both_before.ftcal.json", "three.ftcal.json");
+    auto* sensor = find<QComboBox>("differenceSensor");
+    QTRY_COMPARE_WITH_TIMEOUT(sensor->count(), 1, kWaitMs);
+    QCOMPARE(sensor->currentText(), QStringLiteral("Sensor 3"));
+    compare("before.ftcal.json", "after.ftcal.json");
+    QTRY_VERIFY_WITH_TIMEOUT(!sensor->isVisible(), kWaitMs);
+  }
+
   void whatIsNoCalibrationIsSaid() {
     QFile file(folder_.filePath("wrong.ftcal.json"));
     QVERIFY(file.open(QIODevice::WriteOnly) && file.write("{}") == 2);
@@ -121,11 +160,12 @@ class DifferencePageTest : public WindowDriver {
   }
 
  private:
-  void write(const char* name, CalibrationTable table, const std::string& date) {
+  void write(const char* name, CalibrationTable table, const std::string& date, bool is_separate = false) {
     table.metadata.date = date;
-    const auto corrector = calibration::Corrector::fit(table.nodes, table.metadata,
-                                                       calibration::parseCorrectorChoice("rbf", "none").value(),
-                                                       calibration::AlignMode::kNone);
+    calibration::CorrectorChoice choice = calibration::parseCorrectorChoice("rbf", "none").value();
+    choice.separate_position = is_separate;
+    const auto corrector =
+        calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kNone);
     FT_VERIFY_OK(corrector);
     FT_VERIFY_OK(corrector->save(folder_.filePath(name).toStdString()));
   }
