@@ -5,6 +5,7 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/coincident_places.h"
+#include "calib/calibration/mirrored_sensors.h"
 #include "calib/calibration/placed_sensors.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/baked/baked_position.h"
@@ -66,6 +67,12 @@ std::string orientationNote(std::span<const Node> nodes) {
   if (n_without == 0 || static_cast<std::size_t>(n_without) == nodes.size()) return {};
   return std::to_string(n_without) + " of " + std::to_string(nodes.size()) +
          " rows have no orientation, so that no orientation is used: complete these rows, or leave them out.";
+}
+
+/// That axes are wrong, which the correction would hide; empty where they are not.
+std::string mirroredNote(std::span<const Node> nodes) {
+  const std::string text = mirroredText(nodes);
+  return text.empty() ? text : "Put right before anything is corrected: " + text + ".";
 }
 
 /// A note with whose it is; empty where there is none.
@@ -145,7 +152,8 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
     parts.alignment = alignment;
   }
   std::vector<Node> rows(nodes.begin(), nodes.end());
-  std::vector<std::string> notes{joinCoincidentPlaces(rows), placed.note(), orientationNote(nodes)};
+  std::vector<std::string> notes{mirroredNote(nodes), joinCoincidentPlaces(rows), placed.note(),
+                                 orientationNote(nodes)};
   const PartsFit fit{*position_method, *orientation_method, metadata, choice, control, parts.alignment, notes};
   const std::vector<int> sensors = sensorsOf(rows);
   const Wanted apart{choice.separate_position && sensors.size() > 1, choice.separate_orientation && sensors.size() > 1};

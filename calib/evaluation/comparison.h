@@ -122,6 +122,7 @@ struct Verdict {
   bool apply_position = false;
   bool apply_orientation = false;
   bool is_inside_out = false;  ///< Much of the volume is: axes or places of the readings are wrong. Nothing applies.
+  std::string mirrored;        ///< Where some sensors' readings are mirror images of their places, who and why.
   double gain_low90 = 0;       ///< Of the best position method: 1 - RMS after / RMS before, over the same places.
   double gain_high90 = 0;
   double gain_without_worst_place = 0;

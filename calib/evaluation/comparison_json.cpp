@@ -87,6 +87,7 @@ json verdictToJson(const Verdict& verdict) {
   return {{"apply_position", verdict.apply_position},
           {"apply_orientation", verdict.apply_orientation},
           {"inside_out", verdict.is_inside_out},
+          {"mirrored", nullUnless(!verdict.mirrored.empty(), verdict.mirrored)},
           {"gain_low90", verdict.gain_low90},
           {"gain_high90", verdict.gain_high90},
           {"gain_without_worst_place", verdict.gain_without_worst_place},

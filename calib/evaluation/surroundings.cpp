@@ -70,7 +70,7 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   auto fold_back = foldBack(comparison, job, quiet);
   if (!fold_back) return tl::unexpected(fold_back.error());
   comparison.fold_back = *std::move(fold_back);
-  refuseInsideOut(comparison);
+  refuseInsideOut(comparison, job.nodes);
   judgePlaces(comparison);
   if (auto going = unlessStopped(control, 0.4); !going) return going;
   if (job.has_orientation) {

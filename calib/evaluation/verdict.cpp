@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/mirrored_sensors.h"
 #include "calib/correctors/method_label.h"
 #include "calib/evaluation/base/figures.h"
 #include "calib/evaluation/base/intervals.h"
@@ -87,7 +88,9 @@ FoldCount countFolds(const FoldBack& fold_back, bool of_grid) {
 }
 
 /// What a map that turns much of the volume inside out means. A distorted field folds back near metal at most.
-std::string insideOutText(const FoldBack& fold_back) {
+std::string insideOutText(const Comparison& comparison) {
+  if (!comparison.verdict.mirrored.empty()) return comparison.verdict.mirrored;
+  const FoldBack& fold_back = *comparison.fold_back;
   const bool of_grid = countFolds(fold_back, true).isTooMany();
   const FoldCount count = countFolds(fold_back, of_grid);
   return "the readings are turned inside out in " + std::to_string(count.n_folded) + " of " +
@@ -111,8 +114,8 @@ std::string positionText(const Comparison& comparison, const std::string& do_not
   const bool is_apart = isApart(comparison.split) && !comparison.verdict.is_inside_out;
   const std::string before = errorText(is_apart ? comparison.split->before : comparison.before_position_mm.rms) + " mm";
   if (!comparison.best_position_row)
-    return do_not_apply + (comparison.verdict.is_inside_out ? insideOutText(*comparison.fold_back) + "; " : "") +
-           "no method" + unrankedText(comparison) + " does better than " +
+    return do_not_apply + (comparison.verdict.is_inside_out ? insideOutText(comparison) + "; " : "") + "no method" +
+           unrankedText(comparison) + " does better than " +
            (comparison.align == calibration::AlignMode::kRigid ? "the rigid alignment alone" : "the tracker as it is") +
            " (" + before + ") " + placesText(comparison);
   const MethodScore& best = comparison.position[*comparison.best_position_row];
@@ -120,7 +123,7 @@ std::string positionText(const Comparison& comparison, const std::string& do_not
   const std::string after = errorText(is_apart ? comparison.split->separate : best.stats.rms) + " mm";
   if (comparison.verdict.is_inside_out)
     return do_not_apply + name + " would take the error from " + before + " to " + after + " (" +
-           placesText(comparison) + "), but " + insideOutText(*comparison.fold_back);
+           placesText(comparison) + "), but " + insideOutText(comparison);
   if (test.apply)
     return "Apply " + name + ": error before " + before + ", after " + after + " (" + placesText(comparison) +
            "), gain " + percentText(test.gain) + " % (" + intervalText(test) + ")";
@@ -232,10 +235,13 @@ void pickBest(Comparison& comparison) {
                                " mm: what the table states is too large or in another unit than metres.");
 }
 
-void refuseInsideOut(Comparison& comparison) {
-  const auto& fold_back = comparison.fold_back;
-  if (!fold_back || !(countFolds(*fold_back, true).isTooMany() || countFolds(*fold_back, false).isTooMany())) return;
+void refuseInsideOut(Comparison& comparison, std::span<const Node> nodes) {
   Verdict& verdict = comparison.verdict;
+  verdict.mirrored = calibration::mirroredText(nodes);
+  const auto& fold_back = comparison.fold_back;
+  const bool folds =
+      fold_back && (countFolds(*fold_back, true).isTooMany() || countFolds(*fold_back, false).isTooMany());
+  if (!folds && verdict.mirrored.empty()) return;
   verdict.is_inside_out = true;
   verdict.apply_position = verdict.position.apply = false;
   verdict.apply_orientation = verdict.orientation.apply = false;

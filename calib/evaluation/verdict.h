@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "calib/evaluation/comparison.h"
 
 namespace fieldtrue::evaluation {
@@ -25,9 +27,10 @@ void judgePosition(Verdict& verdict, const GainTest& test);
 void pickBest(Comparison& comparison);
 
 /// Nothing is applied where more than a quarter of the grid's cells fold back, or the correction does at more than a
-/// quarter of the points between the places: the axes or the places of the readings are wrong then, and a correction
-/// that hides it must not be believed.
-void refuseInsideOut(Comparison& comparison);
+/// quarter of the points between the places, or where a sensor's readings are a mirror image of its places: the axes or
+/// the places of the readings are wrong then, and a correction that hides it must not be believed.
+/// @param nodes rows that count
+void refuseInsideOut(Comparison& comparison, std::span<const Node> nodes);
 
 /// Puts the verdict into one sentence.
 void writeVerdictText(Comparison& comparison);

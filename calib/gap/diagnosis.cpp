@@ -152,8 +152,10 @@ void describeAlignment(const identify::GapAlignment& alignment, const identify::
 
 /// Everything that follows from what was judged.
 /// @param known_gap whether there is a gap, where that is known already
+/// @param belongs_together whether the rows are of one set-up; else nothing is told of what they leave, it means
+/// nothing
 void describeJudgement(const identify::GapSearch& search, const Judgement& judgement, std::optional<bool> known_gap,
-                       GapReport& report) {
+                       bool belongs_together, GapReport& report) {
   const identify::GapRows& rows = search.physics().rows();
   const bool has_gap = decide(search, judgement, known_gap, report);
   describeAlignment(judgement.selection.model.model.alignment, rows, report);
@@ -163,8 +165,8 @@ void describeJudgement(const identify::GapSearch& search, const Judgement& judge
   report.rival = rivalOf(judgement);
   if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
     report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
-  addFindings(search, rows, judgement, has_gap, report);
-  if (has_gap && rows.has_dipoles) report.source_shape = sourceShapeOf(search, judgement.selection);
+  if (belongs_together) addFindings(search, rows, judgement, has_gap, report);
+  if (belongs_together && has_gap && rows.has_dipoles) report.source_shape = sourceShapeOf(search, judgement.selection);
   if (report.source_shape && report.source_shape->shape != Shape::kUnclear)
     report.findings.push_back({"", sourceShapeText(*report.source_shape), {}});
   addSequence(judgement.far, report);
@@ -213,7 +215,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   if (control.stop.stop_requested()) return stopped();
   control.progress(0.9 * part);
 
-  describeJudgement(search, judgement, known_gap, report);
+  describeJudgement(search, judgement, known_gap, belongs_together, report);
   report.smallest_detectable = smallestDetectable(search);
   report.isolability = isolabilityOf(search, kStartsForIsolability, Imitators::kOfCoarseGrid, control);
   if (control.stop.stop_requested()) return stopped();

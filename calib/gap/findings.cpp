@@ -7,6 +7,7 @@
 #include "calib/gap/verdict.h"
 #include "calib/identify/search.h"
 #include "calib/identify/traces.h"
+#include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::gap {
 namespace {
@@ -104,10 +105,12 @@ void addBoundOfFloor(const identify::GapSearch& search, const identify::GapRows&
        "leave the columns of the orientation out.");
 }
 
-void addMirrored(GapReport& report) {
+void addMirrored(const std::vector<int>& mirrored, std::size_t n_sensors, GapReport& report) {
   report.findings.push_back({"",
-                             "True and tracked positions are mirror images: an axis has the wrong sign, or two are "
-                             "exchanged. Put that right first; causes are not looked for.",
+                             "True and tracked positions " +
+                                 (n_sensors > 1 ? "of " + sensorsText(mirrored) + " " : std::string()) +
+                                 "are mirror images: an axis has the wrong sign, or two are exchanged. Put that right "
+                                 "first; causes are not looked for.",
                              {}});
 }
 
@@ -127,13 +130,14 @@ void addAstray(double share, GapReport& report) {
 bool addInputFindings(const TableMetadata& metadata, const identify::GapSearch& search, GapReport& report) {
   addAssumption(metadata, report);
   const double astray = search.shareAstray();
-  const bool is_mirrored = identify::isMirrored(search.physics().rows(), search.thresholds());
-  if (is_mirrored) {
-    addMirrored(report);
+  const identify::GapRows& rows = search.physics().rows();
+  const std::vector<int> mirrored = identify::mirroredSensors(rows, search.thresholds());
+  if (!mirrored.empty()) {
+    addMirrored(mirrored, rows.sensors.size(), report);
   } else if (astray > search.thresholds().astray) {
     addAstray(astray, report);
   }
-  return !is_mirrored && astray <= search.thresholds().astray;
+  return mirrored.empty() && astray <= search.thresholds().astray;
 }
 
 void addFindings(const identify::GapSearch& search, const identify::GapRows& stated, const Judgement& judgement,

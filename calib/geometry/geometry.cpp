@@ -107,6 +107,26 @@ Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const E
   return to_from_from;
 }
 
+bool isMirrorImage(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m, double share) {
+  FT_CHECK(from_m.size() == to_m.size());
+  constexpr double kFlat = 1e-9;
+  if (from_m.empty()) return false;
+  const Eigen::Vector3d from_center_m = mean(from_m);
+  const Eigen::Vector3d to_center_m = mean(to_m);
+  Eigen::Matrix3d cross_m2 = Eigen::Matrix3d::Zero();
+  double squares_m2 = 0.0;
+  for (std::size_t i = 0; i < from_m.size(); ++i) {
+    const Eigen::Vector3d from = from_m[i] - from_center_m, to = to_m[i] - to_center_m;
+    cross_m2 += from * to.transpose();
+    squares_m2 += from.squaredNorm() + to.squaredNorm();
+  }
+  const Eigen::Vector3d singular_m2 = Eigen::JacobiSVD<Eigen::Matrix3d>(cross_m2).singularValues();
+  if (cross_m2.determinant() >= 0.0 || singular_m2[2] < kFlat * singular_m2[0]) return false;
+  const double mirrored_m2 = squares_m2 - 2.0 * singular_m2.sum();
+  const double turned_m2 = mirrored_m2 + 4.0 * singular_m2[2];
+  return mirrored_m2 < share * share * turned_m2;
+}
+
 PointSpread pointSpread(std::span<const Eigen::Vector3d> points_m, double flat_ratio) {
   PointSpread spread;
   if (points_m.empty()) return spread;

@@ -16,6 +16,15 @@ class JsonReader;
 /// @error kTooFewNodes below 3 points; kDegenerate when the points lie on one line
 Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m);
 
+/// RMS misfit of the mirror image over that of any turn, below which an axis has the wrong sign or two are exchanged.
+inline constexpr double kMirrorShare = 0.3;
+
+/// Whether points fit a mirror image of others far better than any turn of them; never where they lie in one plane.
+/// @param to_m as many as from_m
+/// @source Umeyama 1991, IEEE PAMI 13 376, the sign of the determinant
+bool isMirrorImage(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m,
+                   double share = kMirrorShare);
+
 /// How points spread in space: their centre, principal axes (columns, longest first) and SD along each.
 struct PointSpread {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();

@@ -1,6 +1,5 @@
 #include "calib/identify/rows.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -99,27 +98,18 @@ Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad) 
   return noise;
 }
 
-bool isMirrored(const GapRows& table, const Thresholds& thresholds) {
-  Eigen::Vector3d middle_true_m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d middle_tracked_m = Eigen::Vector3d::Zero();
-  const auto n = static_cast<double>(table.rows.size());
-  for (const GapRow& row : table.rows) {
-    middle_true_m += row.reference_from_sensor.position_m / n;
-    middle_tracked_m += row.tracker_from_sensor.position_m / n;
+std::vector<int> mirroredSensors(const GapRows& table, const Thresholds& thresholds) {
+  std::vector<int> mirrored;
+  for (std::size_t sensor = 0; sensor < table.sensors.size(); ++sensor) {
+    std::vector<Eigen::Vector3d> p_true_m, p_tracked_m;
+    for (const GapRow& row : table.rows) {
+      if (row.sensor != sensor) continue;
+      p_true_m.push_back(row.reference_from_sensor.position_m);
+      p_tracked_m.push_back(row.tracker_from_sensor.position_m);
+    }
+    if (isMirrorImage(p_true_m, p_tracked_m, thresholds.mirrored)) mirrored.push_back(table.sensors[sensor]);
   }
-  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
-  double squares = 0.0;
-  for (const GapRow& row : table.rows) {
-    const Eigen::Vector3d a = row.reference_from_sensor.position_m - middle_true_m;
-    const Eigen::Vector3d b = row.tracker_from_sensor.position_m - middle_tracked_m;
-    cross += a * b.transpose();
-    squares += a.squaredNorm() + b.squaredNorm();
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross);
-  if (cross.determinant() >= 0.0) return false;
-  const double mirrored = squares - 2.0 * svd.singularValues().sum();
-  const double turned = mirrored + 4.0 * svd.singularValues()[2];
-  return mirrored < thresholds.mirrored * thresholds.mirrored * turned;
+  return mirrored;
 }
 
 namespace {

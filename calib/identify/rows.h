@@ -63,9 +63,8 @@ Result<GapRows> makeGapRows(std::span<const Node> nodes, const TableMetadata& me
 /// Noise covariance of one row: samples, placing and quantum; position [m^2] before rotation [rad^2].
 Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad);
 
-/// Whether tracked positions fit a mirror image of the true ones far better than any turn of them.
-/// @source Umeyama 1991, IEEE PAMI 13 376, the sign of the determinant
-bool isMirrored(const GapRows& rows, const Thresholds& thresholds = {});
+/// The sensors whose tracked positions fit a mirror image of the true ones far better than any turn of them.
+std::vector<int> mirroredSensors(const GapRows& rows, const Thresholds& thresholds = {});
 
 /// Eight blocks of places by the octant of their true position about the median, those of fewer than `fewest` places
 /// joined with the smallest other; for each row its block.

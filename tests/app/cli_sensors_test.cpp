@@ -128,6 +128,27 @@ class CliSensorsTest : public QObject {
     QCOMPARE(readWhole(at("applied_float.csv")).replace("\n4.0,", "\n4,"), readWhole(at("applied_whole.csv")));
   }
 
+  /// Corrected by itself such a sensor looks splendid, held out too.
+  void aSensorWithExchangedAxesIsNotCorrectedInSilence() {
+    auto exchanged = readNodeTable(at("two.nodes.csv").toStdString());
+    FT_VERIFY_OK(exchanged);
+    for (Node& node : exchanged->table.nodes) {
+      Eigen::Vector3d& p_m = node.tracker_from_sensor.position_m;
+      if (node.sensor == 4) std::swap(p_m.y(), p_m.z());
+    }
+    FT_VERIFY_OK(writeNodeTable(std::filesystem::path(at("exchanged.nodes.csv").toStdString()), exchanged->table));
+    const CliRun fitted = runCli({"fit", "--nodes", at("exchanged.nodes.csv"), "--position", "polynomial:degree=2",
+                                  "--json", "--out", at("exchanged.ftcal.json")});
+    FT_VERIFY_STATUS(fitted, 0);
+    FT_VERIFY_MATCH(holdsAll(fitted.json().at("notes").dump(), {"readings of sensor 4 are a mirror image"}));
+    const CliRun compared = runCli({"compare", "--nodes", at("exchanged.nodes.csv"), "--methods", "affine", "--json"});
+    FT_VERIFY_STATUS(compared, 0);
+    const json verdict = compared.json().at("verdict");
+    QVERIFY(verdict.at("apply_position") == false && verdict.at("apply_orientation") == false);
+    FT_VERIFY_MATCH(holdsAll(verdict.at("text").dump(), {"Do not apply", "readings of sensor 4 are a mirror image"}));
+    FT_VERIFY_MATCH(holdsAll(verdict.at("mirrored").dump(), {"sensor 4"}));
+  }
+
   void changesAreToldOfOneSensor() {
     const CliRun unsaid = runCli({"difference", at("auto.ftcal.json"), at("separate.ftcal.json")});
     FT_VERIFY_STATUS(unsaid, 1);

@@ -185,12 +185,16 @@ class VerdictTest : public QObject {
     const Comparison comparison = compared(table, {{"none", {}}, {"affine", {}}});
     const Verdict& verdict = comparison.verdict;
     QVERIFY2(!verdict.apply_position && !verdict.apply_orientation && verdict.is_inside_out, verdict.text.c_str());
+    const QByteArray why = slip == 2 ? "the readings are turned inside out in " : "the readings are a mirror image";
     FT_VERIFY_MATCH(
-        holdsAll(verdict.text, {"Do not apply: Affine would take the error from ", "turned inside out in ",
-                                "axes are swapped or mirrored, readings stand at places that are not theirs"}));
+        holdsAll(verdict.text, {"Do not apply: Affine would take the error from ", "but " + why,
+                                slip == 2 ? "axes are swapped or mirrored, readings stand at places that are "
+                                            "not theirs"
+                                          : "an axis has the wrong sign, or two are exchanged"}));
     QVERIFY(toJson(comparison).at("verdict").at("inside_out") == true);
-    FT_VERIFY_MATCH(holdsAll(compared(table, {{"none", {}}}).verdict.text,
-                             {"Do not apply: the readings are turned inside out", "no method does better"}));
+    QVERIFY(toJson(comparison).at("verdict").at("mirrored").is_string() == (slip != 2));
+    FT_VERIFY_MATCH(
+        holdsAll(compared(table, {{"none", {}}}).verdict.text, {"Do not apply: " + why, "no method does better"}));
     // Held out, the correction of swapped axes looks splendid: nothing but the fold tells.
     QVERIFY(slip == 2 || verdict.position.gain > 0.9);
     QVERIFY(!verdict.position.apply);

@@ -175,7 +175,22 @@ class SensorsAndTrackersTest : public QObject {
     FT_VERIFY_OK(report);
     QVERIFY(isTold(*report, "mirror images"));
     QVERIFY2(report->selected.empty() && report->verdict == GapVerdict::kUnexplained, report->text.c_str());
+    QVERIFY(!isTold(*report, "looks as if") && !report->source_shape);
     QVERIFY(!isTold(*diagnose(recordedIn(gapScene(), gapPlan()), nullptr, nullptr), "mirror images"));
+  }
+
+  void oneSensorWithMirroredAxesIsNamed() {
+    CalibrationTable table = recordedIn(gapScene(), gapPlan());
+    std::vector<Node> second = table.nodes;
+    for (Node& node : second) {
+      node.sensor = 2;
+      std::swap(node.tracker_from_sensor.position_m.y(), node.tracker_from_sensor.position_m.z());
+    }
+    table.nodes.insert(table.nodes.end(), second.begin(), second.end());
+    const auto report = diagnose(table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY(isTold(*report, "positions of sensor 2 are mirror images"));
+    QVERIFY2(report->selected.empty() && report->verdict == GapVerdict::kUnexplained, report->text.c_str());
   }
 
   /// Rows in another order are readings of other places: no cause is looked for. Without a reading of its place the RMS
