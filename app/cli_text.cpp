@@ -168,7 +168,7 @@ std::string comparisonText(const evaluation::Comparison& comparison,
   appendNotes(notes, "", comparison.notes);
   for (const evaluation::MethodScore& score : comparison.position) appendNotes(notes, positionName(score), score.notes);
   for (const evaluation::MethodScore& score : comparison.orientation)
-    appendNotes(notes, orientationName(score), score.notes);
+    appendNotes(notes, "orientation by " + orientationName(score), score.notes);
   if (!notes.empty()) text += "\n" + notes;
   const std::string surroundings = surroundingsText(comparison);
   if (!surroundings.empty()) text += "\n" + surroundings;

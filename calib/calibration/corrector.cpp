@@ -109,7 +109,7 @@ struct PartsFit {
     }
     if (wanted.orientation) {
       FT_TRY(correction.orientation, orientation_method.fit(data, choice.orientation_settings, control));
-      notes.push_back(named(whose, correction.orientation->note()));
+      notes.push_back(named(whose, named("Orientation", correction.orientation->note())));
     }
     return {};
   }

@@ -103,7 +103,10 @@ struct SensorSplit {
   double shared = 0;    ///< mm, or degrees of an orientation.
   double separate = 0;  ///< The same unit.
   PairedDifference separate_less_shared;
-  bool is_better = false;     ///< Separate: the paired 90 % interval is below zero.
+  /// The same of errors as shares of what the shared correction leaves of each sensor, so that one that is noisy does
+  /// not hide what another gains; a number, not a unit.
+  PairedDifference separate_less_shared_in_shares;
+  bool is_better = false;     ///< Separate: one of both paired 90 % intervals is below zero.
   bool is_told = true;        ///< False where a sensor cannot be fitted by itself; then only the text is set.
   GainTest gain;              ///< Of the separate corrections, over no correction.
   double before = 0;          ///< RMS with no correction, at the same places.

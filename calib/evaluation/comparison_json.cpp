@@ -43,6 +43,9 @@ json splitToJson(const SensorSplit& split, const std::string& unit) {
           {"separate_less_shared_" + unit, figure(split.separate_less_shared.difference)},
           {"low90", figure(split.separate_less_shared.low90)},
           {"high90", figure(split.separate_less_shared.high90)},
+          {"separate_less_shared_in_shares", figure(split.separate_less_shared_in_shares.difference)},
+          {"low90_in_shares", figure(split.separate_less_shared_in_shares.low90)},
+          {"high90_in_shares", figure(split.separate_less_shared_in_shares.high90)},
           {"separate_is_better", split.is_better},
           {"text", split.text}};
 }

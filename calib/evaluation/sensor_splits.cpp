@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <utility>
 
 #include "calib/core/number_text.h"
@@ -20,6 +21,44 @@ namespace {
 std::string differenceText(double difference) {
   constexpr double kLeast = 5e-4;  // Millimetres or degrees.
   return std::abs(difference) < kLeast ? "0" : significantText(difference);
+}
+
+/// Errors of places, each sensor's as a share of what a correction leaves of it in all.
+/// @param shared what that correction leaves, of the same sensors
+std::vector<double> inShares(const std::vector<SensorScore>& sensors, const std::vector<SensorScore>& shared) {
+  struct Sum {
+    double squares = 0.0;
+    int n = 0;
+  };
+  std::map<int, Sum> by_place;
+  for (std::size_t k = 0; k < sensors.size(); ++k) {
+    for (std::size_t i = 0; i < sensors[k].places.size(); ++i) {
+      const double share = sensors[k].place_errors[i] / std::max(kTie, shared[k].stats.rms);
+      Sum& sum = by_place[sensors[k].places[i]];
+      sum.squares += share * share;
+      ++sum.n;
+    }
+  }
+  std::vector<double> errors;
+  for (const auto& [place, sum] : by_place) errors.push_back(std::sqrt(sum.squares / sum.n));
+  return errors;
+}
+
+/// "sensor 1 20.1 mm, sensor 2 3.4 mm"
+std::string bySensorText(const std::vector<SensorScore>& sensors, const char* unit) {
+  std::string text;
+  for (const SensorScore& one : sensors)
+    text.append(text.empty() ? "sensor " : ", sensor ")
+        .append(std::to_string(one.sensor) + " " + errorText(one.stats.rms) + " " + unit);
+  return text;
+}
+
+/// Of sensors of which one scatters far more than another.
+std::string unequalText(const std::string& what, const char* unit, const std::vector<SensorScore>& separate,
+                        const std::vector<SensorScore>& shared, const Validation& validation) {
+  return "Each sensor has a correction of " + what + " of its own, since one would spoil what they share: by itself " +
+         bySensorText(separate, unit) + ", with the correction that all share " + bySensorText(shared, unit) + " (" +
+         toText(validation) + ").";
 }
 
 std::string splitText(const SensorSplit& split, const std::string& what, const char* unit,
@@ -54,10 +93,18 @@ SensorSplit splitOf(const Comparison& together, const Comparison& apart, bool of
   split.separate = separate.stats.rms;
   split.separate_less_shared = pairedDifference(separate.place_errors, shared.place_errors);
   split.is_better = split.separate_less_shared.high90 < -kTie;
+  if (!shared.sensors.empty() && shared.sensors.size() == separate.sensors.size()) {
+    split.separate_less_shared_in_shares =
+        pairedDifference(inShares(separate.sensors, shared.sensors), inShares(shared.sensors, shared.sensors));
+    split.is_better = split.is_better || split.separate_less_shared_in_shares.high90 < -kTie;
+  }
   split.gain = testGain(apart.places, before, separate.place_errors, separate.is_tuned);
   split.before = rootMeanSquare(before);
   split.after = separate.place_errors;
-  split.text = splitText(split, what, of_position ? "mm" : "degrees", apart.validation);
+  const char* unit = of_position ? "mm" : "degrees";
+  const bool only_in_shares = split.is_better && split.separate_less_shared.high90 >= -kTie;
+  split.text = only_in_shares ? unequalText(what, unit, separate.sensors, shared.sensors, apart.validation)
+                              : splitText(split, what, unit, apart.validation);
   return split;
 }
 

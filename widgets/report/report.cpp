@@ -96,7 +96,7 @@ void writeNotes(HtmlWriter& html, const ReportInput& input) {
       notes.push_back(correctors::positionLabel(score.method, score.settings) + ": " + note);
   for (const evaluation::MethodScore& score : input.comparison.orientation)
     for (const std::string& note : score.notes)
-      notes.push_back(correctors::orientationLabel(score.method, score.settings) + ": " + note);
+      notes.push_back("Orientation by " + correctors::orientationLabel(score.method, score.settings) + ": " + note);
   if (notes.empty()) return;
   html.element("h2", "Remarks");
   html.open("ul");

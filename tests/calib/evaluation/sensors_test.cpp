@@ -29,7 +29,8 @@ struct TwoSensors {
   double gain_1 = 0.0;  ///< And the first.
   double turn_rad_m =
       0.0;  ///< What the second is turned by too far about y for each metre along x; the first the other way.
-  double noise_2_m = 0.0;    ///< Placing error of the second, SD an axis.
+  double noise_1_m = 0.0;    ///< Placing error of the first, SD an axis.
+  double noise_2_m = 0.0;    ///< And of the second.
   bool side_by_side = true;  ///< So far apart along y, else both at the same place.
   double apart_m = 0.1;
 };
@@ -62,6 +63,9 @@ CalibrationTable twoSensors(const TwoSensors& how) {
     one.reference_from_sensor.orientation = other.reference_from_sensor.orientation = turn;
     one.tracker_from_sensor = reading(options, one.reference_from_sensor, kMount1, how.gain_1, -how.turn_rad_m);
     other.tracker_from_sensor = reading(options, other.reference_from_sensor, kMount2, how.gain, how.turn_rad_m);
+    if (how.noise_1_m > 0.0)
+      for (double& coordinate : one.reference_from_sensor.position_m)
+        coordinate += how.noise_1_m / how.noise_2_m * placing_m(random);
     if (how.noise_2_m > 0.0)
       for (double& coordinate : other.reference_from_sensor.position_m) coordinate += placing_m(random);
   }
@@ -171,6 +175,17 @@ class SensorsTest : public QObject {
     FT_VERIFY_MATCH(holdsAll(comparison.split->text, {"err differently", "kfold:10"}));
   }
 
+  /// 20 mm an axis of the first drown what a gain of 2 % makes of the second, unless each is measured by its own.
+  void aNoisySensorHidesNoneOfTheOthers() {
+    const Comparison comparison = compared(
+        twoSensors({.smooth_m = 0.02, .gain = 0.02, .noise_1_m = 0.02, .noise_2_m = 0.001}), "polynomial:degree=3");
+    QVERIFY(comparison.split.has_value());
+    QVERIFY(comparison.split->separate_less_shared.high90 > 0.0);
+    QVERIFY2(isApart(comparison.split), comparison.split->text.c_str());
+    FT_VERIFY_MATCH(holdsAll(comparison.split->text,
+                             {"one would spoil what they share", "by itself sensor 1 ", "all share sensor 1 "}));
+  }
+
   void oppositeErrorsAreCorrectedApart() {
     // What is 3 % too far for one and 3 % too near for the other leaves nothing that both could share.
     const CalibrationTable table = twoSensors({.gain = 0.03, .gain_1 = -0.03, .noise_2_m = 0.001});
@@ -184,7 +199,7 @@ class SensorsTest : public QObject {
   }
 
   void orientationIsAskedByItself() {
-    const CalibrationTable table = twoSensors({.turn_rad_m = 0.1, .noise_2_m = 0.001});
+    const CalibrationTable table = twoSensors({.turn_rad_m = 0.1, .noise_1_m = 0.001, .noise_2_m = 0.001});
     const auto choice =
         calibration::parseCorrectorChoice("polynomial:degree=1", "polynomial_quaternion:degree=1").value();
     const auto fitted = fitByEvidence(table, choice, calibration::AlignMode::kRigid, {});
