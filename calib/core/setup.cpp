@@ -81,6 +81,9 @@ std::vector<SetupFact> differences(const Setup& one, const Setup& other) {
   return different;
 }
 
+/// Every tracker has a sensor of that number: alone it tells nothing.
+constexpr std::string_view kSensorNumber = "sensor";
+
 SetupMatch match(const Setup& calibrated, const Setup& readings) {
   bool any = false, all = true;
   for (const SetupFact& fact : kFacts) {
@@ -88,7 +91,7 @@ SetupMatch match(const Setup& calibrated, const Setup& readings) {
     if (!fact.identifies || !known) continue;
     const auto given = factOf(readings, fact.key);
     if (given && !isSame(*known, *given)) return SetupMatch::kNo;
-    any = any || given;
+    any = any || (given && fact.key != kSensorNumber);
     all = all && given;
   }
   return any && all ? SetupMatch::kYes : SetupMatch::kUnknown;

@@ -43,7 +43,8 @@ std::string_view nameOf(SetupMatch match);
 std::vector<SetupFact> differences(const Setup& one, const Setup& other);
 
 /// Whether readings are of the set-up that was calibrated: no where an identifying fact differs, yes where every one
-/// that the calibration states is stated of the readings, and at least one; otherwise nobody can tell.
+/// that the calibration states is stated of the readings, and at least one beside the sensor's number; otherwise nobody
+/// can tell.
 SetupMatch match(const Setup& calibrated, const Setup& readings);
 
 /// "room 'Lab 2' instead of 'Lab 1'; filter 'off' instead of 'on'"; empty where nothing differs.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calib/core/file_io.h"
 #include "calib/core/statistics.h"
@@ -98,6 +99,7 @@ RivalReport rivalOf(const Judgement& judgement) {
 
 /// Effects that single readings show stand beside those that the poses show.
 void selectSignalFindings(GapReport& report) {
+  constexpr double kNotTold = std::numeric_limits<double>::quiet_NaN();  // The means do not show it.
   for (const recording::GapFinding& finding : report.findings) {
     if (finding.effect.empty()) continue;
     const auto is_same = [&](const SelectedEffect& e) { return e.effect == finding.effect; };
@@ -106,6 +108,8 @@ void selectSignalFindings(GapReport& report) {
     effect.effect = finding.effect;
     effect.equivalents = {finding.effect};
     effect.probability = 1.0;
+    effect.shrinkage = {kNotTold, kNotTold, kNotTold, {}, {}};
+    effect.credit_fraction = effect.excess2_before_mm2 = effect.excess2_after_mm2 = kNotTold;
     report.selected.push_back(std::move(effect));
   }
 }

@@ -147,6 +147,10 @@ HowFar howFar(const UnseenScores& scores, const RowNoise& noise, const identify:
   return far;
 }
 
+double meanOverRegion(const identify::GapRows& rows, const std::vector<double>& values) {
+  return meanOver(rows, regionShares(rows), values);
+}
+
 Bounded pairedDifference(const std::vector<UnseenRow>& first, const std::vector<UnseenRow>& second,
                          const identify::GapRows& rows) {
   return meanOf(

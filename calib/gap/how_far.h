@@ -51,6 +51,9 @@ double signedRoot_mm(double square_m2);
 
 HowFar howFar(const UnseenScores& scores, const RowNoise& noise, const identify::GapRows& rows);
 
+/// Mean of rows' values over the region, each place by the share of it that it stands for.
+double meanOverRegion(const identify::GapRows& rows, const std::vector<double>& values);
+
 /// Mean over places of a paired difference, with its 90 % interval by Student's t.
 /// @param first, second one value a row
 Bounded pairedDifference(const std::vector<UnseenRow>& first, const std::vector<UnseenRow>& second,

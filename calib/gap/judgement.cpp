@@ -42,13 +42,13 @@ class Judge {
 
  private:
   void tellRest(const UnseenScores& scores, Judgement& judgement) const {
-    const auto n = static_cast<double>(rows_.rows.size());
-    double smooth_m2 = 0.0;
+    std::vector<double> smooth_m2, rest_m2;
     for (std::size_t i = 0; i < rows_.rows.size(); ++i) {
-      smooth_m2 += (scores.smooth[i].square_m2 - scores.step.front()[i].square_m2) / n;
-      judgement.rest_m2 += (scores.step.back()[i].square_m2 - scores.both[i].square_m2) / n;
+      smooth_m2.push_back(scores.smooth[i].square_m2 - scores.step.front()[i].square_m2);
+      rest_m2.push_back(scores.step.back()[i].square_m2 - scores.both[i].square_m2);
     }
-    judgement.smooth_left = 1.0 + smooth_m2 / judgement.far.excess_m2.front().value;
+    judgement.rest_m2 = meanOverRegion(rows_, rest_m2);
+    judgement.smooth_left = 1.0 + meanOverRegion(rows_, smooth_m2) / judgement.far.excess_m2.front().value;
   }
 
   UnseenScores scored(const identify::EffectSelection& selection, std::span<const int> blocks) const {

@@ -1,7 +1,6 @@
 #include "calib/gap/next_measurement.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -105,7 +104,7 @@ double separation(const identify::GapSearch& search, const Proposal& proposal, c
                   const identify::GapModel& b) {
   identify::GapRows rows = search.physics().rows();
   rows.rows = proposal.rows;
-  const identify::GapPhysics physics(rows, {});
+  const identify::GapPhysics physics = search.physics().at(rows);
   const std::vector<Pose> pa = physics.predictions(a);
   const std::vector<Pose> pb = physics.predictions(b);
   double sum = 0.0;
@@ -166,65 +165,66 @@ bool proposeSeparation(const identify::GapSearch& search, const identify::Effect
   return true;
 }
 
-/// What would be left of the gap were an effect taken away and the rig aligned anew: linear in what the effect does.
+/// What the tracker would read were one selected effect taken away, and what gap that is: simulated by what stays and
+/// aligned anew, as a recording made then will be.
 class Removal {
  public:
-  explicit Removal(const identify::GapSearch& search)
-      : search_(search),
-        at_(search.physics(), search.none().model, search.whitening(), search.spaceBlocks()),
-        solver_(at_.nuisance()) {}
+  Removal(const identify::GapSearch& search, const identify::RefinedModel& refined, std::size_t term)
+      : search_(search), refined_(refined), term_(term), rows_(search.physics().rows()) {
+    rest_ = identify::withoutTerm(refined.model, term);
+    const std::vector<Pose> read = search.physics().predictions(rest_);
+    for (std::size_t i = 0; i < read.size(); ++i) rows_.rows[i].tracker_from_sensor = read[i];
+    const identify::GapPhysics physics = search.physics().at(rows_);
+    identify::RefineOptions options;
+    options.law = search.law();
+    left_ = physics.residuals(
+        identify::refineJointly(physics, {refined.model.alignment, {}}, search.whitening(), options).model);
+  }
 
-  /// What a change of all poses takes from the gap at one row, alignment refitted [m].
-  Eigen::Vector3d takenAt(std::size_t row, std::span<const Pose> with, std::span<const Pose> without) const {
-    const int channels = at_.channels();
-    Eigen::VectorXd change = Eigen::VectorXd::Zero(at_.size());
-    Eigen::Index place = 0;
-    for (std::size_t k = 0; k < at_.order().size(); ++k) {
-      const std::size_t i = at_.order()[k];
-      const Eigen::Index begin = static_cast<Eigen::Index>(k) * channels;
-      if (i == row) place = begin;
-      change.segment<3>(begin) = search_.whitening().position[i] * (with[i].position_m - without[i].position_m);
-      if (channels == 6) {
-        change.segment<3>(begin + 3) = search_.whitening().rotation[i] *
-                                       rotationVector_rad(with[i].orientation * without[i].orientation.conjugate());
-      }
-    }
-    const Eigen::VectorXd left = change - at_.nuisance() * solver_.solve(change);
-    return search_.whitening().position[row].triangularView<Eigen::Lower>().solve(left.segment<3>(place));
+  /// RMS size of the gap to be read at a row [m], and its SD: by the noise of one row and by how well the effects that
+  /// stay are known.
+  struct Then {
+    double size_m = 0.0;
+    double sd_m = 0.0;
+  };
+  Then at(std::size_t row) const {
+    const identify::Matrix6d noise =
+        identify::noiseOf(search_.physics().rows().rows[row], search_.placingSd_m(), search_.placingSd_rad());
+    const double noise_m2 = noise.topLeftCorner<3, 3>().trace();
+    return {std::sqrt(left_[row].head<3>().squaredNorm() + noise_m2), std::sqrt(noise_m2 + varianceOfRest_m2(row))};
   }
 
  private:
-  const identify::GapSearch& search_;
-  identify::Linearized at_;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver_;
-};
-
-/// How what each parameter of one term does shows at a row, per unit of the parameter; 3 by parameter.
-Eigen::Matrix3Xd sensitivityAt(const identify::GapSearch& search, const Removal& removal,
-                               const identify::GapModel& model, std::size_t term, std::size_t row) {
-  const std::vector<Pose> as_it_is = search.physics().predictions(model);
-  const Eigen::Index linear = model.terms[term].linear.size();
-  Eigen::Matrix3Xd sensitivity(3, linear + model.terms[term].searched.size());
-  for (Eigen::Index p = 0; p < sensitivity.cols(); ++p) {
-    identify::GapModel moved = model;
-    double& value = p < linear ? moved.terms[term].linear[p] : moved.terms[term].searched[p - linear];
-    const double h = 1e-4 * std::max(1e-3, std::abs(value));
-    value += h;
-    sensitivity.col(p) = removal.takenAt(row, search.physics().predictions(moved), as_it_is) / h;
+  /// By the covariance of the parameters of each effect that stays, alignment as it is.
+  double varianceOfRest_m2(std::size_t row) const {
+    if (refined_.covariance.size() == 0) return 0.0;
+    const Eigen::Vector3d as_it_is_m = rows_.rows[row].tracker_from_sensor.position_m;
+    double variance_m2 = 0.0;
+    for (std::size_t t = 0; t < rest_.terms.size(); ++t) {
+      const Eigen::Index begin = identify::firstParameterOf(refined_, t < term_ ? t : t + 1);
+      const Eigen::Index n_linear = rest_.terms[t].linear.size();
+      Eigen::Matrix3Xd J(3, n_linear + rest_.terms[t].searched.size());
+      for (Eigen::Index p = 0; p < J.cols(); ++p) {
+        identify::GapModel moved = rest_;
+        double& value = p < n_linear ? moved.terms[t].linear[p] : moved.terms[t].searched[p - n_linear];
+        const double h = 1e-4 * std::max(1e-3, std::abs(value));
+        value += h;
+        J.col(p) = (search_.physics().predictions(moved)[row].position_m - as_it_is_m) / h;
+      }
+      const Eigen::MatrixXd covariance = refined_.covariance.block(begin, begin, J.cols(), J.cols());
+      const double own_m2 = (J * covariance * J.transpose()).trace();
+      if (std::isfinite(own_m2)) variance_m2 += std::max(0.0, own_m2);
+    }
+    return variance_m2;
   }
-  return sensitivity;
-}
 
-/// Variance of what an effect does at a row, by the covariance of its parameters [m^2].
-double varianceOfEffect(const identify::GapSearch& search, const Removal& removal,
-                        const identify::RefinedModel& refined, std::size_t term, std::size_t row) {
-  if (refined.covariance.size() == 0) return 0.0;
-  const Eigen::Index begin = identify::firstParameterOf(refined, term);
-  const Eigen::Matrix3Xd J = sensitivityAt(search, removal, refined.model, term, row);
-  const Eigen::MatrixXd covariance = refined.covariance.block(begin, begin, J.cols(), J.cols());
-  const double variance = (J * covariance * J.transpose()).trace();
-  return std::isfinite(variance) ? std::max(0.0, variance) : 0.0;
-}
+  const identify::GapSearch& search_;
+  const identify::RefinedModel& refined_;
+  std::size_t term_;
+  identify::GapRows rows_;
+  identify::GapModel rest_;
+  std::vector<identify::Vector6d> left_;
+};
 
 /// What taking away each selected body, plane or loop would change at the worst places, the rig aligned anew; as sure
 /// as the fit and the noise let it be.
@@ -235,23 +235,17 @@ void predictRemoval(const identify::GapSearch& search, const identify::EffectSel
     return report.nodes[a].before_m.squaredNorm() > report.nodes[b].before_m.squaredNorm();
   });
   order.resize(std::min<std::size_t>(3, order.size()));
-  const identify::GapModel& model = selection.model.model;
-  const std::vector<Pose> with = search.physics().predictions(model);
-  const Removal removal(search);
   for (std::size_t t = 0; t < selection.ways.size(); ++t) {
-    if (model.terms[t].effect->body == nullptr) continue;
-    const std::vector<Pose> rest = search.physics().predictions(identify::withoutTerm(model, t));
+    if (selection.model.model.terms[t].effect->body == nullptr) continue;
+    const Removal removal(search, selection.model, t);
     for (const std::size_t i : order) {
-      const identify::Matrix6d noise =
-          identify::noiseOf(search.physics().rows().rows[i], search.placingSd_m(), search.placingSd_rad());
-      const double variance_m2 =
-          noise.topLeftCorner<3, 3>().trace() + varianceOfEffect(search, removal, selection.model, t, i);
+      const Removal::Then then = removal.at(i);
       Prediction prediction;
       prediction.effect = report.selected[t].effect;
       prediction.node = report.nodes[i].node;
       prediction.now_mm = 1e3 * report.nodes[i].before_m.norm();
-      prediction.then_mm = 1e3 * (report.nodes[i].before_m - removal.takenAt(i, with, rest)).norm();
-      prediction.then_sd_mm = 1e3 * std::sqrt(variance_m2);
+      prediction.then_mm = 1e3 * then.size_m;
+      prediction.then_sd_mm = 1e3 * then.sd_m;
       report.predictions.push_back(prediction);
     }
   }

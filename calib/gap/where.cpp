@@ -13,10 +13,33 @@
 namespace fieldtrue::gap {
 namespace {
 
-/// Upper tail of chi-square. @source Wilson and Hilferty 1931, Proc. Nat. Acad. Sci. 17 684
-double chiSquareTail(double value, double freedom) {
-  const double a = 2.0 / (9.0 * freedom);
-  return 0.5 * std::erfc((std::cbrt(value / freedom) - (1.0 - a)) / std::sqrt(2.0 * a));
+/// Upper tail of the squared size of three whitened numbers under a Student t of them together: a third of it follows
+/// Fisher's F of 3 and `freedom` degrees, by the finite sum that the incomplete beta function is for whole a.
+/// @param freedom even
+/// @source Abramowitz and Stegun 1964, 26.6.2 and 26.5.6
+double tailOfThree(double square, double freedom) {
+  const double beyond = freedom / (freedom + square);
+  double term = std::pow(1.0 - beyond, 1.5), sum = 0.0;
+  for (int j = 0; j < static_cast<int>(0.5 * freedom); ++j) {
+    sum += term;
+    term *= (1.5 + j) / (1.0 + j) * beyond;
+  }
+  return std::clamp(1.0 - sum, 1e-15, 1.0);
+}
+
+/// How likely noise alone takes a row so far off, position and rotation together. Rows whose means are of few samples
+/// know their own scatter badly: the law of the residuals, not a normal one, says what is far.
+/// @source Fisher 1932, the product of two tails
+/// @param scale of the residuals under that law
+double tailOfRow(const identify::Vector6d& whitened, bool has_orientation, const identify::ResidualLaw& law,
+                 const identify::ResidualScale& scale) {
+  const auto tailOf = [&](const auto& part, double unit) {
+    return tailOfThree(part.squaredNorm() / (unit * unit), law.degrees_of_freedom);
+  };
+  const double position = tailOf(whitened.head<3>(), scale.position);
+  if (!has_orientation) return position;
+  const double both = position * tailOf(whitened.tail<3>(), scale.rotation);
+  return both * (1.0 - std::log(both));
 }
 
 /// Marks the hypotheses that may be rejected with a false-discovery rate of at most `rate`.
@@ -169,6 +192,8 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
   const std::vector<identify::Vector6d> white = identify::whitenedResiduals(
       search.physics(), none, identify::makeWhitening(table, search.floorPlacingSd_m(), search.floorPlacingSd_rad()));
   const std::vector<field::SensorSetting> settings = search.physics().settings(with_effects.alignment);
+  const identify::ResidualScale scale =
+      identify::devianceOf(search.noiseLeft(), table.has_orientation, search.law()).scale;
   std::vector<identify::Matrix6d> noise;
   std::vector<RowGap> rows;
   std::vector<double> p;
@@ -185,7 +210,7 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
     rows.push_back({1e3 * std::sqrt(var_m2), kDegPerRad * std::sqrt(var_rad2),
                     settings[i].tracker_from_sensor.position_m.norm(), table.rows[i].time_s});
     const double d2 = white[i].squaredNorm();
-    p.push_back(chiSquareTail(d2, channels));
+    p.push_back(tailOfRow(white[i], table.has_orientation, search.law(), scale));
     sum += d2;
     floor_m2 += var_m2;
     floor_rad2 += var_rad2;

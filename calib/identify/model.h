@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <iterator>
 #include <memory>
 #include <span>
 #include <vector>
@@ -42,7 +43,10 @@ class GapPhysics {
  public:
   /// @param believed effects that the scene already has
   GapPhysics(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed)
-      : rows_(rows), believed_(std::move(believed)) {}
+      : rows_(rows), believed_(std::make_move_iterator(believed.begin()), std::make_move_iterator(believed.end())) {}
+
+  /// The same tracker at other rows, which outlive it.
+  GapPhysics at(const GapRows& rows) const { return GapPhysics(believed_, rows); }
 
   const GapRows& rows() const { return rows_; }
   std::size_t size() const { return rows_.rows.size(); }
@@ -57,8 +61,11 @@ class GapPhysics {
   std::vector<Pose> predictions(const GapModel& model) const;
 
  private:
+  using Believed = std::vector<std::shared_ptr<const field::PhysicalEffect>>;
+  GapPhysics(Believed believed, const GapRows& rows) : rows_(rows), believed_(std::move(believed)) {}
+
   const GapRows& rows_;
-  std::vector<std::unique_ptr<field::PhysicalEffect>> believed_;
+  Believed believed_;
 };
 
 /// Mean orientation of each sensor in its holder, an alignment of the rig given.

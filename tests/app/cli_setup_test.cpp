@@ -70,6 +70,16 @@ class CliSetupTest : public QObject {
     QCOMPARE(run.err.contains("another set-up"), expected == "no");
   }
 
+  /// Every tracker has a sensor 0.
+  void theSensorsNumberAloneTellsNothing() {
+    FT_VERIFY_STATUS(
+        runCli({"fit", "--nodes", at("plain.csv"), "--position", "affine", "--out", at("unstated.ftcal.json")}), 0);
+    FT_VERIFY_STATUS(runCli({"apply", "--calibration", at("unstated.ftcal.json"), "--in", at("plain.csv"), "--out",
+                             at("unstated.csv")}),
+                     0);
+    QCOMPARE(lastColumn("unstated.csv").last(), QByteArray("unknown"));
+  }
+
   void anotherSensorIsAnother() {
     QByteArray rows = readWhole(at("same.csv"));
     const int sensor = static_cast<int>(QString(rows.split('\n').at(headerLine(rows))).split(',').indexOf("sensor"));

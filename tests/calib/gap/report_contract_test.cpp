@@ -141,6 +141,23 @@ class ReportContractTest : public QObject {
             remaining["p95_mm"] <= remaining["worst_mm"]);
   }
 
+  /// What single readings show is in no mean: nothing of the means' figures is told of it.
+  void effectsOfTheSignalTakeNothing() {
+    simulation::Scene scene = gapScene();
+    scene.tracker.correlation = 0.9;
+    SampleTable samples;
+    const CalibrationTable table = recordedIn(scene, gapPlan({.counts = {3, 3, 3}}), 1, &samples);
+    const auto made = gap::diagnose(table, &samples, nullptr);
+    FT_VERIFY_OK(made);
+    const json report = toJson(*made);
+    const auto found = std::find_if(report["selected"].begin(), report["selected"].end(),
+                                    [](const json& one) { return one["effect"] == "correlated_samples"; });
+    QVERIFY(found != report["selected"].end());
+    for (const char* key : {"excess2_before_mm2", "excess2_after_mm2", "credit_fraction"})
+      QVERIFY2((*found)[key].is_null(), key);
+    for (const auto& [key, value] : (*found)["shrinkage"].items()) QVERIFY2(value.is_null(), key.c_str());
+  }
+
   /// Rivals without a name stand in every ranking, and what is likeliest is what is said.
   void theRankingIsWhole_data() { agreesWithItself_data(); }
   void theRankingIsWhole() {

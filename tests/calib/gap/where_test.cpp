@@ -1,8 +1,12 @@
 #include "calib/gap/where.h"
 
 #include <QTest>
+#include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "calib/simulation/scene.h"
+#include "tests/calib/gap/gap_fixtures.h"
 #include "tests/calib/identify/noisy_rows.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -50,6 +54,17 @@ class GapWhereTest : public QObject {
     }
     const double most = 0.05 + 2.33 * std::sqrt(0.05 * 0.95 / kDraws);
     QVERIFY2(n_false <= most * kDraws, qPrintable(QString::number(n_false)));
+  }
+
+  /// Twenty readings that follow one another know their scatter badly, and far off the scatter is most of the noise.
+  void flagsNothingInMeansOfFewReadings() {
+    const auto scene = simulation::readScene(FIELDTRUE_RESOURCES "/rooms/clean.scene.json");
+    FT_VERIFY_OK(scene);
+    const CalibrationTable table = recordedIn(*scene, gapPlan({.counts = {9, 9, 7}, .pitch_m = 0.3048}));
+    const GapReport report = whereIn(identify::makeGapRows(table.nodes, table.metadata).value());
+    const auto n_flagged =
+        std::count_if(report.nodes.begin(), report.nodes.end(), [](const GapNode& node) { return node.is_flagged; });
+    QVERIFY2(n_flagged <= 1, std::to_string(n_flagged).c_str());
   }
 
   /// One place 15 noise SDs off, of 64.
