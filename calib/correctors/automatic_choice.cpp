@@ -95,11 +95,19 @@ bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
   return excess.mean > 0.0 && excess.mean > kDroppedFrom * excess.standard_error;
 }
 
-/// Whether a candidate is better than correcting nothing: by its RMS, and by more than chance.
+/// RMS over the places alike, whatever part of the region each stands for.
+double rmsOfPlaces_m(const InnerScore& score) {
+  const double sum_m2 = std::accumulate(score.squares_m2.begin(), score.squares_m2.end(), 0.0);
+  return std::sqrt(sum_m2 / static_cast<double>(score.squares_m2.size()));
+}
+
+/// Whether a candidate is better than correcting nothing: by its RMS over the region and over the places alike (those
+/// at the edge stand for little of the region, and err most), and by more than chance.
 bool isWorthIt(const InnerScore& score, const InnerScore& none) {
   const PairedDifference gain(none, score);
   const bool is_clear = gain.mean > kOneSided95 * gain.standard_error || pointsTheRightWay(score, none) > kOneSided99;
-  return is_clear && score.rms_m() <= (1.0 - kLeastGain) * none.rms_m();
+  return is_clear && score.rms_m() <= (1.0 - kLeastGain) * none.rms_m() &&
+         rmsOfPlaces_m(score) <= (1.0 - kLeastGain) * rmsOfPlaces_m(none);
 }
 
 InnerScore skippedScore(std::string why) {
