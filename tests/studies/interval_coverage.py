@@ -5,7 +5,7 @@ interval_coverage.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 30,60,120
 
 Of every room thousands of places are recorded without noise, scattered evenly over its box. Tables are drawn from them;
 each stated position is then moved as a hand misplaces a jig, calm (Gaussian of 2 mm an axis) or with gross slips (one in
-twenty by six times as much). `compare` judges a table: its RMS, its 90 % interval, inside and edge apart, and the gain with
+twenty by six times as much). `compare` judges a table: its RMS, its 90 % interval, and the gain with
 its interval. The truth is this script's own: the calibration that `fit` makes of the whole table is applied to 24,000 places
 that no table holds, and the mean square of what is left, plus the known mean square of the misplacing, is what the interval
 should hold: the RMS of this fitted correction at fresh places like those of the table. Untuned methods are left out one by
