@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "calib/core/units.h"
 #include "calib/gap/two_recordings.h"
@@ -11,6 +12,8 @@
 namespace fieldtrue::gap {
 namespace {
 
+constexpr double kFarOff = 10.0;            ///< SDs: no slip of placing that is as stated.
+constexpr std::size_t kFewestFar = 3;       ///< Places: fewer are slips of the hand.
 constexpr std::size_t kRowsForField = 500;  ///< Of the earlier one, to foretell what it would have read.
 
 /// What would have been read at one row, metres or radians beside the alignment, and the variance of each component.
@@ -50,6 +53,13 @@ class Channel {
   }
   /// What the earlier recording would have read at the later one's rows.
   const std::vector<Foretold>& foretold() const { return foretold_; }
+
+  /// How far a reading is from what is foretold, in SDs of a component of noise, placing and what is foretold.
+  double farOff(std::size_t row) const {
+    const auto i = static_cast<Eigen::Index>(row);
+    const Eigen::Vector3d off = later_.values.row(i).transpose() - foretold_[row].value;
+    return off.norm() / std::sqrt(3.0 * (later_.variances[i] + foretold_[row].variance));
+  }
 
   std::vector<Eigen::Vector3d> change() const {
     const identify::SharedField field(both_, found_.earlier, found_.change);
@@ -160,6 +170,27 @@ recording::Cleaned rowsOfChange(const Recording& now, const Alignments& alignmen
   return change;
 }
 
+/// Bound of the tail of chi-square of three numbers a place, as shares of their variance.
+/// @source Chernoff 1952: P(chi2_k >= k x) <= exp(-k/2 (x - 1 - ln x))
+double tailOfPlaces(double n_places, double share) {
+  return std::exp(-1.5 * n_places * (share - 1.0 - std::log(share)));
+}
+
+/// Of the later readings about what the earlier recording foretells, of them all or of those that are far off.
+double astrayPValue(const Recording& now, const std::vector<Channel>& channels, const std::vector<char>& known,
+                    const RecordingChange& change, const identify::Thresholds& thresholds) {
+  const double bound_mm = 1e3 * identify::worstPlacing_m(now.rows, thresholds);
+  const double ratio = change.scatter_now_mm / bound_mm;
+  if (ratio > thresholds.clearly_scattered &&
+      change.scatter_now_mm > thresholds.told_scatter * change.scatter_before_mm)
+    return tailOfPlaces(change.places, ratio * ratio);
+  std::set<std::size_t> far;
+  for (std::size_t i = 0; i < known.size(); ++i)
+    for (const Channel& channel : channels)
+      if (known[i] != 0 && channel.farOff(i) > kFarOff) far.insert(now.rows.rows[i].place);
+  return far.size() < kFewestFar ? 1.0 : tailOfPlaces(static_cast<double>(far.size()), kFarOff * kFarOff);
+}
+
 /// How large the likeliest change is where the earlier recording tells the field, and where it is largest.
 void describeSize(const Recording& now, const Alignments& alignments, const Channel& positions,
                   const std::vector<char>& known, double log_odds, RecordingChange& change) {
@@ -211,6 +242,7 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
   change.changed = log_odds > thresholds.sure_of_change;
   change.scatter_before_mm = 1e3 * channels[0].scatter(false);
   change.scatter_now_mm = 1e3 * channels[0].scatter(true);
+  if (!change.changed) change.astray_p_value = astrayPValue(*now, channels, known, change, thresholds);
   change.least_shown_mm = 1e3 * std::sqrt(3.0) * channels[0].found().least_shown;
   describeSize(*now, alignments, channels[0], known, log_odds, change);
   describeRig(*before, *now, alignments, places, change);
@@ -229,6 +261,12 @@ std::string howSure(double p_value) { return p_value < 1e-3 ? "p < 0.001" : "p <
 std::string nothingText(const RecordingChange& change) {
   return "Nothing changed since the earlier recording that these two would show; they would show a change of about " +
          shown(change.least_shown_mm) + " mm (RMS).";
+}
+
+std::string astrayText(const RecordingChange& change, const GapReport& report) {
+  return "No smooth change of the field shows, but the later readings lie off what the earlier recording foretells by "
+         "more than placing does (" +
+         howSure(change.astray_p_value) + "). " + report.text;
 }
 
 std::string changedText(const RecordingChange& change, const GapReport& report) {
@@ -274,17 +312,19 @@ void describeChange(const RecordingChange& change, const identify::Thresholds& t
   against.p_value = change.p_value;
   against.rms_mm = change.rms_mm;
   against.location_m = change.hottest_m;
-  if (!change.changed) {
+  if (!change.changed && (!change.isAstray() || report.verdict == GapVerdict::kNoGap)) {
     report.verdict = GapVerdict::kNoGap;
     report.text = nothingText(change);
   } else {
+    against.changed = true;
+    against.p_value = std::min(change.p_value, change.astray_p_value);
     against.rms_mm =
         std::sqrt(std::max(0.0, std::pow(report.position_rms_mm, 2) - std::pow(report.floor_position_mm, 2)));
     if (!report.selected.empty()) {
       against.effect = report.selected.front().effect;
       if (report.selected.front().location_m) against.location_m = report.selected.front().location_m;
     }
-    report.text = changedText(change, report);
+    report.text = change.changed ? changedText(change, report) : astrayText(change, report);
   }
   addRigMoved(change, thresholds, report);
   addScatter(change, thresholds, report);

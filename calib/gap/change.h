@@ -21,6 +21,11 @@ struct RecordingChange {
   std::optional<Eigen::Vector3d> hottest_m;  ///< Where positions changed most, tracker frame.
   double scatter_before_mm = 0.0;            ///< SD per axis about any smooth field.
   double scatter_now_mm = 0.0;
+  /// At most so often placing alone takes the later readings so far off what the earlier one foretells; 1 unless they
+  /// scatter clearly more than placing may and than the earlier ones do, or several places are far off: what bends one
+  /// corner alone is no smooth field.
+  double astray_p_value = 1.0;
+  bool isAstray() const { return astray_p_value < 1e-3; }
   int places = 0;  ///< Of the later recording, where the earlier one knows the field.
   int places_left_out = 0;
   std::optional<double> rig_moved_mm;  ///< Where the places are the same: how far they stand from where they stood.

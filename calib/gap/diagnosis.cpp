@@ -251,8 +251,10 @@ Result<GapReport> diagnoseChange(const CalibrationTable& table, const simulation
     tracker = *scene;
     tracker->effects.clear();
   }
+  // Whether what is astray is a change, its diagnosis decides.
+  const auto known = change.isAstray() ? std::nullopt : std::optional(change.changed);
   FT_TRY(auto report, diagnoseRows(std::move(change.rows), change.metadata, nullptr, tracker ? &*tracker : nullptr,
-                                   options, change.changed, partOf(control, 0.2, 1.0)));
+                                   options, known, partOf(control, 0.2, 1.0)));
   describeChange(change, options.thresholds, report);
   return report;
 }

@@ -3,6 +3,7 @@
 #include <QTest>
 #include <algorithm>
 #include <memory>
+#include <random>
 
 #include "tests/calib/gap/diagnosis_checks.h"
 #include "tests/support/test_main.h"
@@ -80,6 +81,37 @@ class ChangeTest : public QObject {
   }
 
   /// The rig set down 4 cm beside and turned by 3 degrees: a finding, and no change of the field.
+  /// What no smooth field is may still be none of placing.
+  void whatScattersIsNotNothing() {
+    const CalibrationTable before = recordedIn(gapScene(), gapPlan(), 1);
+    CalibrationTable now = recordedIn(gapScene(), gapPlan(), 2);
+    const auto quiet = since(before, now);
+    FT_VERIFY_OK(quiet);
+    QVERIFY2(!quiet->against->changed && quiet->verdict == GapVerdict::kNoGap, quiet->text.c_str());
+    std::mt19937_64 generator(5);
+    std::normal_distribution<double> normal_m(0.0, 0.03);
+    for (Node& node : now.nodes)
+      for (double& coordinate : node.tracker_from_sensor.position_m) coordinate += normal_m(generator);
+    const auto report = since(before, now);
+    FT_VERIFY_OK(report);
+    QVERIFY2(report->against->changed && report->verdict == GapVerdict::kUnexplained, report->text.c_str());
+    QVERIFY(report->against->p_value < 1e-3);
+  }
+
+  /// A sphere 9 cm from a corner of the grid takes that place off by half a metre, and the next ones by centimetres.
+  void whatBendsACornerIsAChange() {
+    simulation::Scene scene;
+    scene.rig.tolerance_m = 0.0005;
+    std::vector<PlannedPlace> plan = gapPlan({.counts = {5, 5, 4}, .pitch_m = 0.15});
+    for (PlannedPlace& place : plan) place.reference_from_sensor.position_m += Eigen::Vector3d(0.3, -0.3, -0.2);
+    const CalibrationTable before = recordedIn(scene, plan, 3);
+    scene.effects = {effect("compact_metal", R"({"center_m": [0.95, 0.35, 0.3], "radius_m": 0.08})")};
+    const auto report = since(before, recordedIn(scene, plan, 4));
+    FT_VERIFY_OK(report);
+    QVERIFY2(report->against->changed && report->verdict != GapVerdict::kNoGap, report->text.c_str());
+    QVERIFY(report->against->effect == "compact_metal");
+  }
+
   void aRigSetDownAnewIsNoChange() {
     const simulation::Scene room = roomWith({effect("metal_plane", kFloorThen)});
     const CalibrationTable before = recordedIn(room, gapPlan(), 1);
