@@ -2,8 +2,6 @@
 
 #include <cstddef>
 
-#include "calib/geometry/geometry.h"
-
 namespace fieldtrue::identify {
 
 /// Every figure by which a diagnosis decides: what is refused, selected, named, called a gap, told apart and told. What
@@ -27,7 +25,7 @@ struct Thresholds {
   double astray = 0.4;
   /// RMS misfit of the mirror image over that of any turn, below which an axis has the wrong sign. Set by reason:
   /// field distortion does not make one three times better than the other.
-  double mirrored = kMirrorShare;
+  double mirrored = 0.3;
 
   // What may be noise.
 

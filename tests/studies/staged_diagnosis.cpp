@@ -47,7 +47,7 @@ gap::GapReport StagedDiagnosis::under(const Thresholds& thresholds) {
       if (candidate.effect == effect.effect) static_cast<gap::GapCandidate&>(effect) = candidate;
     report.selected.push_back(std::move(effect));
   }
-  gap::addFindings(*search_, rows_, judgement, has_gap, report);
+  if (belongs_together) gap::addFindings(*search_, rows_, judgement, has_gap, report);
   return report;
 }
 

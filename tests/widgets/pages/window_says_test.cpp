@@ -534,7 +534,7 @@ void WindowSaysTest::mirroredReadingsAreNotToBeCorrected() {
   QVERIFY2(compareText("headline").contains(QStringLiteral("axes or places of the readings are wrong")),
            qPrintable(compareText("headline")));
   QCOMPARE(verdictState(), QStringLiteral("leave"));
-  QVERIFY2(compareText("verdict").contains(QStringLiteral("swapped or mirrored")), qPrintable(compareText("verdict")));
+  QVERIFY2(compareText("verdict").contains(QStringLiteral("mirror image")), qPrintable(compareText("verdict")));
   picture("mirrored");
 }
 
