@@ -35,6 +35,7 @@ cp "$work/light/6-gap-since.png" "$target/gap-since.png"
 cp "$work/light/6-export.png" "$target/export.png"
 cp "$work/light/6-export-sensors.png" "$target/export-sensors.png"
 cp "$work/light/7-changes.png" "$target/changes.png"
+cp "$work/light/7-changes-of-a-sensor.png" "$target/changes-sensor.png"
 cp "$work/light/8-import.png" "$target/import.png"
 cp "$work/light/3-signal.png" "$target/signal.png"
 if [ -n "${FIELDTRUE_ALL_PICTURES:-}" ]; then cp -r "$work/light" "$work/dark" "$target/"; fi

@@ -1,9 +1,12 @@
 #include "calib/calibration/mirrored_sensors.h"
 
+#include <vector>
+
 #include "calib/geometry/geometry.h"
 #include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::calibration {
+namespace {
 
 std::vector<int> mirroredSensors(std::span<const Node> nodes) {
   std::vector<int> mirrored;
@@ -17,6 +20,8 @@ std::vector<int> mirroredSensors(std::span<const Node> nodes) {
   }
   return mirrored;
 }
+
+}  // namespace
 
 std::string mirroredText(std::span<const Node> nodes) {
   const std::vector<int> mirrored = mirroredSensors(nodes);

@@ -50,7 +50,7 @@ CalibrationTable twoSensors(const TwoSensors& how) {
   options.smooth_distortion_m = how.smooth_m;
   CalibrationTable table = syntheticTable(options);
   std::mt19937 random(5);
-  std::normal_distribution<double> placing_m(0.0, how.noise_2_m);
+  std::normal_distribution<double> standard;
   std::vector<Node> second = table.nodes;
   for (std::size_t i = 0; i < table.nodes.size(); ++i) {
     Node& one = table.nodes[i];
@@ -64,10 +64,9 @@ CalibrationTable twoSensors(const TwoSensors& how) {
     one.tracker_from_sensor = reading(options, one.reference_from_sensor, kMount1, how.gain_1, -how.turn_rad_m);
     other.tracker_from_sensor = reading(options, other.reference_from_sensor, kMount2, how.gain, how.turn_rad_m);
     if (how.noise_1_m > 0.0)
-      for (double& coordinate : one.reference_from_sensor.position_m)
-        coordinate += how.noise_1_m / how.noise_2_m * placing_m(random);
+      for (double& coordinate : one.reference_from_sensor.position_m) coordinate += how.noise_1_m * standard(random);
     if (how.noise_2_m > 0.0)
-      for (double& coordinate : other.reference_from_sensor.position_m) coordinate += placing_m(random);
+      for (double& coordinate : other.reference_from_sensor.position_m) coordinate += how.noise_2_m * standard(random);
   }
   table.nodes.insert(table.nodes.end(), second.begin(), second.end());
   return table;
