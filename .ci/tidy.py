@@ -28,8 +28,8 @@ GNU_ONLY = {os.path.join("tests", "exporters", "itk_points.cpp")}  # Debian's he
 
 def prepared():
     """Configures, and tells the files that are compiled: {file: command}."""
-    if not os.path.exists(os.path.join(BUILD, "build.ninja")):
-        subprocess.run(["cmake", "--preset", "tidy"], cwd=ROOT, stdout=subprocess.DEVNULL, check=True)
+    # Each time: of a file that came since the last, an older list of commands knows nothing.
+    subprocess.run(["cmake", "--preset", "tidy"], cwd=ROOT, stdout=subprocess.DEVNULL, check=True)
     with open(os.path.join(BUILD, "compile_commands.json"), encoding="utf-8") as commands:
         files = {os.path.relpath(one["file"], ROOT): one["command"] for one in json.load(commands)}
     return {file: files[file] for file in files if file.endswith(".cpp") and not file.startswith(("build", ".."))

@@ -63,7 +63,7 @@ class PredictionsTest : public QObject {
     for (const Prediction& prediction : report->predictions) {
       if (prediction.effect != id) continue;
       ++told;
-      for (const std::uint64_t seed : {2, 3, 4}) {
+      for (const std::uint64_t seed : {2U, 3U, 4U}) {
         const double then_mm = gapAt_mm(recordedWithout(id, actual, plan, seed), prediction.node);
         const std::string seen = report->text + " " + std::to_string(prediction.now_mm) + " to " +
                                  std::to_string(prediction.then_mm) + " +- " + std::to_string(prediction.then_sd_mm) +
