@@ -95,7 +95,7 @@ std::string remainingText(const gap::GapReport& report) {
     named.resize(std::min<std::size_t>(named.size(), 8));
     text += ", most at " + report.names.list(named, 8);
   }
-  return text + ".\n";
+  return text + ".\n" + gap::howFarOffText(report) + "\n";
 }
 
 std::string predictionsText(const gap::GapReport& report) {

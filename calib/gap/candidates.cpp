@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "calib/identify/profile.h"
@@ -35,15 +36,27 @@ void keepWithinSearch(const effects::EffectFit& fit, GapCandidate& candidate) {
   }
 }
 
+/// The same SD of one parameter, in its unit. An image as far behind a plane as the source stands before it answers
+/// with the inverse cube of the distance, so that its strength is not known better than to three times the distance's
+/// share.
+double unmodelledSd(const Estimate& estimate, bool is_plane, double place_sd_m,
+                    const identify::Thresholds& thresholds) {
+  if (estimate.name.rfind("center_", 0) == 0) return place_sd_m;
+  if (!is_plane) return 0.0;
+  if (estimate.name == "distance_m") return place_sd_m;
+  return estimate.name == "strength" ? 3.0 * thresholds.share_of_distance * std::abs(estimate.value) : 0.0;
+}
+
 /// Widens the intervals of a thing in the room for the physics that its model leaves out.
 void widenPlaced(const effects::FittedEffect& fitted, const identify::Thresholds& thresholds, GapCandidate& candidate) {
   if (!fitted.location_m) return;
   const double place_sd_m = unmodelledPlaceSd_m(fitted, thresholds);
   const double wider = thresholds.wider_of_placed;
+  const bool is_plane = std::any_of(fitted.values.begin(), fitted.values.end(),
+                                    [](const effects::FittedParameter& p) { return p.name == "distance_m"; });
   for (Estimate& estimate : candidate.parameters) {
     if (!estimate.low90 || !estimate.high90) continue;
-    const bool is_center = estimate.name.rfind("center_", 0) == 0;
-    const double more = is_center ? kNinety * place_sd_m : 0.0;
+    const double more = kNinety * unmodelledSd(estimate, is_plane, place_sd_m, thresholds);
     estimate.low90 = estimate.value - std::hypot(wider * (estimate.value - *estimate.low90), more);
     estimate.high90 = estimate.value + std::hypot(wider * (*estimate.high90 - estimate.value), more);
   }
@@ -188,11 +201,33 @@ void findEquivalents(const identify::GapSearch& search, const identify::EffectSe
   }
 }
 
+/// The most evidence that causes which are not named may have, where others are: each was refused for a reason, so
+/// none is likelier than what is named, and what nobody would believe is less likely by what that costs.
+struct MostEvidence {
+  double plausible = std::numeric_limits<double>::infinity();
+  double implausible = std::numeric_limits<double>::infinity();
+
+  double of(const GapCandidate& c) const {
+    return isNameless(c.effect) ? c.bic_gain : std::min(c.bic_gain, c.is_plausible ? plausible : implausible);
+  }
+};
+
+/// @param candidates one of them as the leading effect that is named, if any is
+MostEvidence mostEvidence(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                          const std::vector<GapCandidate>& candidates) {
+  if (selection.ways.empty()) return {};
+  const std::string& leading = search.ways()[selection.ways[selection.leading]].effect->id;
+  for (const GapCandidate& c : candidates)
+    if (c.effect == leading) return {c.bic_gain, c.bic_gain - search.thresholds().implausible_cost};
+  return {};
+}
+
 /// What does not help on places it was not fitted to counts for less; where nothing was worth selecting, nothing is
 /// likelier than none.
-double evidenceOf(const GapCandidate& c, bool is_any_fit, const identify::Thresholds& thresholds) {
+double evidenceOf(const GapCandidate& c, bool is_any_fit, const MostEvidence& most,
+                  const identify::Thresholds& thresholds) {
   if (isNameless(c.effect)) return c.bic_gain;
-  const double evidence = c.bic_gain - (c.shrinkage.fraction <= 0.0 ? thresholds.cost_of_failing : 0.0);
+  const double evidence = most.of(c) - (c.shrinkage.fraction <= 0.0 ? thresholds.cost_of_failing : 0.0);
   return is_any_fit ? evidence : std::min(evidence, 0.0) - thresholds.cost_of_unselected;
 }
 
@@ -235,12 +270,14 @@ void leaveRoomForTheUnknown(const identify::Thresholds& thresholds, std::vector<
   unnamed->probability += part * unknown;
 }
 
-void setProbabilities(bool is_any_fit, const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
+void setProbabilities(bool is_any_fit, const MostEvidence& most_of, const identify::Thresholds& thresholds,
+                      std::vector<GapCandidate>& candidates) {
+  const auto evidence = [&](const GapCandidate& c) { return evidenceOf(c, is_any_fit, most_of, thresholds); };
   double most = 0.0;
-  for (const GapCandidate& c : candidates) most = std::max(most, evidenceOf(c, is_any_fit, thresholds));
+  for (const GapCandidate& c : candidates) most = std::max(most, evidence(c));
   double sum = 0.0;
   for (GapCandidate& c : candidates) {
-    c.probability = std::exp(0.5 * (evidenceOf(c, is_any_fit, thresholds) - most) / thresholds.temperature);
+    c.probability = std::exp(0.5 * (evidence(c) - most) / thresholds.temperature);
     sum += c.probability;
   }
   for (GapCandidate& c : candidates) c.probability /= sum;
@@ -257,14 +294,16 @@ Shrinkage shrinkageOf(double before_m2, double after_m2, const Bounded& left) {
   return shrinkage;
 }
 
-/// What an effect that was not selected would take away: by its exact fit, less what that many parameters take from
-/// noise; what the places it did not see say, where these come off worse.
+/// What an effect that was not selected would take away of places not seen: by its exact fit, less what that many
+/// parameters take from noise and once more what they err by elsewhere; what the places it did not see say, where these
+/// come off worse.
+/// @source Mallows 1973, Technometrics 15 661 (C_p)
 Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::TriedEffect& tried, const HowFar& far,
                            double none) {
   double fall = tried.held_out_gain;
   if (tried.held_out_gain > 0.0 && !tried.refined.model.terms.empty()) {
     const auto parameters = static_cast<double>(identify::parametersOf(tried.model));
-    fall = std::max(fall, none - whitenedSquares(search, tried.model) - parameters);
+    fall = std::max(fall, none - whitenedSquares(search, tried.model) - 2.0 * parameters);
   }
   const double left = 1.0 - fall / far.whitened_excess;
   const double before_m2 = far.excess_m2.front().value;
@@ -272,8 +311,8 @@ Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::Tr
 }
 
 /// The rivals without a name, weighed so that they stand against what was selected as the judgement found.
-void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, const identify::Thresholds& thresholds,
-                 std::vector<GapCandidate>& candidates) {
+void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, const MostEvidence& most_of,
+                 const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
   const double margin = thresholds.nameless_margin;
   const double before_m2 = judgement.far.excess_m2.front().value;
   const auto add = [&](const char* id, double evidence, double left) {
@@ -285,7 +324,7 @@ void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, 
     candidates.push_back(std::move(nameless));
   };
   double best = 0.0;
-  for (const GapCandidate& c : candidates) best = std::max(best, c.bic_gain);
+  for (const GapCandidate& c : candidates) best = std::max(best, most_of.of(c));
   add("none", 0.0, 1.0);
   double smooth = -3.0 * margin;
   if (!judgement.selection.ways.empty())
@@ -324,8 +363,10 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
     for (GapCandidate& c : candidates)
       if (c.effect == search.ways()[selection.ways[t]].effect->id) c.shrinkage = shrinkageOfStep(judgement.far, t);
   }
-  addNameless(judgement, has_gap, scattered_share, search.thresholds(), candidates);
-  setProbabilities(!selection.ways.empty() || judgement.refusal != Refusal::kNone, search.thresholds(), candidates);
+  const MostEvidence most_of = mostEvidence(search, selection, candidates);
+  addNameless(judgement, has_gap, scattered_share, most_of, search.thresholds(), candidates);
+  setProbabilities(!selection.ways.empty() || judgement.refusal != Refusal::kNone, most_of, search.thresholds(),
+                   candidates);
   return candidates;
 }
 

@@ -12,8 +12,6 @@
 namespace fieldtrue::gap {
 namespace {
 
-constexpr double kFarOff = 10.0;            ///< SDs: no slip of placing that is as stated.
-constexpr std::size_t kFewestFar = 3;       ///< Places: fewer are slips of the hand.
 constexpr std::size_t kRowsForField = 500;  ///< Of the earlier one, to foretell what it would have read.
 
 /// What would have been read at one row, metres or radians beside the alignment, and the variance of each component.
@@ -187,8 +185,9 @@ double astrayPValue(const Recording& now, const std::vector<Channel>& channels, 
   std::set<std::size_t> far;
   for (std::size_t i = 0; i < known.size(); ++i)
     for (const Channel& channel : channels)
-      if (known[i] != 0 && channel.farOff(i) > kFarOff) far.insert(now.rows.rows[i].place);
-  return far.size() < kFewestFar ? 1.0 : tailOfPlaces(static_cast<double>(far.size()), kFarOff * kFarOff);
+      if (known[i] != 0 && channel.farOff(i) > thresholds.far_off) far.insert(now.rows.rows[i].place);
+  if (far.size() < thresholds.fewest_far_off) return 1.0;
+  return tailOfPlaces(static_cast<double>(far.size()), thresholds.far_off * thresholds.far_off);
 }
 
 /// How large the likeliest change is where the earlier recording tells the field, and where it is largest.
@@ -207,26 +206,23 @@ void describeSize(const Recording& now, const Alignments& alignments, const Chan
   if (change.changed) change.hottest_m = hottest(changed_m, now.search->physics().settings(alignments.now), known);
 }
 
-}  // namespace
-
-Result<RecordingChange> changeSince(const CalibrationTable& before_table, const CalibrationTable& now_table,
-                                    const identify::Thresholds& thresholds, const RunControl& control) {
-  FT_TRY(auto before, recordingOf(before_table, thresholds));
-  FT_TRY(auto now, recordingOf(now_table, thresholds));
-  const std::vector<int> places = placesBefore(*before, *now);
-  const Alignments alignments = alignedTogether(*before, *now, places);
+/// What the later of two recordings shows beside the earlier one.
+/// @param metadata of the later table
+Result<RecordingChange> changeBetween(const Recording& before, const Recording& now, const Alignments& alignments,
+                                      std::span<const int> places, const TableMetadata& metadata,
+                                      const identify::Thresholds& thresholds, const RunControl& control) {
   std::vector<Channel> channels;
   for (const bool rotation : {false, true}) {
-    if (rotation && !(before->rows.has_orientation && now->rows.has_orientation)) break;
-    channels.emplace_back(*before, *now, alignments, places, rotation).run(control);
+    if (rotation && !(before.rows.has_orientation && now.rows.has_orientation)) break;
+    channels.emplace_back(before, now, alignments, places, rotation).run(control);
     if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The comparison was stopped.");
   }
 
   std::vector<char> known;
-  std::vector<char> place_known(now->rows.place_nodes.size(), 0);
-  for (std::size_t i = 0; i < now->rows.rows.size(); ++i) {
+  std::vector<char> place_known(now.rows.place_nodes.size(), 0);
+  for (std::size_t i = 0; i < now.rows.rows.size(); ++i) {
     known.push_back(channels[0].knows(i) ? 1 : 0);
-    if (known[i] != 0) place_known[now->rows.rows[i].place] = 1;
+    if (known[i] != 0) place_known[now.rows.rows[i].place] = 1;
   }
   RecordingChange change;
   change.places = static_cast<int>(std::count(place_known.begin(), place_known.end(), char{1}));
@@ -242,16 +238,38 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
   change.changed = log_odds > thresholds.sure_of_change;
   change.scatter_before_mm = 1e3 * channels[0].scatter(false);
   change.scatter_now_mm = 1e3 * channels[0].scatter(true);
-  if (!change.changed) change.astray_p_value = astrayPValue(*now, channels, known, change, thresholds);
+  if (!change.changed) change.astray_p_value = astrayPValue(now, channels, known, change, thresholds);
   change.least_shown_mm = 1e3 * std::sqrt(3.0) * channels[0].found().least_shown;
-  describeSize(*now, alignments, channels[0], known, log_odds, change);
-  describeRig(*before, *now, alignments, places, change);
+  describeSize(now, alignments, channels[0], known, log_odds, change);
+  describeRig(before, now, alignments, places, change);
   change.tracker_from_reference = alignments.now.tracker_from_reference;
-  for (std::size_t s = 0; s < now->rows.sensors.size(); ++s)
-    change.sensors_from_mounts[now->rows.sensors[s]] = inverse(alignments.now.mount_from_sensor[s]);
-  change.metadata = metadataOfChange(now_table.metadata, channels);
-  change.rows = rowsOfChange(*now, alignments, channels, known);
+  for (std::size_t s = 0; s < now.rows.sensors.size(); ++s)
+    change.sensors_from_mounts[now.rows.sensors[s]] = inverse(alignments.now.mount_from_sensor[s]);
+  change.metadata = metadataOfChange(metadata, channels);
+  change.rows = rowsOfChange(now, alignments, channels, known);
   return change;
+}
+
+}  // namespace
+
+Result<RecordingChange> changeSince(const CalibrationTable& before_table, const CalibrationTable& now_table,
+                                    const identify::Thresholds& thresholds, const RunControl& control) {
+  FT_TRY(auto before, recordingOf(before_table, thresholds));
+  FT_TRY(auto now, recordingOf(now_table, thresholds));
+  const std::vector<int> places = placesBefore(*before, *now);
+  const Alignments alignments = alignedTogether(*before, *now, places);
+  FT_TRY(auto change, changeBetween(*before, *now, alignments, places, now_table.metadata, thresholds, control));
+  if (change.changed || change.isAstray()) return change;
+  // What bent a few places alone and is gone foretells nothing: it is the earlier readings that are astray.
+  auto back = changeBetween(*now, *before, {alignments.now, alignments.before}, placesBefore(*now, *before),
+                            before_table.metadata, thresholds, control);
+  if (!back && back.error().code == ErrorCode::kCancelled) return tl::unexpected(back.error());
+  if (!back || back->changed || !back->isAstray()) return change;
+  back->is_gone = true;
+  back->rig_moved_mm = change.rig_moved_mm;
+  back->rig_turned_deg = change.rig_turned_deg;
+  std::swap(back->scatter_before_mm, back->scatter_now_mm);
+  return back;
 }
 
 namespace {
@@ -264,6 +282,12 @@ std::string nothingText(const RecordingChange& change) {
 }
 
 std::string astrayText(const RecordingChange& change, const GapReport& report) {
+  if (change.is_gone) {
+    return "Something is gone: the earlier readings lie off what the later recording tells of their places by more "
+           "than "
+           "placing does (" +
+           howSure(change.astray_p_value) + "). Of what stood there: " + report.text;
+  }
   return "No smooth change of the field shows, but the later readings lie off what the earlier recording foretells by "
          "more than placing does (" +
          howSure(change.astray_p_value) + "). " + report.text;

@@ -41,7 +41,10 @@ void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) 
   if (report.hotspot && !rows.has_dipoles && nodes.size() * 3 < rows.place_nodes.size()) {
     const Eigen::Vector3d& at = report.hotspot->center_m;
     text += " Something local acts within " + shown(report.hotspot->radius_m) + " m of (" + shown(at.x()) + ", " +
-            shown(at.y()) + ", " + shown(at.z()) + ") m.";
+            shown(at.y()) + ", " + shown(at.z()) + ") m";
+    if (report.hotspot->sd_m) text += " (+- " + shown(*report.hotspot->sd_m) + " m)";
+    text += report.hotspot->half_m ? "; half of it is gone " + shown(*report.hotspot->half_m) + " m from there."
+                                   : "; within these places it does not fall to half.";
   }
   report.findings.push_back({"", text, nodes});
 }

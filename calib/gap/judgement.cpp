@@ -26,6 +26,7 @@ class Judge {
     dropIdle(judgement);
     UnseenScores scores = scored(judgement.selection, scattered_);
     while (dropHarmful(scores, judgement)) scores = scored(judgement.selection, scattered_);
+    if (!judgement.dropped.empty()) identify::rankAnew(search_, judgement.selection, control_);
     if (!judgement.selection.ways.empty() && !control_.stop.stop_requested()) weigh(scores, judgement);
     if (judgement.refusal != Refusal::kNone) {
       for (std::size_t t = 0; t < judgement.selection.ways.size(); ++t)
@@ -93,19 +94,25 @@ class Judge {
     }
   }
 
-  /// Takes out the effect with which unseen places come off worst, if they come off worse with it than without.
+  /// Where unseen places come off worse with one effect more than without it, takes out the one that the rows miss
+  /// least: the folds choose for themselves, so that what a step adds in them need not be what it adds in the whole.
   bool dropHarmful(const UnseenScores& scores, Judgement& judgement) {
     identify::EffectSelection& selection = judgement.selection;
-    double worst = 0.0;
-    std::optional<std::size_t> harmful;
-    for (std::size_t s = 0; s + 1 < scores.step.size(); ++s) {
-      const double harm = pairedDifference(scores.step[s + 1], scores.step[s], rows_).value;
-      if (harm <= worst) continue;
-      worst = harm;
-      harmful = s;
+    const auto harms = [&](std::size_t s) {
+      return pairedDifference(scores.step[s + 1], scores.step[s], rows_).value > 0.0;
+    };
+    bool is_harmful = false;
+    for (std::size_t s = 0; s + 1 < scores.step.size(); ++s) is_harmful = is_harmful || harms(s);
+    if (!is_harmful || control_.stop.stop_requested()) return false;
+    std::size_t least_missed = 0;
+    std::optional<identify::RefinedModel> rest;
+    for (std::size_t t = 0; t < selection.ways.size(); ++t) {
+      identify::RefinedModel tried = without(selection, t);
+      if (rest && search_.bicOf(tried.model) >= search_.bicOf(rest->model)) continue;
+      rest = std::move(tried);
+      least_missed = t;
     }
-    if (!harmful || control_.stop.stop_requested()) return false;
-    drop(*harmful, without(selection, *harmful), judgement);
+    drop(least_missed, *rest, judgement);
     judgement.nats_over_unnamed = selection.ways.empty() ? 0.0 : natsOf(selection.model.model, laws_.beside);
     return true;
   }
@@ -119,9 +126,7 @@ class Judge {
     judgement.dropped.push_back(idOf(search_, selection, term));
     selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
     selection.model = rest;
-    if (selection.ways.size() < 2) selection.alternatives = selection.first;
     if (selection.ways.empty()) selection.model = search_.none();
-    selection.leading = std::min(selection.leading, selection.ways.empty() ? 0 : selection.ways.size() - 1);
   }
 
   void clear(identify::EffectSelection& selection) const {

@@ -1,5 +1,7 @@
 #include "calib/gap/report.h"
 
+#include "calib/gap/verdict.h"
+
 namespace fieldtrue::gap {
 
 std::string_view idOf(GapVerdict verdict) {
@@ -36,6 +38,14 @@ std::string_view idOf(Shape shape) {
 
 bool isNameless(const std::string& effect) {
   return effect == "none" || effect == kUnnamedSmooth || effect == kUnnamedScattered;
+}
+
+std::string howFarOffText(const GapReport& report) {
+  const Remaining& left = report.remaining;
+  return "Half of the readings that no fit saw lie off by less than " + shown(left.p50_mm) +
+         " mm, 90 % of them by less than " + shown(left.p90_mm) + " mm, 95 % by less than " + shown(left.p95_mm) +
+         " mm, and the worst, " + report.names.of(left.worst_node) + ", by " + shown(left.worst_mm) +
+         " mm; noise alone would be " + shown(report.floor_position_mm) + " mm RMS.";
 }
 
 }  // namespace fieldtrue::gap

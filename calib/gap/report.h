@@ -98,6 +98,8 @@ struct GapBin {
 struct Hotspot {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  ///< Tracker frame.
   double radius_m = 0.0;
+  std::optional<double> sd_m;    ///< Of the centre, of all three axes together: by drawing the places again.
+  std::optional<double> half_m;  ///< From the centre, beyond which less than half of the gap there is left.
 };
 
 /// What shape a thing in the room has by how it answers along each of its axes.
@@ -247,5 +249,9 @@ struct GapReport {
   std::vector<std::string> next_separates;
   std::vector<Prediction> predictions;
 };
+
+/// One sentence: how far readings lie off that no fit saw, with the causes that are named added: the middle, 90 and 95
+/// % of them, and the worst.
+std::string howFarOffText(const GapReport& report);
 
 }  // namespace fieldtrue::gap

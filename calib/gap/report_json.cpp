@@ -130,7 +130,9 @@ json whereToJson(const GapReport& report) {
                {"jig_or_time", numberToJson(report.origin.jig_or_time)}}}};
   if (report.hotspot) {
     to["hotspot"] = {{"center_m", vectorToJson(report.hotspot->center_m)},
-                     {"radius_m", numberToJson(report.hotspot->radius_m)}};
+                     {"radius_m", numberToJson(report.hotspot->radius_m)},
+                     {"sd_m", numberToJson(report.hotspot->sd_m)},
+                     {"half_m", numberToJson(report.hotspot->half_m)}};
   }
   if (report.source_shape) to["source_shape"] = sourceShapeToJson(*report.source_shape);
   return to;

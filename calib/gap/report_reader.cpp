@@ -85,7 +85,14 @@ SourceShape sourceShapeFrom(const JsonReader& reader) {
 void readWhere(const JsonReader& reader, GapReport& report) {
   report.nodes = reader["nodes"].list(nodeFrom);
   const JsonReader hotspot = reader["hotspot"];
-  if (!hotspot.isNull()) report.hotspot = Hotspot{vectorFrom(hotspot["center_m"]), hotspot["radius_m"].numberOrNan()};
+  if (!hotspot.isNull()) {
+    const auto ifTold = [&](const char* key) {
+      const auto found = hotspot.find(key);
+      return found ? found->optionalNumber() : std::nullopt;
+    };
+    report.hotspot =
+        Hotspot{vectorFrom(hotspot["center_m"]), hotspot["radius_m"].numberOrNan(), ifTold("sd_m"), ifTold("half_m")};
+  }
   if (const auto shape = reader.find("source_shape"); shape && !shape->isNull())
     report.source_shape = sourceShapeFrom(*shape);
   report.channels = reader["channels"].list([](const JsonReader& channel) {

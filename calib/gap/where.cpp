@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <random>
 
 #include "calib/core/statistics.h"
 #include "calib/core/units.h"
@@ -159,27 +161,88 @@ void describeChannels(const identify::GapRows& table, const GapReport& at, const
   }
 }
 
-void describeHotspot(GapReport& report) {
-  Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
-  double weight = 0.0;
+/// The middle of the rows with at least half the largest excess, weighted by its square.
+/// @param times how often each row counts
+std::optional<Hotspot> hottest(const std::vector<GapNode>& nodes, const std::vector<double>& times) {
   double most = 0.0;
-  for (const GapNode& node : report.nodes) most = std::max(most, node.is_flagged ? node.excess : 0.0);
-  if (!(most > 0.0)) return;
-  for (const GapNode& node : report.nodes) {
-    if (!node.is_flagged || node.excess < 0.5 * most) continue;
-    const double w = node.excess * node.excess;
-    sum_m += w * node.place_m;
-    weight += w;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (nodes[i].is_flagged && times[i] > 0.0) most = std::max(most, nodes[i].excess);
+  if (!(most > 0.0)) return std::nullopt;
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const bool counts = nodes[i].is_flagged && nodes[i].excess >= 0.5 * most;
+    weights.push_back(counts ? times[i] * nodes[i].excess * nodes[i].excess : 0.0);
   }
+  const double weight = std::accumulate(weights.begin(), weights.end(), 0.0);
   Hotspot hotspot;
-  hotspot.center_m = sum_m / weight;
-  double spread = 0.0;
-  for (const GapNode& node : report.nodes) {
-    if (!node.is_flagged || node.excess < 0.5 * most) continue;
-    spread += node.excess * node.excess * (node.place_m - hotspot.center_m).squaredNorm();
+  for (std::size_t i = 0; i < nodes.size(); ++i) hotspot.center_m += weights[i] / weight * nodes[i].place_m;
+  double spread_m2 = 0.0;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    spread_m2 += weights[i] / weight * (nodes[i].place_m - hotspot.center_m).squaredNorm();
+  hotspot.radius_m = std::sqrt(spread_m2);
+  return hotspot;
+}
+
+/// Distance from a row to the nearest other place, 0 where there is none.
+double nearestOther_m(const std::vector<GapNode>& nodes, const Eigen::Vector3d& center_m) {
+  const auto nearer = [&](const GapNode& a, const GapNode& b) {
+    return (a.place_m - center_m).squaredNorm() < (b.place_m - center_m).squaredNorm();
+  };
+  const GapNode& nearest = *std::min_element(nodes.begin(), nodes.end(), nearer);
+  double other_m = std::numeric_limits<double>::infinity();
+  for (const GapNode& node : nodes)
+    if (node.node != nearest.node) other_m = std::min(other_m, (node.place_m - nearest.place_m).norm());
+  return std::isfinite(other_m) ? other_m : 0.0;
+}
+
+/// How far the middle moves when other places are drawn from the same ones, and what lies between them: evenly within
+/// half a pitch, half of it for the three axes together.
+/// @source Efron 1979, Ann. Statist. 7 1
+std::optional<double> centerSd_m(const std::vector<GapNode>& nodes, const Eigen::Vector3d& center_m) {
+  constexpr int kDraws = 200;
+  std::map<int, std::size_t> place_of;
+  for (const GapNode& node : nodes) place_of.emplace(node.node, place_of.size());
+  std::mt19937_64 generator(1);
+  double sum_m2 = 0.0, draws = 0.0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    std::vector<double> drawn(place_of.size(), 0.0);
+    for (std::size_t k = 0; k < drawn.size(); ++k) drawn[generator() % drawn.size()] += 1.0;
+    std::vector<double> times;
+    for (const GapNode& node : nodes) times.push_back(drawn[place_of[node.node]]);
+    const auto again = hottest(nodes, times);
+    if (!again) continue;
+    sum_m2 += (again->center_m - center_m).squaredNorm();
+    draws += 1.0;
   }
-  hotspot.radius_m = std::sqrt(spread / weight);
-  report.hotspot = hotspot;
+  if (draws < 0.25 * kDraws) return std::nullopt;
+  return std::hypot(std::sqrt(sum_m2 / draws), 0.5 * nearestOther_m(nodes, center_m));
+}
+
+/// Where, going away from the middle, the gap of the nearest rows (RMS, in floors) has fallen to half.
+std::optional<double> halfDistance_m(const std::vector<GapNode>& nodes, const Eigen::Vector3d& center_m) {
+  std::vector<std::pair<double, double>> rows;  // Distance, squared excess.
+  for (const GapNode& node : nodes) rows.emplace_back((node.place_m - center_m).norm(), node.excess * node.excess);
+  std::sort(rows.begin(), rows.end());
+  const std::size_t together = std::max<std::size_t>(3, rows.size() / 20);
+  if (rows.size() < 3 * together) return std::nullopt;
+  double first = 0.0;
+  for (std::size_t from = 0; from + together <= rows.size(); ++from) {
+    double square = 0.0, distance_m = 0.0;
+    for (std::size_t k = from; k < from + together; ++k) {
+      square += rows[k].second / static_cast<double>(together);
+      distance_m += rows[k].first / static_cast<double>(together);
+    }
+    if (from == 0) first = square;
+    if (square < 0.25 * first) return distance_m;
+  }
+  return std::nullopt;
+}
+
+void describeHotspot(GapReport& report) {
+  report.hotspot = hottest(report.nodes, std::vector<double>(report.nodes.size(), 1.0));
+  if (!report.hotspot) return;
+  report.hotspot->sd_m = centerSd_m(report.nodes, report.hotspot->center_m);
+  report.hotspot->half_m = halfDistance_m(report.nodes, report.hotspot->center_m);
 }
 
 }  // namespace

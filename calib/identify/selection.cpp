@@ -41,6 +41,13 @@ class Selector {
     return finished(std::move(selection), first);
   }
 
+  void rankAnew(EffectSelection& selection) {
+    selection.alternatives = selection.first;
+    selection.leading = 0;
+    if (selection.ways.size() > 1) rankAlternatives(selection);
+    holdLeading(selection);
+  }
+
  private:
   /// What GapSearch::rank makes of a model. Exchanging effects and looking for the leading one ask for the same again.
   const std::vector<TriedEffect>& ranked(const RefinedModel& base) {
@@ -102,6 +109,7 @@ class Selector {
     selection.alternatives = first;
     if (selection.ways.size() > 1) findLeading(selection);
     if (selection.ways.size() == 1) takeOver(selection);
+    holdLeading(selection);
     selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
     return selection;
   }
@@ -157,18 +165,10 @@ class Selector {
     }
   }
 
-  /// A single effect that exchanging and dropping ended at may be fitted better than when it was first tried, or worse
-  /// than another alone.
+  /// A single effect that exchanging and dropping ended at may be worse than another alone.
   void takeOver(EffectSelection& selection) const {
     const double gain = none_bic_ - search_.bicOf(selection.model.model);
     const effects::Effect* effect = search_.ways()[selection.ways.front()].effect;
-    for (TriedEffect& tried : selection.alternatives) {
-      if (search_.ways()[tried.way].effect != effect || tried.bic_gain >= gain) continue;
-      tried.way = selection.ways.front();
-      tried.refined = selection.model;
-      tried.model = selection.model.model;
-      tried.bic_gain = gain;
-    }
     const TriedEffect* best = firstWorth(selection.alternatives, gain + thresholds_.least_gain_exchange);
     if (best == nullptr || search_.ways()[best->way].effect == effect) return;
     selection.ways.clear();
@@ -177,6 +177,16 @@ class Selector {
 
   /// The effect whose absence costs most leads; the candidates are its alternatives with the others present.
   void findLeading(EffectSelection& selection) {
+    rankAlternatives(selection);
+    const double bic = search_.bicOf(selection.model.model);
+    const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
+    if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) return;
+    selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+    add(*best, selection);
+    selection.leading = selection.ways.size() - 1;
+  }
+
+  void rankAlternatives(EffectSelection& selection) {
     double most = -std::numeric_limits<double>::infinity();
     RefinedModel rest;
     for (std::size_t term = 0; term < selection.ways.size(); ++term) {
@@ -189,12 +199,24 @@ class Selector {
       }
     }
     selection.alternatives = ranked(rest);
-    const double bic = search_.bicOf(selection.model.model);
-    const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
-    if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) return;
-    selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(selection.leading));
-    add(*best, selection);
-    selection.leading = selection.ways.size() - 1;
+  }
+
+  /// Among the alternatives the leading effect stands as it was selected, where that is the better fit: it was tried
+  /// before the others were there.
+  void holdLeading(EffectSelection& selection) const {
+    if (selection.ways.empty()) return;
+    const std::size_t leading = selection.ways[selection.leading];
+    const RefinedModel rest = without(selection, selection.leading);
+    const double gain = search_.bicOf(rest.model) - search_.bicOf(selection.model.model);
+    for (TriedEffect& tried : selection.alternatives) {
+      if (search_.ways()[tried.way].effect != search_.ways()[leading].effect || tried.bic_gain >= gain) continue;
+      GapModel last = withoutTerm(selection.model.model, selection.leading);
+      last.terms.push_back(selection.model.model.terms[selection.leading]);
+      tried.way = leading;
+      tried.refined = search_.refined(last);
+      tried.model = tried.refined.model;
+      tried.bic_gain = gain;
+    }
   }
 
   struct Ranked {
@@ -216,6 +238,10 @@ class Selector {
 EffectSelection selectEffects(const GapSearch& search, const EffectSelectionOptions& options,
                               const RunControl& control) {
   return Selector(search, options, control).run();
+}
+
+void rankAnew(const GapSearch& search, EffectSelection& selection, const RunControl& control) {
+  Selector(search, {}, control).rankAnew(selection);
 }
 
 }  // namespace fieldtrue::identify

@@ -23,4 +23,8 @@ struct EffectSelectionOptions {
 EffectSelection selectEffects(const GapSearch& search, const EffectSelectionOptions& options,
                               const RunControl& control);
 
+/// Which of the selected effects leads, and its alternatives, where effects were taken out since they were selected; as
+/// selectEffects leaves them.
+void rankAnew(const GapSearch& search, EffectSelection& selection, const RunControl& control);
+
 }  // namespace fieldtrue::identify

@@ -6,7 +6,9 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "calib/effects/course.h"
 #include "calib/field/dipole_field.h"
 #include "calib/identify/origin.h"
 #include "calib/identify/traces.h"
@@ -63,6 +65,8 @@ class BasisBuilder {
     const auto budget = static_cast<int>(at.size() / 2 - at.nuisance().cols());
     while (degree_ > 1 && 3 * degree_ * (degree_ + 2) + 60 > budget) --degree_;
     has_bend_ = 3 * degree_ * (degree_ + 2) + 60 <= budget;
+    const std::vector<std::size_t> stretches = effects::stretchesFor(settings.size());
+    if (!stretches.empty() && last_s_ > first_s_) course_.emplace(first_s_, last_s_, stretches.back());
   }
 
   Basis build() const {
@@ -162,7 +166,14 @@ class BasisBuilder {
     if (!rows_.has_times || last_s_ <= first_s_) return list;
     const double t = 2.0 * (s.time_s - first_s_) / (last_s_ - first_s_) - 1.0;
     const Eigen::Matrix3d G = field::dipoleField(s.tracker_from_sensor.position_m, 1.0);
-    for (const double shape : {t, t * t, t * t * t}) {
+    std::vector<double> courses{t, t * t, t * t * t};
+    if (course_) {
+      courses.assign(course_->times_s().size() - 1, 0.0);  // What is level at first is the transmitter's.
+      course_->weigh(s.time_s, [&](std::size_t k, double share) {
+        if (k > 0) courses[k - 1] = share;
+      });
+    }
+    for (const double shape : courses) {
       field::EffectResponse gain;
       gain.field_per_m3 = shape * G;
       list.push_back(gain);
@@ -181,6 +192,7 @@ class BasisBuilder {
   Eigen::AlignedBox3d rig_;
   double first_s_ = std::numeric_limits<double>::infinity();
   double last_s_ = -std::numeric_limits<double>::infinity();
+  std::optional<effects::Course> course_;  ///< Of the gain, where there are rows enough.
   int degree_ = 3;
   bool has_bend_ = true;
 };

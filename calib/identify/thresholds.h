@@ -131,7 +131,7 @@ struct Thresholds {
   /// SD of a centre as a share of the thing's size; of a loop 2 times that times radius / sqrt 2. Set on open sessions,
   /// by coverage.
   double share_of_size = 0.12;
-  /// SD of a plane's place as a share of its distance. Set on open sessions, by coverage.
+  /// SD of a plane's place as a share of its distance; of its strength 3 times that. Set on open sessions, by coverage.
   double share_of_distance = 0.03;
   /// None of these SDs is above [m]. Set by reason.
   double widest_place_m = 0.3;
@@ -168,6 +168,11 @@ struct Thresholds {
   /// Share of the variance without any reading, below which the earlier recording knows the field at a place. Set by
   /// reason: the SD is half.
   double far_surer = 0.25;
+  /// SDs that a reading must lie from what the earlier recording foretells to be astray: no slip of a placing that is
+  /// as stated. Set on pairs of simulated recordings without a change, by false alarms.
+  double far_off = 10.0;
+  /// Places astray from which that may be a change. Set by reason: fewer are slips of the hand.
+  std::size_t fewest_far_off = 3;
   /// How far a rig stands from where it stood, from which that is told [mm]. Set by reason: a foot set on a mark.
   double told_rig_moved_mm = 5.0;
   /// The same of its turn [degrees]. Set by reason.

@@ -69,6 +69,8 @@ const std::array kDeciding = {
     one<&Thresholds::least_separation>("least_separation", false),
     one<&Thresholds::sure_of_change>("sure_of_change", false),
     one<&Thresholds::far_surer>("far_surer", false),
+    one<&Thresholds::far_off>("far_off", false),
+    one<&Thresholds::fewest_far_off>("fewest_far_off", false),
     one<&Thresholds::told_rig_moved_mm>("told_rig_moved_mm", false),
     one<&Thresholds::told_rig_turned_deg>("told_rig_turned_deg", false),
     one<&Thresholds::told_scatter>("told_scatter", false),

@@ -30,6 +30,7 @@ void GapInspector::setReport(const std::optional<gap::GapReport>& report) {
     view->setChart(chart);
     layout_->addWidget(view);
   }
+  addText("gapHowFarOff", QString::fromStdString(gap::howFarOffText(*report)));
   if (report->replicates) addText("gapTrust", QString::fromStdString(report->replicates->text));
   const std::string prediction = predictionText(*report);
   if (!prediction.empty()) addText("gapPrediction", tr("To be checked: %1").arg(QString::fromStdString(prediction)));

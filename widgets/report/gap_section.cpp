@@ -115,6 +115,7 @@ void writeFields(HtmlWriter& html, const gap::GapReport& report, const DrawPictu
 void writeDiagnosis(HtmlWriter& html, const gap::GapReport& report, const DrawPictures& draw,
                     const CalibrationTable* table) {
   html.element("p", report.text, {{"class", "lead"}});
+  html.element("p", gap::howFarOffText(report));
   if (!report.next_measurement.empty()) html.element("p", "Next measurement: " + report.next_measurement);
   if (report.replicates) html.element("p", report.replicates->text);
   const std::string prediction = predictionText(report);

@@ -1,6 +1,7 @@
 #include <QTest>
 #include <cmath>
 
+#include "calib/effects/registry.h"
 #include "calib/effects/rows.h"
 #include "tests/calib/effects/fit_designs.h"
 #include "tests/calib/effects/reading_of.h"
@@ -38,6 +39,9 @@ class GainDriftTest : public QObject {
   void movesReadingsAsTheGainDoes();
   void tellsTheDriftOverTheSession();
   void isTriedFromShortToLongWarmUps();
+  void isTriedInStretchesThatHaveRowsEnough();
+  void refusesACourseThatIsNone_data();
+  void refusesACourseThatIsNone();
 };
 
 void GainDriftTest::followsItsFormula_data() {
@@ -55,6 +59,12 @@ void GainDriftTest::followsItsFormula_data() {
   QTest::newRow("clock of another day") << QByteArray(
                                                R"({"amplitude": 0.02, "time_constant_s": 600, "start_s": 1.7e9})")
                                         << 1.7e9 + 600.0 << 0.02 / std::exp(1.0);
+  const QByteArray course(R"({"course_times_s": [100, 200, 600], "course_gains": [0.01, -0.02, 0.06]})");
+  QTest::newRow("course, before it") << course << 50.0 << 0.01;
+  QTest::newRow("course, half of a stretch") << course << 150.0 << -0.005;
+  QTest::newRow("course, a quarter of a longer one") << course << 300.0 << 0.0;
+  QTest::newRow("course, at a moment") << course << 200.0 << -0.02;
+  QTest::newRow("course, after it") << course << 900.0 << 0.06;
 }
 
 void GainDriftTest::followsItsFormula() {
@@ -96,6 +106,46 @@ void GainDriftTest::isTriedFromShortToLongWarmUps() {
     const double ratio = starts[i][0] / starts[i - 1][0];
     QVERIFY2(ratio > 1.0 && ratio < 2.0, qPrintable(QString::number(ratio)));
   }
+}
+
+// 100 rows from 20 s to 614 s: twelve for each of 4 or 8 stretches, not of 16; the second of four ends at 317 s.
+void GainDriftTest::isTriedInStretchesThatHaveRowsEnough() {
+  const OwnedDesign owned = gridDesign({Eigen::Quaterniond::Identity()}, true, false);
+  std::vector<std::string> names;
+  for (const auto& way : findEffect("gain_drift").value()->fits(owned.design)) names.push_back(way->name());
+  QVERIFY((names == std::vector<std::string>{"linear", "exponential", "quadratic", "course_of_4", "course_of_8"}));
+  const FittedEffect fitted =
+      wayOf("gain_drift", owned.design, "course_of_4")->describe({}, Eigen::Vector4d(0.01, 0.03, -0.01, 0.02));
+  const auto effect = effectOf("gain_drift", fitted.parameters);
+  FT_VERIFY_MATCH(near(gainAt(*effect, 20.0), 0.0, 1e-12));
+  FT_VERIFY_MATCH(near(gainAt(*effect, 317.0), 0.03, 1e-12));
+  FT_VERIFY_MATCH(near(gainAt(*effect, 614.0), 0.02, 1e-12));
+  FT_VERIFY_MATCH(near(gainAt(*effect, 94.25), 0.005, 1e-12));
+  QCOMPARE(fitted.values.at(1).name, std::string("gain_after_2_of_4"));
+}
+
+void GainDriftTest::refusesACourseThatIsNone_data() {
+  QTest::addColumn<QByteArray>("parameters");
+  QTest::addColumn<QByteArray>("needed");
+  QTest::newRow("lengths") << QByteArray(R"({"course_times_s": [0, 1, 2], "course_gains": [0.1, 0.2]})")
+                           << QByteArray("course_times_s has 3 numbers and course_gains 2");
+  QTest::newRow("twice the same moment") << QByteArray(
+                                                R"({"course_times_s": [0, 5, 5], "course_gains": [0.0, 0.1, 0.2]})")
+                                         << QByteArray("must rise");
+  QTest::newRow("falling") << QByteArray(R"({"course_times_s": [5, 1], "course_gains": [0.0, 0.1]})")
+                           << QByteArray("must rise");
+}
+
+void GainDriftTest::refusesACourseThatIsNone() {
+  QFETCH(QByteArray, parameters);
+  QFETCH(QByteArray, needed);
+  const Effect& drift = *findEffect("gain_drift").value();
+  const auto resolved = resolveEffectParameters(drift, nlohmann::json::parse(parameters.toStdString()));
+  FT_VERIFY_OK(resolved);
+  const auto made = drift.make(*resolved, {});
+  QVERIFY(!made.has_value());
+  QCOMPARE(made.error().code, ErrorCode::kBadInput);
+  FT_VERIFY_MATCH(holdsAll(made.error().message, {needed}));
 }
 
 FIELDTRUE_TEST(GainDriftTest)

@@ -80,7 +80,6 @@ class ChangeTest : public QObject {
     }
   }
 
-  /// The rig set down 4 cm beside and turned by 3 degrees: a finding, and no change of the field.
   /// What no smooth field is may still be none of placing.
   void whatScattersIsNotNothing() {
     const CalibrationTable before = recordedIn(gapScene(), gapPlan(), 1);
@@ -98,20 +97,31 @@ class ChangeTest : public QObject {
     QVERIFY(report->against->p_value < 1e-3);
   }
 
-  /// A sphere 9 cm from a corner of the grid takes that place off by half a metre, and the next ones by centimetres.
+  /// A sphere 9 cm from a corner of the grid takes that place off by half a metre, and the next ones by centimetres:
+  /// carried there, or away.
+  void whatBendsACornerIsAChange_data() {
+    QTest::addColumn<bool>("is_gone");
+    QTest::newRow("came") << false;
+    QTest::newRow("went") << true;
+  }
   void whatBendsACornerIsAChange() {
+    QFETCH(bool, is_gone);
     simulation::Scene scene;
     scene.rig.tolerance_m = 0.0005;
     std::vector<PlannedPlace> plan = gapPlan({.counts = {5, 5, 4}, .pitch_m = 0.15});
     for (PlannedPlace& place : plan) place.reference_from_sensor.position_m += Eigen::Vector3d(0.3, -0.3, -0.2);
-    const CalibrationTable before = recordedIn(scene, plan, 3);
+    const CalibrationTable without = recordedIn(scene, plan, 3);
     scene.effects = {effect("compact_metal", R"({"center_m": [0.95, 0.35, 0.3], "radius_m": 0.08})")};
-    const auto report = since(before, recordedIn(scene, plan, 4));
+    const CalibrationTable with = recordedIn(scene, plan, 4);
+    const auto report = is_gone ? since(with, without) : since(without, with);
     FT_VERIFY_OK(report);
     QVERIFY2(report->against->changed && report->verdict != GapVerdict::kNoGap, report->text.c_str());
-    QVERIFY(report->against->effect == "compact_metal");
+    QCOMPARE(report->against->effect, std::string("compact_metal"));
+    QCOMPARE(report->text.find("Something is gone") == 0, is_gone);
+    FT_VERIFY_MATCH(near(*report->against->location_m, {0.95, 0.35, 0.3}, 0.1));
   }
 
+  /// The rig set down 4 cm beside and turned by 3 degrees: a finding, and no change of the field.
   void aRigSetDownAnewIsNoChange() {
     const simulation::Scene room = roomWith({effect("metal_plane", kFloorThen)});
     const CalibrationTable before = recordedIn(room, gapPlan(), 1);

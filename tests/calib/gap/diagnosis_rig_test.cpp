@@ -45,6 +45,31 @@ class DiagnosisRigTest : public QObject {
     FT_VERIFY_MATCH(names(*report, effect.toStdString()));
   }
 
+  /// A gain that rises, falls below where it was and rises again follows no formula; its course is told.
+  void followsADriftThatWanders() {
+    const std::vector<PlannedPlace> plan = gapPlan({.counts = {6, 5, 4}});
+    simulation::Scene scene = gapScene();
+    const double end_s = recordedIn(scene, plan).nodes.back().t_end_s.value();
+    const std::vector<double> shares{0.0, 0.3, 0.6, 1.0}, gains{0.0, 0.05, -0.03, 0.04};
+    nlohmann::json parameters{{"course_gains", gains}};
+    for (const double share : shares) parameters["course_times_s"].push_back(share * end_s);
+    scene.effects.push_back({"gain_drift", parameters});
+    const auto report = diagnose(recordedIn(scene, plan, 2), nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    FT_VERIFY_MATCH(names(*report, "gain_drift"));
+    QVERIFY2(report->remaining.fraction < 0.05, report->text.c_str());
+    const nlohmann::json found = report->selected.front().scene_parameters;
+    const auto times_s = found.at("course_times_s").get<std::vector<double>>();
+    QVERIFY(times_s.size() > 4);
+    for (std::size_t k = 0; k < times_s.size(); ++k) {
+      const double share = times_s[k] / end_s;
+      const std::size_t s = share < shares[1] ? 0 : share < shares[2] ? 1 : 2;
+      const double gain = gains[s] + (gains[s + 1] - gains[s]) * (share - shares[s]) / (shares[s + 1] - shares[s]);
+      // 1 mm of placing at 0.9 m is a third of a percent of gain; a stretch has fifteen rows, and rounds the corners.
+      FT_VERIFY_MATCH(near(found.at("course_gains").at(k).get<double>(), gain, 0.008));
+    }
+  }
+
   /// Where the rig states the transmitter's place, what contradicts it is a finding.
   void namesWhatContradictsAStatedAlignment_data() {
     QTest::addColumn<QByteArray>("effect");

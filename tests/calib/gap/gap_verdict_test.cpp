@@ -48,6 +48,20 @@ class GapVerdictTest : public QObject {
     QVERIFY(verdictOf(leaving(value, low90), false, true, {}) == GapVerdict::kUnexplained);
     QVERIFY(verdictOf(leaving(value, low90), false, false, {}) == GapVerdict::kNoGap);
   }
+
+  void tellsHowFarReadingsLieOff() {
+    GapReport report;
+    report.floor_position_mm = 1.44;
+    report.remaining.p50_mm = 2.13;
+    report.remaining.p90_mm = 3.98;
+    report.remaining.p95_mm = 4.57;
+    report.remaining.worst_mm = 12.4;
+    report.remaining.worst_node = 17;
+    QCOMPARE(
+        howFarOffText(report),
+        std::string("Half of the readings that no fit saw lie off by less than 2.1 mm, 90 % of them by less than 4 "
+                    "mm, 95 % by less than 4.6 mm, and the worst, P17, by 12 mm; noise alone would be 1.4 mm RMS."));
+  }
 };
 
 FIELDTRUE_TEST(GapVerdictTest)

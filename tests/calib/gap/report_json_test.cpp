@@ -62,7 +62,7 @@ GapReport someReport() {
   node.excess = 9.5;
   node.is_flagged = true;
   report.nodes = {node};
-  report.hotspot = Hotspot{Eigen::Vector3d(1, 2, 3), 0.4};
+  report.hotspot = Hotspot{Eigen::Vector3d(1, 2, 3), 0.4, 0.05, 0.25};
   report.source_shape = SourceShape{Shape::kIronBar, Eigen::Vector3d(1, 2, 4), Eigen::Vector3d(0.5, 0.25, 0.125),
                                     Eigen::Vector3d(0.0625, 0.03125, 0.015625), Eigen::Matrix3d::Identity()};
   report.channels = {{"radial", "mm", 3.5, 0.5}};
@@ -121,7 +121,7 @@ class GapJsonTest : public QObject {
                                  "node visit gap_mm gap_deg excess flagged place_m before_mm "
                                  "after_mm")
                                  .split(' ');
-    QTest::newRow("hotspot") << "/where/hotspot" << QStringList{"center_m", "radius_m"};
+    QTest::newRow("hotspot") << "/where/hotspot" << QStringList{"center_m", "radius_m", "sd_m", "half_m"};
     QTest::newRow("shape") << "/where/source_shape"
                            << QString("shape center_m polarizabilities_m3 sd_m3 axes").split(' ');
     QTest::newRow("channel") << "/where/channels/0" << QString("name rms unit floor").split(' ');

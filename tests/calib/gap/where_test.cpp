@@ -96,6 +96,36 @@ class GapWhereTest : public QObject {
     const GapReport report = whereIn(identify::makeGapRows(nodes, {}).value());
     QVERIFY(report.hotspot.has_value());
     FT_VERIFY_MATCH(near(report.hotspot->center_m, corner_m, 0.2));
+    // exp(-(r / 0.2)^2) is a half at 0.2 sqrt(ln 2) = 0.17 m from the corner; the middle lies up to a pitch within.
+    QVERIFY(report.hotspot->sd_m && *report.hotspot->sd_m > 0.005 && *report.hotspot->sd_m < kCubePitch_m);
+    QVERIFY(report.hotspot->half_m && std::abs(*report.hotspot->half_m - 0.17) < kCubePitch_m);
+  }
+
+  /// How far the middle is off from draw to draw of noise and places is what is stated of it.
+  void statesHowFarTheHotSpotMayLieOff() {
+    std::vector<Eigen::Vector3d> centers_m;
+    double stated_m2 = 0.0;
+    for (unsigned seed = 1; seed <= 60; ++seed) {
+      std::vector<PlannedPlace> plan = gapPlan({.counts = {5, 5, 5}, .pitch_m = 0.15, .is_scattered = true}, seed);
+      CalibrationTable table = recordedIn(gapScene(), plan, seed);
+      for (Node& node : table.nodes) {
+        const Eigen::Vector3d p_m = node.reference_from_sensor.position_m;
+        const double away = (p_m - Eigen::Vector3d(0.3, 0.3, 0.3)).norm() / 0.15;
+        node.tracker_from_sensor.position_m += 0.05 * std::exp(-away * away) * Eigen::Vector3d(0.6, 0.0, 0.8);
+      }
+      const GapReport report = whereIn(identify::makeGapRows(table.nodes, table.metadata).value());
+      if (!report.hotspot || !report.hotspot->sd_m) continue;  // No place was drawn near enough.
+      centers_m.push_back(report.hotspot->center_m);
+      stated_m2 += *report.hotspot->sd_m * *report.hotspot->sd_m;
+    }
+    const auto n = static_cast<double>(centers_m.size());
+    QVERIFY2(n >= 45, std::to_string(n).c_str());
+    Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& center_m : centers_m) middle_m += center_m / n;
+    double off_m2 = 0.0;
+    for (const Eigen::Vector3d& center_m : centers_m) off_m2 += (center_m - middle_m).squaredNorm() * n / (n - 1.0);
+    const double ratio = std::sqrt(stated_m2 / off_m2);
+    QVERIFY2(ratio > 0.7 && ratio < 1.8, std::to_string(ratio).c_str());
   }
 
   /// Splitting a vector into components keeps its length, and bins share the rows out.

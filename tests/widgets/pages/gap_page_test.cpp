@@ -155,6 +155,7 @@ void GapPageTest::showsWhatTheReportSays() {
            QStringLiteral("Partly explained: ") + QString::fromStdString(effectLabel("compact_metal")));
   QCOMPARE(textOf(*page, "gapSentence"), QString::fromStdString(report.text));
   QVERIFY(textOf(*page, "gapNext").contains(QString::fromStdString(report.next_measurement)));
+  QVERIFY(textOf(*page, "gapHowFarOff").contains(QStringLiteral("readings that no fit saw lie off by less than")));
   QVERIFY(textOf(*page, "gapPrediction").contains(QStringLiteral("P2 falls from 31 to 12 +- 4 mm")));
 
   const GapBarChart& probability = chart(*page, "probability");
