@@ -41,7 +41,7 @@ class Course {
 inline std::vector<std::size_t> stretchesFor(std::size_t rows) {
   constexpr std::size_t kFewestRows = 12;
   std::vector<std::size_t> numbers;
-  for (const std::size_t stretches : {4, 8, 16, 32})
+  for (const std::size_t stretches : {4U, 8U, 16U, 32U})
     if (rows >= kFewestRows * stretches) numbers.push_back(stretches);
   return numbers;
 }
