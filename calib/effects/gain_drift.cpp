@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kPlausibleGain = 0.1;
 constexpr double kPlausibleDrift = 0.2;  ///< Cold amplifiers may warm up by a tenth and more.
-constexpr double kShortest = 0.02;  ///< Time constant over the length of the session.
+constexpr double kShortest = 0.02;       ///< Time constant over the length of the session.
 constexpr double kLongest = 2.0;
 constexpr int kStarts = 10;
 

@@ -224,7 +224,7 @@ struct GapReport {
   std::optional<double> orientation_rms_deg;
   double floor_position_mm = 0.0;
   std::optional<double> floor_orientation_deg;
-  double ratio_to_floor = 0.0;
+  double ratio_to_floor = 0.0;  ///< RMS over rows and channels, each in units of its own noise.
   double p_value = 1.0;
   std::vector<GapNode> nodes;
   PlaceNames names;  ///< What the places are called; not in the document.

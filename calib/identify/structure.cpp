@@ -69,7 +69,20 @@ class BasisBuilder {
     if (!stretches.empty() && last_s_ > first_s_) course_.emplace(first_s_, last_s_, stretches.back());
   }
 
+  /// No columns at all where these would leave next to nothing of so few rows: what is left would not tell the noise.
   Basis build() const {
+    Basis basis = whole();
+    const auto most = static_cast<Eigen::Index>(kMostOfResiduals * static_cast<double>(at_.size()));
+    if (basis.columns.cols() + at_.nuisance().cols() <= most) return basis;
+    basis.columns.resize(at_.size(), 0);
+    basis.begin = {};
+    return basis;
+  }
+
+ private:
+  static constexpr double kMostOfResiduals = 0.9;
+
+  Basis whole() const {
     Basis basis;
     std::vector<std::vector<field::EffectResponse>> groups(kGroups);
     std::array<std::size_t, kGroups> counts{};
@@ -94,7 +107,6 @@ class BasisBuilder {
     return basis;
   }
 
- private:
   static Eigen::Vector3d inRig(const field::SensorSetting& s) {
     return inverse(s.tracker_from_reference) * s.tracker_from_sensor.position_m;
   }
