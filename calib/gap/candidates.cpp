@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "calib/gap/probabilities.h"
 #include "calib/identify/profile.h"
 
 namespace fieldtrue::gap {
@@ -199,92 +199,6 @@ void findEquivalents(const identify::GapSearch& search, const identify::EffectSe
         candidates[a].equivalents.push_back(candidates[b].effect);
     }
   }
-}
-
-/// The most evidence that causes which are not named may have, where others are: each was refused for a reason, so
-/// none is likelier than what is named, and what nobody would believe is less likely by what that costs.
-struct MostEvidence {
-  double plausible = std::numeric_limits<double>::infinity();
-  double implausible = std::numeric_limits<double>::infinity();
-
-  double of(const GapCandidate& c) const {
-    return isNameless(c.effect) ? c.bic_gain : std::min(c.bic_gain, c.is_plausible ? plausible : implausible);
-  }
-};
-
-/// @param candidates one of them as the leading effect that is named, if any is
-MostEvidence mostEvidence(const identify::GapSearch& search, const identify::EffectSelection& selection,
-                          const std::vector<GapCandidate>& candidates) {
-  if (selection.ways.empty()) return {};
-  const std::string& leading = search.ways()[selection.ways[selection.leading]].effect->id;
-  for (const GapCandidate& c : candidates)
-    if (c.effect == leading) return {c.bic_gain, c.bic_gain - search.thresholds().implausible_cost};
-  return {};
-}
-
-/// What does not help on places it was not fitted to counts for less; where nothing was worth selecting, nothing is
-/// likelier than none.
-double evidenceOf(const GapCandidate& c, bool is_any_fit, const MostEvidence& most,
-                  const identify::Thresholds& thresholds) {
-  if (isNameless(c.effect)) return c.bic_gain;
-  const double evidence = most.of(c) - (c.shrinkage.fraction <= 0.0 ? thresholds.cost_of_failing : 0.0);
-  return is_any_fit ? evidence : std::min(evidence, 0.0) - thresholds.cost_of_unselected;
-}
-
-/// Two names of one thing, as a wrong scale of the rig and of the tracker: the first carries the probability of both.
-void joinExactTwins(const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
-  for (std::size_t a = 0; a < candidates.size(); ++a) {
-    for (std::size_t b = a + 1; b < candidates.size(); ++b) {
-      const auto& names = candidates[a].equivalents;
-      const bool is_twin = std::find(names.begin(), names.end(), candidates[b].effect) != names.end() &&
-                           std::abs(candidates[a].bic_gain - candidates[b].bic_gain) < thresholds.twin_evidence;
-      if (!is_twin) continue;
-      candidates[a].probability += candidates[b].probability;
-      candidates[b].probability = 0.0;
-    }
-  }
-}
-
-double unknownShareOf(const GapCandidate& c, const identify::Thresholds& thresholds) {
-  if (c.effect == "none") return thresholds.unknown_as_none;
-  if (isNameless(c.effect)) return 0.0;
-  return c.location_m ? thresholds.unknown_as_thing : thresholds.unknown_as_other;
-}
-
-/// What the catalogue does not hold is taken for a cause that it holds, or for nothing, in part of all recordings: that
-/// part of the probability goes to a cause without a name, which does not become the first by it.
-void leaveRoomForTheUnknown(const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
-  const auto by_probability = [](const GapCandidate& a, const GapCandidate& b) {
-    return a.probability < b.probability;
-  };
-  const auto first = std::max_element(candidates.begin(), candidates.end(), by_probability);
-  const auto unnamed = std::find_if(candidates.begin(), candidates.end(),
-                                    [](const GapCandidate& c) { return c.effect == kUnnamedSmooth; });
-  if (unnamed == candidates.end() || first == unnamed) return;
-  double unknown = 0.0;
-  for (const GapCandidate& c : candidates) unknown += unknownShareOf(c, thresholds) * c.probability;
-  const double lead = first->probability - unnamed->probability;
-  const double closing = unknown + unknownShareOf(*first, thresholds) * first->probability;
-  const double part = closing < lead ? 1.0 : 0.999 * lead / closing;
-  for (GapCandidate& c : candidates) c.probability *= 1.0 - part * unknownShareOf(c, thresholds);
-  unnamed->probability += part * unknown;
-}
-
-void setProbabilities(bool is_any_fit, const MostEvidence& most_of, const identify::Thresholds& thresholds,
-                      std::vector<GapCandidate>& candidates) {
-  const auto evidence = [&](const GapCandidate& c) { return evidenceOf(c, is_any_fit, most_of, thresholds); };
-  double most = 0.0;
-  for (const GapCandidate& c : candidates) most = std::max(most, evidence(c));
-  double sum = 0.0;
-  for (GapCandidate& c : candidates) {
-    c.probability = std::exp(0.5 * (evidence(c) - most) / thresholds.temperature);
-    sum += c.probability;
-  }
-  for (GapCandidate& c : candidates) c.probability /= sum;
-  joinExactTwins(thresholds, candidates);
-  leaveRoomForTheUnknown(thresholds, candidates);
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const GapCandidate& a, const GapCandidate& b) { return a.probability > b.probability; });
 }
 
 Shrinkage shrinkageOf(double before_m2, double after_m2, const Bounded& left) {
