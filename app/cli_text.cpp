@@ -77,6 +77,8 @@ std::string surroundingsText(const evaluation::Comparison& comparison) {
   for (const std::string& line :
        {widgets::truenessText(comparison), comparison.coverage ? comparison.coverage->text : std::string(),
         comparison.fold_back ? comparison.fold_back->text : std::string(),
+        comparison.orientation_cover ? comparison.orientation_cover->text : std::string(),
+        comparison.position_dependence ? comparison.position_dependence->text : std::string(),
         comparison.orientation_dependence ? comparison.orientation_dependence->text : std::string(),
         widgets::sensorsText(comparison), widgets::resamplingText(comparison)})
     if (!line.empty()) text += line + "\n";

@@ -14,6 +14,7 @@
 #include "calib/core/run_control.h"
 #include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/error_stats.h"
+#include "calib/evaluation/orientation/orientation_cover.h"
 #include "calib/evaluation/orientation/orientation_dependence.h"
 #include "calib/evaluation/region/coverage.h"
 #include "calib/evaluation/region/fold_back.h"
@@ -188,10 +189,13 @@ struct Comparison {
   std::string best_orientation = "none";
   Verdict verdict;
   Trueness trueness;
-  std::optional<Coverage> coverage;   ///< These need ComparisonOptions::with_surroundings.
-  std::optional<FoldBack> fold_back;  ///< With the best position method fitted to all rows it may see.
-  std::optional<OrientationDependence> orientation_dependence;  ///< None without orientation.
-  std::vector<ResamplingError> resampling;                      ///< Empty for places in one plane.
+  std::optional<Coverage> coverage;                   ///< These need ComparisonOptions::with_surroundings.
+  std::optional<FoldBack> fold_back;                  ///< With the best position method fitted to all rows it may see.
+  std::optional<OrientationCover> orientation_cover;  ///< None without orientation; the next two likewise.
+  /// Whether the errors depend on how the sensor is held.
+  std::optional<OrientationDependence> position_dependence;
+  std::optional<OrientationDependence> orientation_dependence;
+  std::vector<ResamplingError> resampling;  ///< Empty for places in one plane.
   /// Of the best methods, or of those that come nearest where none beats the error before; none with one sensor.
   std::optional<SensorSplit> split;
   std::optional<SensorSplit> orientation_split;

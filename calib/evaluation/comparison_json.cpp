@@ -168,6 +168,8 @@ json toJson(const Comparison& comparison) {
           {"trueness", truenessToJson(comparison)},
           {"coverage", partToJson(comparison.coverage)},
           {"fold_back", partToJson(comparison.fold_back)},
+          {"orientation_cover", partToJson(comparison.orientation_cover)},
+          {"position_dependence", partToJson(comparison.position_dependence)},
           {"orientation_dependence", partToJson(comparison.orientation_dependence)},
           {"resampling", resamplingToJson(comparison.resampling)},
           {"sensors", sensorsToJson(comparison.before_sensors)},

@@ -59,6 +59,15 @@ std::vector<ResamplingError> resamplingErrors(const Comparison& comparison, cons
   return errors;
 }
 
+/// None where it cannot be asked.
+Result<std::optional<OrientationDependence>> dependenceOn(const HeldOutJob& job, PosePart part,
+                                                          const RunControl& control) {
+  auto dependence = orientationDependence({job.metadata, job.nodes}, part, job.seed, control);
+  if (dependence) return std::optional(*std::move(dependence));
+  if (dependence.error().code == ErrorCode::kCancelled) return tl::unexpected(dependence.error());
+  return std::optional<OrientationDependence>();
+}
+
 }  // namespace
 
 Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& table, const HeldOutJob& job,
@@ -74,9 +83,9 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   judgePlaces(comparison);
   if (auto going = unlessStopped(control, 0.4); !going) return going;
   if (job.has_orientation) {
-    auto dependence = orientationDependence({job.metadata, job.nodes}, job.seed, quiet);
-    if (!dependence && dependence.error().code == ErrorCode::kCancelled) return tl::unexpected(dependence.error());
-    if (dependence) comparison.orientation_dependence = *std::move(dependence);
+    comparison.orientation_cover = orientationCover(CalibrationTable{job.metadata, job.nodes});
+    FT_TRY(comparison.position_dependence, dependenceOn(job, PosePart::kPosition, quiet));
+    FT_TRY(comparison.orientation_dependence, dependenceOn(job, PosePart::kOrientation, quiet));
   }
   if (auto going = unlessStopped(control, 0.6); !going) return going;
   comparison.resampling = resamplingErrors(comparison, job, quiet);

@@ -137,9 +137,11 @@ class CliChainTest : public QObject {
     // Tuned methods are among all of them.
     QCOMPARE(result["validate"].get<std::string>(), std::string("kfold:10"));
     QCOMPARE(result["places"].get<int>(), 48);
-    for (const char* key : {"coverage", "fold_back", "orientation_dependence", "trueness"})
+    for (const char* key :
+         {"coverage", "fold_back", "orientation_cover", "position_dependence", "orientation_dependence", "trueness"})
       QVERIFY2(result.at(key).is_object(), key);
-    for (const char* key : {"coverage", "fold_back", "orientation_dependence"})
+    for (const char* key :
+         {"coverage", "fold_back", "orientation_cover", "position_dependence", "orientation_dependence"})
       QVERIFY2(!result.at(key).at("text").get<std::string>().empty(), key);
     verifyScores(result, "position", "position_mm", {"rms_common_mm"});
     verifyScores(result, "orientation", "orientation_deg", {});

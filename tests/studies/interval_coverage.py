@@ -6,8 +6,8 @@ interval_coverage.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 30,60,120
 Of every room thousands of places are recorded without noise, scattered evenly over its box. Tables are drawn from them;
 each stated position is then moved as a hand misplaces a jig, calm (Gaussian of 2 mm an axis) or with gross slips (one in
 twenty by six times as much). `compare` judges a table: its RMS, its 90 % interval, and the gain with
-its interval. The truth is this script's own: the calibration that `fit` makes of the whole table is applied to 24,000 places
-that no table holds, and the mean square of what is left, plus the known mean square of the misplacing, is what the interval
+its interval. The truth is this script's own: the calibration that `fit` makes of the whole table is applied to 42 places for
+each of the table's (3,000 at least) that no table holds, and the mean square of what is left, plus the known mean square of the misplacing, is what the interval
 should hold: the RMS of this fitted correction at fresh places like those of the table. Untuned methods are left out one by
 one, at all sizes; the tuned ones stand in tables of 60 with ten folds. Printed: the share of tables whose interval holds the
 truth, by cell, with the least and the largest.
@@ -25,7 +25,8 @@ import tempfile
 
 EXTENT_M = (2.44, 2.44, 1.83)  # Of the rooms' grid.
 POOL = 9000
-FRESH = 24000  # The truth's own error, the same for all tables, is then a sixth of what a table of 567 errs by.
+FRESH_A_PLACE = 42  # The truth's own error, the same for all tables, is then a sixth of what a table errs by.
+FEWEST_FRESH = 3000
 SLIP_SD_M = 0.002
 UNTUNED = ("none", "affine", "polynomial:degree=2", "hmq", "tetrahedral")
 TUNED = ("none", "rbf", "gaussian_process")
@@ -67,7 +68,7 @@ def write(path, head, rows):
         writer.writerows(rows)
 
 
-def record(cli, rooms, room, folder):
+def record(cli, rooms, room, n_fresh, folder):
     """Readings without noise at places scattered over the room's box."""
     with open(os.path.join(rooms, f"{room}.scene.json"), encoding="utf-8") as text:
         scene = json.load(text)
@@ -75,7 +76,7 @@ def record(cli, rooms, room, folder):
     scene["rig"] = {"tolerance_m": 0, "tolerance_rad": 0}
     draw = random.Random(room)
     nodes = [dict(zip(("x_m", "y_m", "z_m"), (draw.uniform(0, side_m) for side_m in EXTENT_M)), node=number)
-             for number in range(POOL + FRESH)]
+             for number in range(POOL + n_fresh)]
     paths = [os.path.join(folder, name) for name in ("room.scene.json", "room.plan.json", "room.nodes.csv")]
     for path, content in zip(paths, (scene, {"schema": "fieldtrue.plan/1", "nodes": nodes})):
         with open(path, "w", encoding="utf-8") as out:
@@ -108,7 +109,7 @@ def cell(job):
     cli, rooms, room, heavy, n_places, n_tables, tuned = job
     held = {}
     with tempfile.TemporaryDirectory() as folder:
-        head, rows = record(cli, rooms, room, folder)
+        head, rows = record(cli, rooms, room, max(FEWEST_FRESH, FRESH_A_PLACE * n_places), folder)
         fresh, table = os.path.join(folder, "fresh.csv"), os.path.join(folder, "table.nodes.csv")
         write(fresh, head, rows[POOL:])
         draw, misplacing = random.Random(f"{room} {heavy} {n_places} {tuned}"), Misplacing(heavy)

@@ -142,6 +142,8 @@ void VerdictPanel::fillNotes() {
   addNote(tr("Sensors"), QString::fromStdString(sensorsText(c)));
   if (c.coverage) addNote(tr("Coverage"), QString::fromStdString(c.coverage->text));
   if (c.fold_back) addNote(tr("One-to-one"), QString::fromStdString(c.fold_back->text));
+  if (c.orientation_cover) addNote(tr("Orientations"), QString::fromStdString(c.orientation_cover->text));
+  if (c.position_dependence) addNote(tr("Position error"), QString::fromStdString(c.position_dependence->text));
   if (c.orientation_dependence)
     addNote(tr("Orientation error"), QString::fromStdString(c.orientation_dependence->text));
   for (const std::string& note : c.notes) addNote(tr("Note"), QString::fromStdString(note));

@@ -49,18 +49,25 @@ void writeFoldBack(HtmlWriter& html, const evaluation::FoldBack& fold_back, cons
   writeList(html, folded);
 }
 
+void writeDependence(HtmlWriter& html, const evaluation::Comparison& comparison) {
+  if (!comparison.position_dependence && !comparison.orientation_dependence) return;
+  html.element("h3", "How the sensor was held");
+  if (const auto& cover = comparison.orientation_cover) html.element("p", cover->text, {{"id", "orientation-cover"}});
+  if (const auto& dependence = comparison.position_dependence)
+    html.element("p", dependence->text, {{"id", "position-dependence"}});
+  if (const auto& dependence = comparison.orientation_dependence)
+    html.element("p", dependence->text, {{"id", "orientation-dependence"}});
+}
+
 }  // namespace
 
 void writeRegion(HtmlWriter& html, const evaluation::Comparison& comparison) {
   const std::string resampling = resamplingText(comparison);
-  if (!comparison.coverage && !comparison.fold_back && !comparison.orientation_dependence && resampling.empty()) return;
+  if (!comparison.coverage && !comparison.fold_back && !comparison.position_dependence && resampling.empty()) return;
   html.element("h2", "Region and field");
   if (comparison.coverage) writeCoverage(html, *comparison.coverage);
   if (comparison.fold_back) writeFoldBack(html, *comparison.fold_back, comparison.names);
-  if (comparison.orientation_dependence) {
-    html.element("h3", "Dependence on orientation");
-    html.element("p", comparison.orientation_dependence->text, {{"id", "orientation-dependence"}});
-  }
+  writeDependence(html, comparison);
   if (!resampling.empty()) {
     html.element("h3", "Resampling");
     html.element("p", resampling, {{"id", "resampling"}});

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "calib/core/statistics.h"
 #include "calib/evaluation/base/index_source.h"
 #include "calib/evaluation/orientation/orientation_rows.h"
 
@@ -22,7 +23,12 @@ namespace {
 constexpr Eigen::Index kSeen = 9;
 constexpr Eigen::Index kDegreeOne = 9;
 constexpr Eigen::Index kDegreeTwo = 25;
-constexpr Eigen::Index kTerms = 3 * (kSeen + kDegreeOne + kDegreeTwo);
+constexpr Eigen::Index kOrientationTerms = 3 * (kSeen + kDegreeOne + kDegreeTwo);
+/// Errors of position have more: along the line of sight, by how a symmetric, traceless tensor that is fixed to the
+/// sensor stretches it (what unequal coils do to the range), and a lever arm, which alone does not grow with the range.
+constexpr Eigen::Index kStretches = 5;
+constexpr Eigen::Index kLever = 3;
+constexpr Eigen::Index kPositionTerms = kOrientationTerms + kStretches + kLever;
 constexpr double kDegreeTwoShare = 0.5;
 constexpr std::array<double, 6> kRidges = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0};
 constexpr std::size_t kPlaceGroups = 3;
@@ -53,15 +59,18 @@ Eigen::Matrix<double, kSeen, 1> sphericalFunctions(const Eigen::Vector3d& u) {
   return values;
 }
 
-using TermBlock = Eigen::Matrix<double, 3, kTerms>;
+using TermBlock = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 
-TermBlock termsOf(const Eigen::Quaterniond& q_true, const Eigen::Vector3d& p_tracked_m) {
+/// @param p_tracked_m of the place
+/// @param range of the place over that of the others where the error grows with it, else 1
+TermBlock termsOf(const Eigen::Quaterniond& q_true, const Eigen::Vector3d& p_tracked_m, PosePart part, double range) {
   static const std::array<Eigen::Matrix3d, 5> basis = tracelessBasis();
   const Eigen::Matrix3d R = q_true.toRotationMatrix();
-  const auto seen = sphericalFunctions(R.transpose() * p_tracked_m.normalized());
-  TermBlock block;
+  const Eigen::Vector3d sight = p_tracked_m.normalized();
+  const auto seen = sphericalFunctions(R.transpose() * sight);
+  TermBlock block(3, part == PosePart::kPosition ? kPositionTerms : kOrientationTerms);
   Eigen::Index column = 0;
-  for (Eigen::Index j = 0; j < kSeen; ++j, column += 3) block.middleCols<3>(column) = seen[j] * R;
+  for (Eigen::Index j = 0; j < kSeen; ++j, column += 3) block.middleCols<3>(column) = range * seen[j] * R;
   for (Eigen::Index i = 0; i < kDegreeOne; ++i, column += 3)
     block.middleCols<3>(column) = R(i / 3, i % 3) * Eigen::Matrix3d::Identity();
   for (const Eigen::Matrix3d& a : basis)
@@ -70,21 +79,49 @@ TermBlock termsOf(const Eigen::Quaterniond& q_true, const Eigen::Vector3d& p_tra
       block.middleCols<3>(column) = entry * Eigen::Matrix3d::Identity();
       column += 3;
     }
+  if (part == PosePart::kOrientation) return block;
+  for (const Eigen::Matrix3d& b : basis) block.col(column++) = range * sight.dot(R * b * R.transpose() * sight) * sight;
+  block.middleCols<kLever>(column) = R;
   return block;
+}
+
+/// Mean tracked position of every place: a row's own one holds the error that is to be foretold.
+std::vector<Eigen::Vector3d> placesTracked_m(const OrientationRows& rows) {
+  std::vector<Eigen::Vector3d> sum_m(rows.n_places, Eigen::Vector3d::Zero());
+  std::vector<double> n_rows(rows.n_places, 0.0);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    sum_m[rows.place[i]] += rows.p_tracked_m[i];
+    n_rows[rows.place[i]] += 1.0;
+  }
+  for (std::size_t p = 0; p < rows.n_places; ++p) sum_m[p] /= n_rows[p];
+  return sum_m;
+}
+
+/// Distance of each place from the transmitter over their median, of errors that grow with it; else ones.
+std::vector<double> placeRanges(const std::vector<Eigen::Vector3d>& places_m, PosePart part) {
+  std::vector<double> range;
+  for (const Eigen::Vector3d& p_m : places_m) range.push_back(p_m.norm());
+  const double usual_m = median(range);
+  for (double& r : range) r = part == PosePart::kPosition && usual_m > 0.0 ? r / usual_m : 1.0;
+  return range;
 }
 
 /// What the models are fitted to.
 struct Problem {
   std::vector<TermBlock> terms;
-  std::vector<Eigen::Vector3d> error_deg;
+  std::vector<Eigen::Vector3d> error;
   std::vector<std::size_t> place;
   std::vector<std::size_t> place_group;
   std::vector<std::size_t> group;
   std::size_t n_places = 0;
   std::size_t n_groups = 0;
+
+  Eigen::Index n_terms() const { return terms.front().cols(); }
 };
 
-Problem problemOf(const OrientationRows& rows, std::uint64_t seed) {
+Problem problemOf(const OrientationRows& rows, PosePart part, std::uint64_t seed) {
+  const std::vector<Eigen::Vector3d> places_m = placesTracked_m(rows);
+  const std::vector<double> range = placeRanges(places_m, part);
   std::vector<std::size_t> rank(rows.n_places);
   std::iota(rank.begin(), rank.end(), std::size_t{0});
   IndexSource source(seed);
@@ -93,8 +130,8 @@ Problem problemOf(const OrientationRows& rows, std::uint64_t seed) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::size_t place = rank[rows.place[i]];
     if (place >= kMostPlaces) continue;
-    problem.terms.push_back(termsOf(rows.q_true[i], rows.p_tracked_m[i]));
-    problem.error_deg.push_back(rows.error_deg[i]);
+    problem.terms.push_back(termsOf(rows.q_true[i], places_m[rows.place[i]], part, range[rows.place[i]]));
+    problem.error.push_back(rows.error[i]);
     problem.place.push_back(place);
     problem.place_group.push_back(place % kPlaceGroups);
     problem.group.push_back(rows.group[i]);
@@ -107,7 +144,7 @@ Problem problemOf(const OrientationRows& rows, std::uint64_t seed) {
 /// Rows with the mean of their place's rows taken off, whatever function of the place that is: three lines each.
 struct Centered {
   Eigen::MatrixXd terms;
-  Eigen::VectorXd error_deg;
+  Eigen::VectorXd error;
 };
 
 /// Takes off each row the mean over the reference rows of its place; rows whose place has none are left out.
@@ -115,23 +152,23 @@ struct Centered {
 /// @param used receives the rows that are there
 Centered centered(const Problem& problem, const std::vector<std::size_t>& rows,
                   const std::vector<std::size_t>& reference, std::vector<std::size_t>& used) {
-  std::vector<TermBlock> mean_terms(problem.n_places, TermBlock::Zero());
-  std::vector<Eigen::Vector3d> mean_deg(problem.n_places, Eigen::Vector3d::Zero());
+  std::vector<TermBlock> mean_terms(problem.n_places, TermBlock::Zero(3, problem.n_terms()));
+  std::vector<Eigen::Vector3d> mean_error(problem.n_places, Eigen::Vector3d::Zero());
   std::vector<double> n_mates(problem.n_places, 0.0);
   for (const std::size_t i : reference) {
     mean_terms[problem.place[i]] += problem.terms[i];
-    mean_deg[problem.place[i]] += problem.error_deg[i];
+    mean_error[problem.place[i]] += problem.error[i];
     n_mates[problem.place[i]] += 1.0;
   }
   for (const std::size_t i : rows)
     if (n_mates[problem.place[i]] > 0.0) used.push_back(i);
   const auto n_lines = 3 * static_cast<Eigen::Index>(used.size());
-  Centered result{Eigen::MatrixXd(n_lines, kTerms), Eigen::VectorXd(n_lines)};
+  Centered result{Eigen::MatrixXd(n_lines, problem.n_terms()), Eigen::VectorXd(n_lines)};
   for (std::size_t k = 0; k < used.size(); ++k) {
     const std::size_t place = problem.place[used[k]];
     const auto line = 3 * static_cast<Eigen::Index>(k);
     result.terms.middleRows<3>(line) = problem.terms[used[k]] - mean_terms[place] / n_mates[place];
-    result.error_deg.segment<3>(line) = problem.error_deg[used[k]] - mean_deg[place] / n_mates[place];
+    result.error.segment<3>(line) = problem.error[used[k]] - mean_error[place] / n_mates[place];
   }
   return result;
 }
@@ -140,10 +177,10 @@ Centered centered(const Problem& problem, const std::vector<std::size_t>& rows,
 class RidgeFits {
  public:
   explicit RidgeFits(const Centered& train) : n_lines_(static_cast<double>(train.terms.rows())) {
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(kTerms, kTerms);
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(train.terms.cols(), train.terms.cols());
     normal.selfadjointView<Eigen::Lower>().rankUpdate(train.terms.transpose());
     eigen_.compute(normal);
-    moments_ = eigen_.eigenvectors().transpose() * (train.terms.transpose() * train.error_deg);
+    moments_ = eigen_.eigenvectors().transpose() * (train.terms.transpose() * train.error);
   }
 
   Eigen::VectorXd coefficients(double ridge) const {
@@ -187,7 +224,7 @@ CutRows cutRows(const Problem& problem, const std::vector<std::size_t>& rows, co
 /// Squares of what a cut's scored rows leave, for every ridge and, last, for none of the orientation's terms.
 struct CutResult {
   std::vector<std::size_t> rows;
-  Eigen::MatrixXd squares_deg2;  ///< One row each, one column a ridge, the last without terms.
+  Eigen::MatrixXd squares;  ///< One row each, one column a ridge, the last without terms.
 };
 
 /// Sum of squares of each row's three lines.
@@ -201,14 +238,13 @@ CutResult scoreCut(const Problem& problem, const std::vector<std::size_t>& rows,
   std::vector<std::size_t> trained;
   const Centered train = centered(problem, parts.fitted, parts.fitted, trained);
   const Centered test = centered(problem, parts.scored, parts.reference, result.rows);
-  result.squares_deg2.resize(static_cast<Eigen::Index>(result.rows.size()),
-                             static_cast<Eigen::Index>(kRidges.size()) + 1);
-  result.squares_deg2.colwise() = rowSquares(test.error_deg);
+  result.squares.resize(static_cast<Eigen::Index>(result.rows.size()), static_cast<Eigen::Index>(kRidges.size()) + 1);
+  result.squares.colwise() = rowSquares(test.error);
   if (trained.empty() || result.rows.empty()) return result;
   const RidgeFits fits(train);
   for (std::size_t r = 0; r < kRidges.size(); ++r)
-    result.squares_deg2.col(static_cast<Eigen::Index>(r)) =
-        rowSquares(test.error_deg - test.terms * fits.coefficients(kRidges[r]));
+    result.squares.col(static_cast<Eigen::Index>(r)) =
+        rowSquares(test.error - test.terms * fits.coefficients(kRidges[r]));
   return result;
 }
 
@@ -233,7 +269,7 @@ Eigen::Index chooseRidge(const Problem& problem, const std::vector<std::size_t>&
     // One group of places serves as test with every orientation: the next one round.
     const Cut inner = turned ? Cut{(outer.places + 1 + g % (kPlaceGroups - 1)) % kPlaceGroups, g} : Cut{g, kNone};
     const CutResult result = scoreCut(problem, training, inner);
-    if (!result.rows.empty()) squares += result.squares_deg2.colwise().sum();
+    if (!result.rows.empty()) squares += result.squares.colwise().sum();
   }
   Eigen::Index best = squares.size() - 1;
   for (Eigen::Index r = squares.size() - 1; r >= 0; --r)
@@ -245,17 +281,17 @@ Eigen::Index chooseRidge(const Problem& problem, const std::vector<std::size_t>&
 class PlaceSquares {
  public:
   explicit PlaceSquares(std::size_t n_places) : small_(n_places, 0.0), large_(n_places, 0.0), n_(n_places, 0.0) {}
-  void add(std::size_t place, double small_deg2, double large_deg2) {
-    small_[place] += small_deg2;
-    large_[place] += large_deg2;
+  void add(std::size_t place, double small, double large) {
+    small_[place] += small;
+    large_[place] += large;
     n_[place] += 1.0;
   }
   NestedErrors errors() const {
     NestedErrors result;
     for (std::size_t p = 0; p < n_.size(); ++p) {
       if (n_[p] == 0.0) continue;
-      result.place_only_deg.push_back(std::sqrt(small_[p] / n_[p]));
-      result.with_orientation_deg.push_back(std::sqrt(large_[p] / n_[p]));
+      result.place_only.push_back(std::sqrt(small_[p] / n_[p]));
+      result.with_orientation.push_back(std::sqrt(large_[p] / n_[p]));
     }
     return result;
   }
@@ -268,9 +304,9 @@ class PlaceSquares {
 
 }  // namespace
 
-NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orientations, std::uint64_t seed,
-                               const RunControl& control) {
-  const Problem problem = problemOf(rows, seed);
+NestedErrors nestedModelErrors(const OrientationRows& rows, PosePart part, bool hold_out_orientations,
+                               std::uint64_t seed, const RunControl& control) {
+  const Problem problem = problemOf(rows, part, seed);
   std::vector<std::size_t> all(problem.place.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   const std::vector<Cut> cuts = cutsOf(problem, hold_out_orientations);
@@ -285,9 +321,8 @@ NestedErrors nestedModelErrors(const OrientationRows& rows, bool hold_out_orient
   for (std::size_t c = 0; c < cuts.size(); ++c)
     for (std::size_t k = 0; k < results[c].rows.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(k);
-      const Eigen::MatrixXd& squares_deg2 = results[c].squares_deg2;
-      squares.add(problem.place[results[c].rows[k]], squares_deg2(row, squares_deg2.cols() - 1),
-                  squares_deg2(row, chosen[c]));
+      const Eigen::MatrixXd& left = results[c].squares;
+      squares.add(problem.place[results[c].rows[k]], left(row, left.cols() - 1), left(row, chosen[c]));
     }
   return squares.errors();
 }

@@ -43,16 +43,21 @@ int sensorOfMostRows(std::span<const Node> nodes) {
 
 }  // namespace
 
-Result<OrientationRows> orientationRows(const CalibrationTable& table) {
+const char* unitOf(PosePart part) { return part == PosePart::kPosition ? "mm" : "degrees"; }
+
+std::vector<Node> nodesOfAskedSensor(const CalibrationTable& table) {
   std::vector<Node> nodes;
   std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(nodes),
                [](const Node& node) { return node.role != NodeRole::kSkipped; });
-  // Sensors differ by their mountings and by their coils, which is not how they are turned: one of them is asked.
-  nodes = nodesOfSensor(nodes, sensorOfMostRows(nodes));
+  return nodesOfSensor(nodes, sensorOfMostRows(nodes));
+}
+
+Result<OrientationRows> orientationRows(const CalibrationTable& table, PosePart part) {
+  const std::vector<Node> nodes = nodesOfAskedSensor(table);
   const auto n_without = std::count_if(nodes.begin(), nodes.end(), [](const Node& n) { return !n.has_orientation; });
   if (nodes.empty() || n_without > 0)
     return fail(ErrorCode::kUnsupported,
-                "Whether orientation errors depend on orientation needs an orientation in every row, and " +
+                "Whether errors depend on orientation needs an orientation in every row, and " +
                     std::to_string(n_without) + " of " + std::to_string(nodes.size()) + " rows have none");
   calibration::Alignment alignment;
   if (calibration::defaultAlignMode(table.metadata) == calibration::AlignMode::kRigid) {
@@ -63,8 +68,10 @@ Result<OrientationRows> orientationRows(const CalibrationTable& table) {
   OrientationRows rows;
   std::map<int, std::size_t> number_of_place;
   for (std::size_t i = 0; i < data.size(); ++i) {
-    const Eigen::Quaterniond q_error = data.q_tracked[i] * data.q_true[i].conjugate();
-    rows.error_deg.push_back(kDegPerRad * rotationVector_rad(q_error));
+    if (part == PosePart::kPosition)
+      rows.error.push_back((data.p_tracked_m[i] - data.p_true_m[i]) / kMPerMm);
+    else
+      rows.error.push_back(kDegPerRad * rotationVector_rad(data.q_tracked[i] * data.q_true[i].conjugate()));
     rows.place.push_back(number_of_place.try_emplace(data.node[i], number_of_place.size()).first->second);
   }
   rows.n_places = number_of_place.size();

@@ -3,10 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "calib/core/file_io.h"
 #include "calib/core/place_name.h"
@@ -24,15 +22,7 @@ constexpr double kTold = 0.002;
 constexpr double kFarShare = 0.34;
 constexpr std::size_t kMostAdvised = 6;
 
-/// One place of the plan, tracker frame.
-struct TurnedPlace {
-  int node = 0;
-  Eigen::Vector3d p_m = Eigen::Vector3d::Zero();
-  std::vector<Eigen::Quaterniond> q;  ///< Of each visit.
-
-  bool isTurned() const { return distinctRotations(q, kAlike_rad).size() > 1; }
-};
-
+/// Tracker frame.
 std::vector<TurnedPlace> turnedPlaces(std::span<const PlannedPlace> plan, const Pose& tracker_from_reference) {
   std::map<int, std::size_t> at;
   std::vector<TurnedPlace> places;
@@ -44,34 +34,6 @@ std::vector<TurnedPlace> turnedPlaces(std::span<const PlannedPlace> plan, const 
     places[found->second].q.push_back(tracked.orientation);
   }
   return places;
-}
-
-/// Orientations spread evenly over all there are.
-/// @source Alexa 2022, Super-Fibonacci spirals: fast, low-discrepancy sampling of SO(3), CVPR, algorithm 1
-std::vector<Eigen::Quaterniond> evenOrientations(int count) {
-  constexpr double kPhi = std::numbers::sqrt2;
-  constexpr double kPsi = 1.533751168755204288118041;
-  std::vector<Eigen::Quaterniond> all;
-  for (int i = 0; i < count; ++i) {
-    const double s = i + 0.5;
-    const double inner = std::sqrt(s / count);
-    const double outer = std::sqrt(1.0 - s / count);
-    const double alpha = 2.0 * std::numbers::pi * s / kPhi;
-    const double beta = 2.0 * std::numbers::pi * s / kPsi;
-    all.emplace_back(outer * std::cos(beta), inner * std::sin(alpha), inner * std::cos(alpha), outer * std::sin(beta));
-  }
-  return all;
-}
-
-double farthest_deg(std::span<const Eigen::Quaterniond> seen) {
-  constexpr int kProbes = 20000;  // About 6 degrees apart.
-  double least_cosine = 1.0;
-  for (const Eigen::Quaterniond& q : evenOrientations(kProbes)) {
-    double nearest = 0.0;
-    for (const Eigen::Quaterniond& other : seen) nearest = std::max(nearest, std::abs(q.dot(other)));
-    least_cosine = std::min(least_cosine, nearest);
-  }
-  return 2.0 * kDegPerRad * std::acos(least_cosine);
 }
 
 /// Columns: strains without a change of volume, of unit norm as matrices.
@@ -102,21 +64,6 @@ Eigen::VectorXd coilSd(const std::vector<TurnedPlace>& places, double placing_sd
   return sd.reverse();
 }
 
-struct Farthest {
-  std::size_t place = 0;
-  double distance_m = 0.0;
-};
-
-Farthest farthestFrom(const std::vector<TurnedPlace>& places, const std::vector<std::size_t>& turned) {
-  Farthest farthest;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    double nearest_m = std::numeric_limits<double>::infinity();
-    for (const std::size_t t : turned) nearest_m = std::min(nearest_m, (places[i].p_m - places[t].p_m).norm());
-    if (nearest_m > farthest.distance_m) farthest = {i, nearest_m};
-  }
-  return farthest;
-}
-
 /// Where to turn the sensor too: one after the other the place farthest from all where it is turned.
 void advisePlaces(const std::vector<TurnedPlace>& places, PlannedOrientations& planned) {
   Eigen::AlignedBox3d box;
@@ -125,11 +72,9 @@ void advisePlaces(const std::vector<TurnedPlace>& places, PlannedOrientations& p
     box.extend(places[i].p_m);
     if (places[i].isTurned()) turned.push_back(i);
   }
-  planned.n_turned = static_cast<int>(turned.size());
   if (turned.empty()) return;
-  planned.farthest_turned_m = farthestFrom(places, turned).distance_m;
   for (std::size_t i = 0; i < kMostAdvised; ++i) {
-    const Farthest farthest = farthestFrom(places, turned);
+    const FarthestPlace farthest = farthestFrom(places, turned);
     if (farthest.distance_m <= kFarShare * box.diagonal().norm()) return;
     planned.turn_here.push_back(places[farthest.place].node);
     turned.push_back(farthest.place);
@@ -148,7 +93,8 @@ std::string namesOf(std::span<const PlannedPlace> plan, const std::vector<int>& 
 
 std::string coilText(const PlannedOrientations& planned) {
   const std::string ways = std::to_string(PlannedOrientations::kCoilWays);
-  if (planned.n_turned == 0) return "How the sensor's coils differ cannot be told: no place is visited in two of them.";
+  if (planned.cover.n_turned == 0)
+    return "How the sensor's coils differ cannot be told: no place is visited in two of them.";
   const std::string told = "Of the " + ways + " ways in which the sensor's coils may differ they tell " +
                            std::to_string(planned.coil_ways_told);
   if (planned.coil_ways_told < PlannedOrientations::kCoilWays)
@@ -157,18 +103,18 @@ std::string coilText(const PlannedOrientations& planned) {
 }
 
 std::string textOf(std::span<const PlannedPlace> plan, const PlannedOrientations& planned) {
-  const std::string far = std::to_string(std::lround(planned.farthest_deg));
-  if (planned.n_orientations < 2)
+  const std::string far = std::to_string(std::lround(planned.cover.farthest_deg));
+  if (planned.cover.n_orientations < 2)
     return "One orientation: a correction holds for a sensor held that way. If it will be turned, plan 4 orientations "
            "or "
            "more; fewer do not tell how its coils differ.";
-  std::string text = std::to_string(planned.n_orientations) + " orientations, at " + std::to_string(planned.n_turned) +
-                     " of " + std::to_string(planned.n_places) +
+  std::string text = std::to_string(planned.cover.n_orientations) + " orientations, at " +
+                     std::to_string(planned.cover.n_turned) + " of " + std::to_string(planned.cover.n_places) +
                      " places two or more: a sensor held anyhow is at most about " + far +
                      " degrees from one of them. " + coilText(planned);
   if (!planned.turn_here.empty())
     text += " Turn it also at " + namesOf(plan, planned.turn_here) + ": up to " +
-            formatNumber(std::round(100.0 * *planned.farthest_turned_m) / 100.0) +
+            formatNumber(std::round(100.0 * *planned.cover.farthest_turned_m) / 100.0) +
             " m from there to a place where it is turned.";
   return text;
 }
@@ -178,13 +124,8 @@ std::string textOf(std::span<const PlannedPlace> plan, const PlannedOrientations
 PlannedOrientations plannedOrientations(std::span<const PlannedPlace> plan, const Pose& tracker_from_reference,
                                         double placing_sd_m) {
   const std::vector<TurnedPlace> places = turnedPlaces(plan, tracker_from_reference);
-  std::vector<Eigen::Quaterniond> all;
-  for (const TurnedPlace& place : places) all.insert(all.end(), place.q.begin(), place.q.end());
-  const std::vector<Eigen::Quaterniond> distinct = distinctRotations(all, kAlike_rad);
   PlannedOrientations planned;
-  planned.n_places = static_cast<int>(places.size());
-  planned.n_orientations = static_cast<int>(distinct.size());
-  planned.farthest_deg = farthest_deg(distinct);
+  planned.cover = orientationCover(places);
   const Eigen::VectorXd sd = coilSd(places, placing_sd_m);
   planned.coil_ways_told = static_cast<int>((sd.array() < kTold).count());
   if (planned.coil_ways_told > 0) planned.coil_sd = sd[planned.coil_ways_told - 1];
@@ -194,17 +135,13 @@ PlannedOrientations plannedOrientations(std::span<const PlannedPlace> plan, cons
 }
 
 nlohmann::json toJson(const PlannedOrientations& planned) {
-  return {
-      {"count", planned.n_orientations},
-      {"places", planned.n_places},
-      {"places_turned", planned.n_turned},
-      {"farthest_deg", planned.farthest_deg},
-      {"farthest_turned_m", planned.farthest_turned_m ? nlohmann::json(*planned.farthest_turned_m) : nlohmann::json()},
-      {"coil_ways", PlannedOrientations::kCoilWays},
-      {"coil_ways_told", planned.coil_ways_told},
-      {"coil_sd", planned.coil_sd ? nlohmann::json(*planned.coil_sd) : nlohmann::json()},
-      {"turn_here", planned.turn_here},
-      {"text", planned.text}};
+  nlohmann::json json = toJson(planned.cover);
+  json.update({{"coil_ways", PlannedOrientations::kCoilWays},
+               {"coil_ways_told", planned.coil_ways_told},
+               {"coil_sd", planned.coil_sd ? nlohmann::json(*planned.coil_sd) : nlohmann::json()},
+               {"turn_here", planned.turn_here},
+               {"text", planned.text}});
+  return json;
 }
 
 }  // namespace fieldtrue::evaluation

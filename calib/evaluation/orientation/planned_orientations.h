@@ -7,19 +7,14 @@
 #include <vector>
 
 #include "calib/core/calibration_table.h"
+#include "calib/evaluation/orientation/orientation_cover.h"
 
 namespace fieldtrue::evaluation {
 
 /// What the orientations of a plan will tell about a correction that takes orientation as an input, before anything is
 /// measured.
 struct PlannedOrientations {
-  int n_orientations = 0;  ///< More than 10 degrees apart.
-  int n_places = 0;
-  int n_turned = 0;  ///< Places at which the sensor is held in two of them or more.
-  /// How far a sensor held anyhow may be from the nearest of them.
-  double farthest_deg = 180.0;
-  /// Largest distance of a place from one where the sensor is turned [m]; none without any.
-  std::optional<double> farthest_turned_m;
+  OrientationCover cover;
   /// Ways in which the gains and angles of three coils can differ: five, since a gain of all alike is a scale.
   static constexpr int kCoilWays = 5;
   int coil_ways_told = 0;  ///< Of these, by the changes from one orientation to the next at the same place.

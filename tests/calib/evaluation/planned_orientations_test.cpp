@@ -77,9 +77,9 @@ class PlannedOrientationsTest : public QObject {
     QFETCH(const Turns, turns);
     QFETCH(const double, radius_deg);
     const PlannedOrientations planned = plannedOrientations(grid(turns), Pose{});
-    QCOMPARE(planned.n_orientations, static_cast<int>(turns.size()));
-    QVERIFY2(planned.farthest_deg <= radius_deg + 0.1 && planned.farthest_deg > radius_deg - 4.0,
-             qPrintable(QString::number(planned.farthest_deg)));
+    QCOMPARE(planned.cover.n_orientations, static_cast<int>(turns.size()));
+    QVERIFY2(planned.cover.farthest_deg <= radius_deg + 0.1 && planned.cover.farthest_deg > radius_deg - 4.0,
+             qPrintable(QString::number(planned.cover.farthest_deg)));
   }
 
   /// Between visits E - R E R^T is seen: of turns about one axis the strain that is round about it commutes with all
@@ -137,27 +137,53 @@ class PlannedOrientationsTest : public QObject {
   void placesFarFromATurnedOneAreAdvised() {
     const Turns cube = cubeTurns();
     const PlannedOrientations planned = plannedOrientations(grid({cube[0], cube[4]}, 9), Pose{});
-    QCOMPARE(planned.n_places, 27);
-    QCOMPARE(planned.n_turned, 9);
-    FT_VERIFY_MATCH(near(*planned.farthest_turned_m, 0.4, 1e-12));
+    QCOMPARE(planned.cover.n_places, 27);
+    QCOMPARE(planned.cover.n_turned, 9);
+    FT_VERIFY_MATCH(near(*planned.cover.farthest_turned_m, 0.4, 1e-12));
     QVERIFY(!planned.turn_here.empty());
     QVERIFY(std::all_of(planned.turn_here.begin(), planned.turn_here.end(), [](int node) { return node >= 18; }));
     QVERIFY(planned.text.find("pipe 3") != std::string::npos);
     const PlannedOrientations all = plannedOrientations(grid({cube[0], cube[4]}), Pose{});
     QVERIFY(all.turn_here.empty());
-    FT_VERIFY_MATCH(near(*all.farthest_turned_m, 0.0, 1e-12));
+    FT_VERIFY_MATCH(near(*all.cover.farthest_turned_m, 0.0, 1e-12));
+  }
+
+  /// A recording of that plan stands for the same, whatever its mounting turns all orientations by.
+  void aRecordingIsAskedTheSame() {
+    const Turns cube = cubeTurns();
+    CalibrationTable table;
+    for (const PlannedPlace& stop : grid({cube[0], cube[4]}, 9)) {
+      Node node;
+      node.node = stop.node;
+      node.visit = stop.visit;
+      node.reference_from_sensor = stop.reference_from_sensor * Pose{{}, about({1, 2, 3}, 25.0)};
+      table.nodes.push_back(node);
+    }
+    const auto cover = orientationCover(table);
+    QVERIFY(cover);
+    QCOMPARE(cover->n_orientations, 2);
+    QCOMPARE(cover->n_places, 27);
+    QCOMPARE(cover->n_turned, 9);
+    FT_VERIFY_MATCH(near(cover->farthest_deg, 180.0, 4.0));
+    FT_VERIFY_MATCH(near(*cover->farthest_turned_m, 0.4, 1e-12));
+    FT_VERIFY_MATCH(holdsAll(cover->text, {"held in 2 ways, at 9 of 27 places", "0.40 m from a place"}));
+    table.nodes[3].has_orientation = false;
+    QVERIFY(!orientationCover(table));
+    std::erase_if(table.nodes, [](const Node& node) { return node.visit > 0 || !node.has_orientation; });
+    FT_VERIFY_MATCH(holdsAll(orientationCover(table)->text, {"in one way"}));
+    QVERIFY(!orientationCover(CalibrationTable{}));
   }
 
   void skippedPlacesAndVisitsOfOneOrientationDoNotCount() {
     const Turns cube = cubeTurns();
     std::vector<PlannedPlace> plan = grid({cube[0], about({0, 0, 1}, 5.0), cube[4]});
     const PlannedOrientations before = plannedOrientations(plan, Pose{});
-    QCOMPARE(before.n_orientations, 2);
+    QCOMPARE(before.cover.n_orientations, 2);
     for (PlannedPlace& place : plan)
       if (place.visit == 2) place.role = NodeRole::kSkipped;
     const PlannedOrientations skipped = plannedOrientations(plan, Pose{});
-    QCOMPARE(skipped.n_orientations, 1);
-    QCOMPARE(skipped.n_turned, 0);
+    QCOMPARE(skipped.cover.n_orientations, 1);
+    QCOMPARE(skipped.cover.n_turned, 0);
     QVERIFY(skipped.text.find("One orientation") == 0);
   }
 };

@@ -289,13 +289,16 @@ class VerdictTest : public QObject {
     const auto bare = compareMethods(bentTable(0.03, 0.0), options);
     FT_VERIFY_OK(bare);
     const nlohmann::json without = toJson(*bare);
-    for (const char* key : {"coverage", "fold_back", "orientation_dependence"})
+    for (const char* key :
+         {"coverage", "fold_back", "orientation_cover", "position_dependence", "orientation_dependence"})
       QVERIFY2(without.at(key).is_null(), key);
     options.with_surroundings = true;
     const auto whole = compareMethods(bentTable(0.03, 0.0), options);
     FT_VERIFY_OK(whole);
     const nlohmann::json with = toJson(*whole);
-    for (const char* key : {"coverage", "fold_back", "orientation_dependence"}) QVERIFY2(with.at(key).is_object(), key);
+    for (const char* key :
+         {"coverage", "fold_back", "orientation_cover", "position_dependence", "orientation_dependence"})
+      QVERIFY2(with.at(key).is_object(), key);
     QCOMPARE(with.at("resampling").size(), std::size_t{3});
     for (const char* key : {"method", "rms_mm", "excess_mm", "n_scored", "n_without_support"})
       QVERIFY2(with.at("resampling").at(0).contains(key), key);

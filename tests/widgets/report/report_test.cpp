@@ -296,8 +296,9 @@ class ReportTest : public QObject {
     input.comparison.coverage->holes.push_back({{0.5, 0.25, -1.0}, 0.4});
     const auto page = parsed(input);
     for (const std::string& text :
-         {input.comparison.coverage->text, input.comparison.fold_back->text,
-          input.comparison.orientation_dependence->text, resamplingText(input.comparison),
+         {input.comparison.coverage->text, input.comparison.fold_back->text, input.comparison.orientation_cover->text,
+          input.comparison.position_dependence->text, input.comparison.orientation_dependence->text,
+          resamplingText(input.comparison),
           "cell between " + input.comparison.names.list(cell.nodes, 8) + " around (0.250, -0.500, 1.000) m",
           std::string("hole around (0.500, 0.250, -1.000) m, 0.400 m from the nearest place")})
       QVERIFY2(!text.empty() && page->text.contains(QString::fromStdString(text)), text.c_str());
