@@ -8,8 +8,6 @@
 #include "app/cli.h"
 #include "app/cli_values.h"
 #include "calib/calibration/corrector.h"
-#include "calib/correctors/base/method.h"
-#include "calib/correctors/registry.h"
 #include "calib/evaluation/judged_calibration.h"
 #include "calib/exporters/export_calibration.h"
 #include "calib/exporters/registry.h"
@@ -53,18 +51,6 @@ Read<void> readOrientation(const std::string& text, exporters::ExportOptions& op
   return {};
 }
 
-/// How far the method errs on places left out. Methods that take minutes for that are not asked.
-std::optional<exporters::HeldOutError> heldOutError(const calibration::Corrector& corrector,
-                                                    const RunControl& control) {
-  const calibration::CorrectorChoice& choice = corrector.choice();
-  const auto method = correctors::findPositionMethod(choice.position_id);
-  if (!method || (*method)->cost == correctors::FitCost::kVeryCostly) return std::nullopt;
-  const auto judged = evaluation::judgeCalibration(corrector, control);
-  const evaluation::MethodScore* score = judged ? evaluation::scoreOf(*judged, corrector) : nullptr;
-  if (score == nullptr) return std::nullopt;
-  return exporters::HeldOutError{score->stats.rms / 1000.0, toText(judged->validation)};
-}
-
 /// The calibration's file without folder and endings.
 std::string plainName(const std::string& path) {
   std::string name = std::filesystem::path(path).filename().string();
@@ -103,8 +89,9 @@ Outcome runExport(const ExportArguments& arguments, const CommonOptions& common)
   if (corrector && arguments.bake_um)
     corrector = corrector->baked(1e-6 * *arguments.bake_um, runControl(common, "baking"));
   if (!corrector) return notPossible(corrector.error());
-  if (!(*exporter)->knows_pose || (*exporter)->id == "vtk_vtp")
-    options.held_out = heldOutError(*corrector, runControl(common, "leaving places out"));
+  if ((*exporter)->tells_error)
+    if (const auto judged = evaluation::heldOutRms(*corrector, runControl(common, "leaving places out")))
+      options.held_out = exporters::HeldOutError{judged->rms_mm / 1000.0, judged->validated};
   const auto written =
       exporters::exportCalibration(**exporter, *corrector, options, path, runControl(common, "sampling"));
   if (!written) return notPossible(written.error());

@@ -1,6 +1,7 @@
 #include "calib/evaluation/judged_calibration.h"
 
 #include "calib/correctors/base/method_text.h"
+#include "calib/correctors/registry.h"
 
 namespace fieldtrue::evaluation {
 
@@ -21,6 +22,15 @@ const MethodScore* scoreOf(const Comparison& judged, const calibration::Correcto
   for (const MethodScore& score : judged.position)
     if (score.method == corrector.choice().position_id && !score.skipped) return &score;
   return nullptr;
+}
+
+std::optional<HeldOutRms> heldOutRms(const calibration::Corrector& corrector, const RunControl& control) {
+  const auto method = correctors::findPositionMethod(corrector.choice().position_id);
+  if (!method || (*method)->cost == correctors::FitCost::kVeryCostly) return std::nullopt;
+  const auto judged = judgeCalibration(corrector, control);
+  const MethodScore* score = judged ? scoreOf(*judged, corrector) : nullptr;
+  if (score == nullptr) return std::nullopt;
+  return HeldOutRms{score->stats.rms, toText(judged->validation)};
 }
 
 }  // namespace fieldtrue::evaluation

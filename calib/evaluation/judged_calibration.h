@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "calib/calibration/corrector.h"
 #include "calib/evaluation/comparison.h"
 
@@ -11,5 +14,14 @@ Result<Comparison> judgeCalibration(const calibration::Corrector& corrector, con
 
 /// The score of that method; null where it could not be judged.
 const MethodScore* scoreOf(const Comparison& judged, const calibration::Corrector& corrector);
+
+/// How far a position method errs on places that its fits did not see, and on which.
+struct HeldOutRms {
+  double rms_mm = 0.0;
+  std::string validated;  ///< "loo", "kfold:10"
+};
+
+/// None where it could not be judged, or where that would take minutes.
+std::optional<HeldOutRms> heldOutRms(const calibration::Corrector& corrector, const RunControl& control);
 
 }  // namespace fieldtrue::evaluation

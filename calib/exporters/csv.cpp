@@ -96,6 +96,7 @@ Exporter csvExporter() {
           .in_words = "metres; the places, measured, true and corrected, with their errors",
           .purpose = Purpose::kNumbers,
           .knows_pose = true,
+          .tells_error = false,
           .write = write};
 }
 

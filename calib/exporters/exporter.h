@@ -37,6 +37,7 @@ struct Exporter {
   Purpose purpose = Purpose::kFieldtrue;
   bool may_be_inverse = false;  ///< Can be written true to measured.
   bool knows_pose = false;      ///< Keeps what depends on how the sensor is turned, or on which sensor it is.
+  bool tells_error = true;      ///< States how far the calibration errs on places that its fits did not see.
   bool has_free_pitch = false;  ///< A lattice whose pitch is chosen for the deviation that is allowed.
   bool is_folder = false;       ///< Writes a folder of files.
   Result<Written> (*write)(const ExportSubject&, const ExportOptions&, const std::filesystem::path&,

@@ -18,6 +18,7 @@ Exporter ftcalExporter() {
           .reads_it = "Fieldtrue: apply, difference, the page Changes",
           .in_words = "metres; everything that the calibration knows",
           .knows_pose = true,
+          .tells_error = false,
           .write = write};
 }
 

@@ -79,6 +79,7 @@ Exporter trackdPluginExporter() {
           .in_words = "a folder: the plug-in, its parameters (feet, degrees), the whole calibration",
           .purpose = Purpose::kPeriod,
           .knows_pose = true,
+          .tells_error = false,
           .is_folder = true,
           .write = write};
 }

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "calib/core/statistics.h"
+#include "calib/geometry/geometry.h"
 
 namespace fieldtrue::identify {
 namespace {

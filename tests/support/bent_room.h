@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -10,8 +11,8 @@
 
 namespace fieldtrue::testing {
 
-/// 9 x 9 x 7 nodes one foot apart in a room bent smoothly as no physics would bend it, with noise and a jig of 5 mm.
-inline CalibrationTable bentRoom() {
+/// A grid over 8 x 8 x 6 feet in a room bent smoothly as no physics would bend it, with noise and a jig of 5 mm.
+inline CalibrationTable bentRoom(const std::array<int, 3>& counts = {9, 9, 7}) {
   CalibrationTable table;
   table.metadata.jig_tolerance_m = 0.005;
   std::uint32_t state = 1;
@@ -23,12 +24,12 @@ inline CalibrationTable bentRoom() {
     }
     return Eigen::Vector3d(sd * drawn);
   };
-  for (int place = 0; place < 567; ++place) {
+  for (int place = 0; place < counts[0] * counts[1] * counts[2]; ++place) {
     Node node;
     node.node = place;
-    node.index = {place % 9, place / 9 % 9, place / 81};
-    const Eigen::Vector3d p_m =
-        0.3048 * Eigen::Vector3d((*node.index)[0] - 4, (*node.index)[1] - 4, (*node.index)[2] + 1);
+    node.index = {place % counts[0], place / counts[0] % counts[1], place / (counts[0] * counts[1])};
+    const auto share = [&](std::size_t axis) { return (*node.index)[axis] / (counts[axis] - 1.0); };
+    const Eigen::Vector3d p_m = 0.3048 * Eigen::Vector3d(8 * share(0) - 4, 8 * share(1) - 4, 6 * share(2) + 1);
     const Eigen::Vector3d bent_m(0.03 * std::sin(1.5 * p_m.z() + p_m.x()), 0.05 * std::sin(1.1 * p_m.x() * p_m.y()),
                                  0.02 * p_m.squaredNorm() / 3.0);
     node.reference_from_sensor.position_m = p_m;

@@ -4,6 +4,7 @@
 #include <QDateTime>
 #include <QFileInfo>
 
+#include "calib/evaluation/judged_calibration.h"
 #include "calib/exporters/export_calibration.h"
 #include "calib/exporters/registry.h"
 #include "calib/tables/table_io.h"
@@ -46,32 +47,25 @@ Result<std::string> said(const Result<void>& written, const std::string& note = 
   return note;
 }
 
-/// Of the method that is written, if the comparison on screen judged it.
-std::optional<exporters::HeldOutError> heldOutError(const Workbench& workbench) {
-  if (!workbench.comparison() || !workbench.correctorIsCurrent()) return std::nullopt;
-  const calibration::CorrectorChoice& choice = workbench.corrector()->choice();
-  for (const evaluation::MethodScore& score : workbench.comparison()->position)
-    if (score.method == choice.position_id && score.settings == choice.position_settings && !score.skipped)
-      return exporters::HeldOutError{score.stats.rms / 1000.0, toText(workbench.comparison()->validation)};
-  return std::nullopt;
-}
-
 ExportWriting calibrationWriter(const Workbench& workbench, const exporters::Exporter& exporter,
                                 const ExportChoices& choices) {
   const bool bake = exporter.knows_pose && choices.bake && !workbench.corrector()->isBaked();
   exporters::ExportOptions options;
   options.name = QFileInfo(workbench.sessionPath()).completeBaseName().toStdString();
   options.mean_orientation = true;
-  options.held_out = heldOutError(workbench);
   if (exporter.has_free_pitch) options.max_deviation_m = choices.deviation_m;
   if (exporter.may_be_inverse && choices.inverse) options.direction = exporters::Direction::kTrueToMeasured;
   const auto sensor = exporter.knows_pose ? std::nullopt : choices.sensor;
   return [corrector = *workbench.corrector(), exporter = &exporter, bake, deviation_m = choices.deviation_m, sensor,
-          options](const std::string& path, const RunControl& control) -> Result<std::string> {
+          options](const std::string& path, const RunControl& control) mutable -> Result<std::string> {
     const Result<calibration::Corrector> written = bake     ? corrector.baked(deviation_m, control)
                                                    : sensor ? corrector.ofSensor(*sensor)
                                                             : Result<calibration::Corrector>(corrector);
     if (!written) return tl::unexpected(written.error());
+    if (exporter->tells_error)
+      if (const auto judged = evaluation::heldOutRms(*written, control))
+        options.held_out = exporters::HeldOutError{judged->rms_mm / 1000.0, judged->validated};
+    if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
     FT_TRY(const auto done, exporters::exportCalibration(*exporter, *written, options, path, control));
     std::string note = bake ? written->report().notes.back() : std::string();
     for (const std::string& one : done.notes) note += (note.empty() ? "" : " ") + one;

@@ -1,10 +1,14 @@
+#include <QDir>
+#include <QFileInfo>
 #include <QTemporaryDir>
 #include <QTest>
 #include <QThreadPool>
+#include <algorithm>
 
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
+#include "widgets/pages/export_targets.h"
 #include "widgets/workbench/workbench.h"
 
 using namespace fieldtrue;
@@ -58,6 +62,47 @@ class SameCalibrationTest : public QObject {
     FT_VERIFY_OK(workbench.corrector()->save(at("window.ftcal.json").toStdString()));
     QCOMPARE(readWhole(at("window.ftcal.json")), readWhole(at("command.ftcal.json")));
     QVERIFY(readWhole(at("window.ftcal.json")).contains("TX 17"));
+  }
+
+  /// Of one calibration, for other programs: every file, and every file of a folder.
+  void filesForOtherProgramsAreTheSame() {
+    FT_VERIFY_STATUS(runCli({"fit", "--nodes", at("n.csv"), "--position", "polynomial:degree=2", "--orientation",
+                             "polynomial_quaternion:degree=2", "--out", at("s.ftcal.json")}),
+                     0);
+    Workbench workbench;
+    workbench.openSession(at("s.fieldtrue"));
+    QTRY_COMPARE_WITH_TIMEOUT(workbench.recordedTable().nodes.size(), std::size_t{72}, 60000);
+    workbench.fit(calibration::parseCorrectorChoice("polynomial:degree=2", "polynomial_quaternion:degree=2").value(),
+                  calibration::defaultAlignMode(workbench.table().metadata));
+    QTRY_VERIFY_WITH_TIMEOUT(workbench.correctorCorrects() && !workbench.isFitting(), 120000);
+    ExportChoices as_offered;
+    as_offered.deviation_m = 0.05 / 1000.0;
+    int n_formats = 0;
+    for (const ExportTarget& target : exportTargets(workbench)) {
+      if (target.exporter == nullptr) continue;
+      const QString from_window = at("window_file") + target.extension;
+      const QString from_command = at("command_file") + target.extension;
+      const auto in_window = target.prepare(as_offered)(from_window.toStdString(), {});
+      const CliRun on_command =
+          runCli({"export", "--calibration", at("s.ftcal.json"), "--format", target.id, "--out", from_command});
+      QCOMPARE(on_command.status == 0, in_window.has_value());
+      if (!in_window) continue;
+      ++n_formats;
+      QVERIFY2(sameContent(from_window, from_command), qPrintable(target.id));
+      for (const QString& path : {from_window, from_command})
+        QVERIFY(QFileInfo(path).isDir() ? QDir(path).removeRecursively() : QFile::remove(path));
+    }
+    QVERIFY(n_formats > 20);
+  }
+
+ private:
+  static bool sameContent(const QString& a, const QString& b) {
+    if (!QFileInfo(a).isDir()) return !readWhole(a).isEmpty() && readWhole(a) == readWhole(b);
+    const QStringList names = QDir(a).entryList(QDir::Files);
+    return !names.isEmpty() && names == QDir(b).entryList(QDir::Files) &&
+           std::all_of(names.begin(), names.end(), [&](const QString& name) {
+             return readWhole(QDir(a).filePath(name)) == readWhole(QDir(b).filePath(name));
+           });
   }
 };
 
