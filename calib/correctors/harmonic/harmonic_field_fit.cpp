@@ -37,6 +37,12 @@ struct Chosen {
   std::vector<double> variances;  ///< Prior variance of each tensor.
 };
 
+/// Where the sources of one step stand, in an order of their own, and what they leave.
+struct Choice {
+  std::vector<Eigen::Vector3d> places_m;
+  double misfit_m2 = 0.0;
+};
+
 class Fitter {
  public:
   Fitter(const FitData& data, const HarmonicOptions& options, const RunControl& control, const Pose& field_from_truth)
@@ -186,8 +192,10 @@ class Fitter {
     const GroupedSystem system(linear.design, basis, linear.y, box_.extent_m());
     const bool unknown = data_.jig_sd_m <= 0.0;
     const auto n_chosen = static_cast<Eigen::Index>(chosen_.sites.size());  // The first candidates, see refine().
-    const GroupSelection selection =
-        selectGroups(system, {options_.least_gain, options_.most_sources, noiseForStep(), unknown, n_chosen}, control_);
+    const GroupSelection selection = selectGroups(
+        system,
+        {is_choice_final_ ? 0.0 : options_.least_gain, options_.most_sources, noiseForStep(), unknown, n_chosen},
+        control_);
     noise_factor_ = std::clamp(selection.noise_factor, 1e-16, 1e16);
 
     Eigen::VectorXd effect = Eigen::VectorXd::Zero(linear.y.size());
@@ -198,6 +206,7 @@ class Fitter {
     const Eigen::Matrix<double, 6, 1> motion = qr.solve(linear.y - effect);
     moveTruth(motion);
     const bool whole = keep(selection, linear);
+    is_choice_final_ = is_choice_final_ || goesRound();
     refine(selection.gain, step);
     if (!whole) return std::numeric_limits<double>::infinity();
     // Whitened by about the jig's SD.
@@ -272,8 +281,28 @@ class Fitter {
     take(std::move(misfit));
   }
 
+  /// Whether the choice has come round to one made before and is, of those in between, the one that leaves least: each
+  /// change of the field would go on making the next one the likelier.
+  bool goesRound() {
+    constexpr double kAsGood = 1.0 + 1e-4;  // Of one choice at two rounds.
+    Choice now;
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) now.places_m.push_back(placeOf_m(k));
+    std::sort(now.places_m.begin(), now.places_m.end(), [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+      return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+    });
+    now.misfit_m2 = misfit_m2_;
+    const auto same = [&](const Choice& other) { return other.places_m == now.places_m; };
+    const auto before = std::find_if(choices_.begin(), choices_.end(), same);
+    const bool was_left = !std::all_of(before, choices_.end(), same);
+    const bool is_least = std::all_of(before, choices_.end(),
+                                      [&](const Choice& other) { return now.misfit_m2 <= kAsGood * other.misfit_m2; });
+    const bool is_round = was_left && is_least;
+    choices_.push_back(std::move(now));
+    return is_round;
+  }
+
   /// Candidates of the next step: those chosen, their closer neighbours, and of the rest those that offered most; all
-  /// of a new lattice when the places turn out to stand elsewhere.
+  /// of a new lattice when the places turn out to stand elsewhere. Once the choice is final, those chosen.
   void refine(const Eigen::VectorXd& gain, int step) {
     const Box before = box_;
     findBox();
@@ -282,6 +311,11 @@ class Fitter {
         (box_.low_m - before.low_m).norm() + (box_.high_m - before.high_m).norm() > kMoved * box_.extent_m();
     std::vector<Site> next;
     for (const Eigen::Index site : chosen_.sites) next.push_back(sites_[static_cast<std::size_t>(site)]);
+    if (is_choice_final_) {
+      sites_ = std::move(next);
+      std::iota(chosen_.sites.begin(), chosen_.sites.end(), Eigen::Index{0});
+      return;
+    }
     for (std::size_t k = 0; k < chosen_.sites.size(); ++k) {
       for (const Site& site : refinedSites(next[k], box_)) next.push_back(site);
       next[k].reach_m *= 0.5;
@@ -335,6 +369,8 @@ class Fitter {
   double noise_factor_ = 1.0;
   std::vector<Site> sites_;
   Chosen chosen_;
+  std::vector<Choice> choices_;  ///< Of every step.
+  bool is_choice_final_ = false;
   double misfit_m2_ = 0.0;                    ///< Of the field found so far.
   std::vector<Eigen::Vector3d> corrected_m_;  ///< By the field found so far.
 };

@@ -2,6 +2,7 @@
 #include <QTest>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "calib/calibration/alignment.h"
 #include "calib/core/settings.h"
@@ -23,13 +24,13 @@ struct Fitted {
   std::unique_ptr<correctors::PositionModel> model;
 };
 
-Fitted fitIn(const RoomRecording& recording, const std::string& method_text) {
+Fitted fitIn(const RoomRecording& recording, const std::string& method_text, const RunControl& control = {}) {
   const MethodText text = parseMethodText(method_text).value();
   const correctors::PositionMethod& method = *correctors::findPositionMethod(text.id).value();
   const Settings settings = resolveSettings(text.id, method.settings, text.given).value();
   const calibration::Alignment alignment = calibration::fitAlignment(recording.fit_nodes).value();
   const correctors::FitData data = calibration::makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
-  return {alignment, method.fit(data, settings, {}).value()};
+  return {alignment, method.fit(data, settings, control).value()};
 }
 
 }  // namespace
@@ -43,6 +44,8 @@ class RoomsAccuracyTest : public QObject {
   void theFieldItselfBeatsEveryMethodOfTheSurvey_data();
   void theFieldItselfBeatsEveryMethodOfTheSurvey();
   void anEmptyRoomIsLeftAlone();
+  void theFieldSettles_data();
+  void theFieldSettles();
 };
 
 void RoomsAccuracyTest::roomsAreWhatTheySay_data() {
@@ -126,6 +129,31 @@ void RoomsAccuracyTest::anEmptyRoomIsLeftAlone() {
   // Without metal the physics is known: both are the same rigid fit.
   FT_VERIFY_MATCH(near(aligned_mm, known_mm, 1e-6));
   QVERIFY(roomRms_mm(*ours.model, ours.alignment, recording.exact_nodes) < aligned_mm + 0.5);
+}
+
+void RoomsAccuracyTest::theFieldSettles_data() {
+  QTest::addColumn<QString>("room");
+  QTest::addColumn<std::uint64_t>("seed");
+  // In these recordings two or three choices of sources each make the next one the likelier.
+  QTest::newRow("steel bar") << "steel_bar" << std::uint64_t{1};
+  QTest::newRow("steel bar, a round of three") << "steel_bar" << std::uint64_t{6};
+  QTest::newRow("two bodies") << "two_bodies" << std::uint64_t{7};
+  QTest::newRow("mixed") << "mixed" << std::uint64_t{3};
+}
+
+void RoomsAccuracyTest::theFieldSettles() {
+  QFETCH(QString, room);
+  QFETCH(std::uint64_t, seed);
+  const RoomRecording recording = recordRoom(readRoom(FIELDTRUE_RESOURCES, room.toStdString()), seed, 200, 2);
+  int n_steps = 0;
+  RunControl control;
+  control.progress = [&](double) { ++n_steps; };
+  const Fitted ours = fitIn(recording, "harmonic_field", control);
+  QVERIFY2(n_steps < 20, qPrintable(QString::number(n_steps)));
+  const double ours_mm = roomRms_mm(*ours.model, ours.alignment, recording.exact_nodes);
+  const Fitted other = fitIn(recording, "gaussian_process");
+  const double other_mm = roomRms_mm(*other.model, other.alignment, recording.exact_nodes);
+  QVERIFY2(ours_mm < 0.8 * other_mm, qPrintable(QString("%1 against %2 mm").arg(ours_mm).arg(other_mm)));
 }
 
 FIELDTRUE_TEST(RoomsAccuracyTest)
