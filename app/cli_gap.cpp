@@ -2,6 +2,7 @@
 
 #include <QCoreApplication>
 #include <filesystem>
+#include <iostream>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -17,6 +18,7 @@
 #include "app/cli_values.h"
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
+#include "calib/gap/first_look.h"
 #include "calib/gap/plan_check.h"
 #include "calib/gap/report_json.h"
 #include "calib/tables/table_sensors.h"
@@ -37,6 +39,7 @@ struct DiagnoseOptions {
   std::string html;
   std::string updated_scene;
   int replicates = 0;
+  bool first = false;
   TableArguments table;
 };
 
@@ -96,6 +99,16 @@ Result<void> writeScene(const std::string& path, const simulation::Scene& scene)
   return writeFileAtomically(path, [&](std::ostream& out) { out << toJson(scene).dump(2) << '\n'; });
 }
 
+/// On standard error, before the diagnosis of all places begins.
+void tellFirstLook(const CalibrationTable& table, const simulation::Scene* scene, const RunControl& control) {
+  const auto part = gap::firstLook(table);
+  if (!part) return;
+  RunControl quiet = control;
+  quiet.progress = [](double) {};
+  if (const auto report = gap::diagnose(*part, nullptr, scene, {}, quiet))
+    std::cerr << "Provisional, by " << report->input.places << " of the places: " << report->text << std::endl;
+}
+
 Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   const auto input = readDiagnosisInput(options);
   if (!input) return tl::unexpected(input.error());
@@ -105,6 +118,7 @@ Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common)
     gap::DiagnosisOptions diagnosis;
     diagnosis.replicates = options.replicates;
     diagnosis.against = input->against;
+    if (options.first) tellFirstLook(input->table, scene, control);
     return gap::diagnose(input->table, samples, scene, diagnosis, control);
   });
   if (!report) return notPossible(report.error());
@@ -146,6 +160,10 @@ void addDiagnose(CommandLine& line) {
                    "same is named (0, the default: not; 50 is a good number, at most ten minutes)")
       ->type_name("N")
       ->check(CLI::Range(0, 1000));
+  command
+      ->add_flag("--first", options->first,
+                 "Tell on standard error within seconds what some of the places say, where there are 180 and more")
+      ->excludes("--against");
   command->add_option("--out", options->out, "Report to write (*.gap.json)")->type_name("FILE")->required();
   command->add_option("--html", options->html, "Page to write beside it")->type_name("FILE");
   command

@@ -40,6 +40,11 @@ bool isNameless(const std::string& effect) {
   return effect == "none" || effect == kUnnamedSmooth || effect == kUnnamedScattered;
 }
 
+bool isSureOfMost(const GapReport& report) {
+  constexpr double kMost = 0.5;
+  return !report.selected.empty() && report.remaining.high90 && *report.remaining.high90 < kMost;
+}
+
 std::string howFarOffText(const GapReport& report) {
   const Remaining& left = report.remaining;
   return "Half of the readings that no fit saw lie off by less than " + shown(left.p50_mm) +

@@ -138,7 +138,11 @@ std::string verdictText(const GapReport& report, const std::string& thing) {
     case GapVerdict::kNoGap:
       return "No " + thing + ": the recording agrees with the simulation within its noise (" + gap + ").";
     case GapVerdict::kExplained:
-      return "The " + thing + " (" + gap + ") is explained by: " + causesText(report) + "; " + fallText(report) + ".";
+      return "The " + thing + " (" + gap + ") is explained by: " + causesText(report) +
+             (isSureOfMost(report) ? "; " + fallText(report)
+                                   : ", as far as these places can tell; " + fallText(report) +
+                                         ", so more than half may have another cause") +
+             ".";
     case GapVerdict::kPartlyExplained:
       return "The " + thing + " (" + gap + ") is partly explained by: " + causesText(report) + "; " + fallText(report) +
              ", the rest has another cause.";

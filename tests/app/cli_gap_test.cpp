@@ -88,6 +88,24 @@ class CliGapTest : public QObject {
     QVERIFY(run.json() == json::parse(one.toStdString()));
   }
 
+  /// Before all places are looked at, and without a word in the report of them.
+  void someOfThePlacesAreToldFirst() {
+    FT_VERIFY_STATUS(runCli({"simulate", "--scene", at("metal.scene.json"), "--plan",
+                             "grid:6x6x5@0.24:origin=0.6,-0.6,-0.45", "--seed", "5", "--nodes", at("many.nodes.csv")}),
+                     0);
+    const auto diagnosedTo = [&](const char* name, const QStringList& more) {
+      return runCli(QStringList{"diagnose", "--nodes", at("many.nodes.csv"), "--out", at(name)} + more);
+    };
+    const CliRun plain = diagnosedTo("plain.gap.json", {});
+    FT_VERIFY_STATUS(plain, 0);
+    QVERIFY(!plain.err.contains("Provisional"));
+    const CliRun run = diagnosedTo("many.gap.json", {"--first"});
+    FT_VERIFY_STATUS(run, 0);
+    QVERIFY2(run.err.startsWith("Provisional, by 60 of the places: The gap "), run.err.constData());
+    QVERIFY2(run.err.contains("etal"), run.err.constData());
+    QCOMPARE(readWhole(at("many.gap.json")), readWhole(at("plain.gap.json")));
+  }
+
   /// Metal carried in between two recordings of other places: told, and in the document as the contract has it.
   void whatChangedIsTold() {
     const QString other = "grid:4x4x4@0.33:origin=0.55,-0.45,-0.5";
@@ -119,6 +137,9 @@ class CliGapTest : public QObject {
     QTest::newRow("samples of what changed")
         << QStringList{"diagnose", "--nodes", few, "--against", few, "--samples", few, "--out", at("x.gap.json")} << 2
         << QByteArray("--samples tells nothing");
+    QTest::newRow("a first look at what changed")
+        << QStringList{"diagnose", "--nodes", few, "--against", few, "--first", "--out", at("x.gap.json")} << 2
+        << QByteArray("--first");
     QTest::newRow("no plan") << QStringList{"plan-check"} << 2 << QByteArray("--plan");
     QTest::newRow("bad plan") << QStringList{"plan-check", "--plan", "grid:5x5"} << 2 << QByteArray("5x5");
   }

@@ -1,4 +1,5 @@
 #include <benchmark/benchmark.h>
+#include <sys/resource.h>
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -7,9 +8,11 @@
 #include <random>
 
 #include "calib/gap/diagnosis.h"
+#include "calib/gap/first_look.h"
 #include "calib/identify/field_comparison.h"
 #include "calib/simulation/simulator.h"
 #include "tests/bench/two_threads.h"
+#include "tests/support/bent_room.h"
 
 /// What a diagnosis costs by the number of places and by room, and what changed since an earlier recording, on two
 /// threads; and the density of two recordings under one field, beside the same density with its covariance written out
@@ -43,14 +46,25 @@ CalibrationTable recorded(const char* room, int n, int m, std::uint64_t seed) {
   return simulation::simulate(scene.value(), planOf(n, m, 1), options).value().table;
 }
 
-void diagnoseRoom(benchmark::State& state, const char* room) {
-  const auto n = static_cast<int>(state.range(0));
-  const CalibrationTable table = recorded(room, n, static_cast<int>(state.range(1)), 1);
+/// Largest memory the process has held so far [MiB].
+double peak_mib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+void diagnoseTable(benchmark::State& state, const CalibrationTable& table) {
   for ([[maybe_unused]] auto _ : state) {
     auto report = gap::diagnose(table, nullptr, nullptr, {}, twoThreads());
     benchmark::DoNotOptimize(report);
   }
   state.SetLabel(std::to_string(table.nodes.size()) + " places");
+  state.counters["peak_MiB"] = peak_mib();
+}
+
+void diagnoseRoom(benchmark::State& state, const char* room) {
+  const auto n = static_cast<int>(state.range(0));
+  diagnoseTable(state, recorded(room, n, static_cast<int>(state.range(1)), 1));
 }
 BENCHMARK_CAPTURE(diagnoseRoom, clean, "clean")->Args({5, 4})->Args({9, 7})->Unit(benchmark::kSecond)->UseRealTime();
 BENCHMARK_CAPTURE(diagnoseRoom, steel_floor, "steel_floor")
@@ -58,7 +72,27 @@ BENCHMARK_CAPTURE(diagnoseRoom, steel_floor, "steel_floor")
     ->Args({9, 7})
     ->Unit(benchmark::kSecond)
     ->UseRealTime();
+BENCHMARK_CAPTURE(diagnoseRoom, steel_bar, "steel_bar")->Args({9, 7})->Unit(benchmark::kSecond)->UseRealTime();
 BENCHMARK_CAPTURE(diagnoseRoom, mixed, "mixed")->Args({5, 4})->Args({9, 7})->Unit(benchmark::kSecond)->UseRealTime();
+
+/// A room bent as no physics would bend it.
+void diagnoseNameless(benchmark::State& state) {
+  const auto n = static_cast<int>(state.range(0));
+  diagnoseTable(state, testing::bentRoom({n, n, static_cast<int>(state.range(1))}));
+}
+BENCHMARK(diagnoseNameless)->Args({5, 4})->Args({9, 7})->Unit(benchmark::kSecond)->UseRealTime();
+
+/// What some of the places say while all are looked at.
+void firstLook(benchmark::State& state, const char* room) {
+  diagnoseTable(state, gap::firstLook(recorded(room, 9, 7, 1)).value());
+}
+BENCHMARK_CAPTURE(firstLook, steel_bar, "steel_bar")->Unit(benchmark::kSecond)->UseRealTime();
+BENCHMARK_CAPTURE(firstLook, mixed, "mixed")->Unit(benchmark::kSecond)->UseRealTime();
+
+BENCHMARK_CAPTURE(diagnoseRoom, steel_floor_5000, "steel_floor")
+    ->Args({17, 17})
+    ->Unit(benchmark::kSecond)
+    ->UseRealTime();
 
 void changeSinceEarlier(benchmark::State& state) {
   const auto n = static_cast<int>(state.range(0));

@@ -150,7 +150,8 @@ std::string gapHeadline(const gap::GapReport& report) {
     case gap::GapVerdict::kNoGap:
       return is_change ? "Nothing changed since the earlier recording" : "The simulation matches the recording";
     case gap::GapVerdict::kExplained:
-      return (is_change ? "Changed, and explained" : "Explained") + names;
+      return std::string(is_change ? "Changed, and explained" : "Explained") +
+             (gap::isSureOfMost(report) ? "" : " as far as these places can tell") + names;
     case gap::GapVerdict::kPartlyExplained:
       return (is_change ? "Changed, and partly explained" : "Partly explained") + names;
     case gap::GapVerdict::kUnexplained:

@@ -17,6 +17,7 @@
 #include "acquisition/session/recorded_table.h"
 #include "calib/core/file_io.h"
 #include "calib/gap/diagnosis.h"
+#include "calib/gap/first_look.h"
 #include "calib/gap/report_json.h"
 #include "calib/recording/unit_slip.h"
 #include "calib/tables/table_sensors.h"
@@ -37,6 +38,8 @@ namespace {
 constexpr std::size_t kFewestRows = 12;
 constexpr int kGapInspectorWidth = 400;
 constexpr int kReplicates = 50;
+constexpr double kProgressSteps = 1000.0;
+constexpr double kFirstShare = 0.15;  ///< Of the progress: a first look at some of the places.
 
 Result<gap::GapReport> diagnoseWithCalib(const CalibrationTable& table, const SampleTable* samples,
                                          const simulation::Scene* scene, const gap::DiagnosisOptions& options,
@@ -135,7 +138,7 @@ QWidget* GapPage::makeButtons(QWidget* header) {
   save_scene_ = addButton(buttons, tr("Save s&cene..."), "saveGapScene", &GapPage::chooseSceneFile);
   progress_ = new QProgressBar(buttons);
   progress_->setObjectName(QStringLiteral("gapProgress"));
-  progress_->setRange(0, 1000);
+  progress_->setRange(0, static_cast<int>(kProgressSteps));
   progress_->setAccessibleName(tr("Diagnosis"));
   QPushButton* order[] = {run_, choose_, add_, undo_, save_report_, save_scene_, trust_, since_};
   for (int i = 0; i < 8; ++i) grid->addWidget(order[i], i / 2, i % 2);
@@ -167,6 +170,7 @@ void GapPage::setRecording(const CalibrationTable& table, std::function<SampleTa
   table_ = table;
   samples_ = std::move(samples);
   report_.reset();
+  provisional_.reset();
   against_.reset();
   for (Earlier& earlier : earlier_) earlier.report.reset();
   const auto usable = std::count_if(table_.nodes.begin(), table_.nodes.end(),
@@ -180,6 +184,7 @@ void GapPage::setScene(const std::optional<simulation::Scene>& scene) {
   scene_ = scene;
   earlier_.clear();
   report_.reset();
+  provisional_.reset();
   against_.reset();
   showReport();
 }
@@ -237,17 +242,41 @@ void GapPage::run(const gap::DiagnosisOptions& options) {
     return showReport();
   against_ = options.against;
   progress_->setValue(0);
-  jobs_.run(
-      [diagnose = diagnose_, table = table_, samples = samples_ ? samples_() : SampleTable(), scene = scene_,
-       options](const RunControl& control) {
-        return diagnose(table, samples.rows.empty() ? nullptr : &samples, scene ? &*scene : nullptr, options, control);
-      },
-      [this](Result<gap::GapReport> result) { onResult(std::move(result)); },
-      [this](double fraction) { progress_->setValue(static_cast<int>(fraction * 1000.0)); });
+  provisional_.reset();
+  const bool is_first = !report_ && !options.against && options.replicates == 0;
+  if (const auto first = is_first ? gap::firstLook(table_) : std::nullopt) {
+    diagnoseIn(kFirstShare, *first, {}, options, [this, options](Result<gap::GapReport> result) {
+      diagnoseAll(options);
+      if (result) provisional_ = std::move(*result);
+      showReport();
+    });
+  } else {
+    diagnoseAll(options);
+  }
   showReport();
 }
 
+void GapPage::diagnoseAll(const gap::DiagnosisOptions& options) {
+  diagnoseIn(1.0, table_, samples_ ? samples_() : SampleTable(), options,
+             [this](Result<gap::GapReport> result) { onResult(std::move(result)); });
+}
+
+/// Goes on from where the progress is to `to`.
+void GapPage::diagnoseIn(double to, const CalibrationTable& table, SampleTable samples,
+                         const gap::DiagnosisOptions& options, std::function<void(Result<gap::GapReport>)> done) {
+  const double from = progress_->value() / kProgressSteps;
+  jobs_.run(
+      [diagnose = diagnose_, table, samples = std::move(samples), scene = scene_, options](const RunControl& control) {
+        return diagnose(table, samples.rows.empty() ? nullptr : &samples, scene ? &*scene : nullptr, options, control);
+      },
+      std::move(done),
+      [this, from, to](double fraction) {
+        progress_->setValue(static_cast<int>((from + (to - from) * fraction) * kProgressSteps));
+      });
+}
+
 void GapPage::onResult(Result<gap::GapReport> result) {
+  provisional_.reset();
   if (result) {
     report_ = std::move(*result);
   } else {
@@ -272,6 +301,7 @@ void GapPage::undo() {
   jobs_.stop();
   scene_ = std::move(earlier_.back().scene);
   report_ = std::move(earlier_.back().report);
+  provisional_.reset();
   earlier_.pop_back();
   against_.reset();
   showReport();
@@ -320,7 +350,7 @@ Result<void> GapPage::saveScene(const QString& path) const {
 void GapPage::showReport() {
   showWords();
   showField();
-  inspector_->setReport(report_);
+  inspector_->setReport(shown());
   showButtons();
   workbench_.setGapReport(report_);
 }
@@ -330,15 +360,22 @@ void GapPage::showWords() {
                      : scene_
                          ? tr("The simulation holds %n effect(s).", nullptr, static_cast<int>(scene_->effects.size()))
                          : tr("The simulation is an ideal tracker in free space."));
-  const bool matches =
-      report_ && (report_->verdict == gap::GapVerdict::kNoGap || report_->verdict == gap::GapVerdict::kExplained);
-  header_->setProperty("state", !report_ ? "" : matches ? "apply" : "leave");
+  const std::optional<gap::GapReport>& report = shown();
+  const bool matches = report && (report->verdict == gap::GapVerdict::kNoGap ||
+                                  (report->verdict == gap::GapVerdict::kExplained && gap::isSureOfMost(*report)));
+  header_->setProperty("state", !report ? "" : matches ? "apply" : "leave");
   for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(*widget);
   QString next;
-  if (report_) {
-    headline_->setText(QString::fromStdString(gapHeadline(*report_)));
-    sentence_->setText(QString::fromStdString(report_->text));
-    next = QString::fromStdString(report_->next_measurement);
+  if (report) {
+    const QString headline = QString::fromStdString(gapHeadline(*report));
+    const QString sentence = QString::fromStdString(report->text);
+    headline_->setText(report_ ? headline : tr("Provisional: %1").arg(headline));
+    sentence_->setText(report_ ? sentence
+                               : tr("By %1 of the places; all of them are %2. %3")
+                                     .arg(report->input.places)
+                                     .arg(isDiagnosing() ? tr("being looked at") : tr("yet to be looked at"))
+                                     .arg(sentence));
+    if (report_) next = QString::fromStdString(report->next_measurement);
     if (!next.isEmpty()) next = tr("Next measurement: %1").arg(next);
   } else {
     headline_->setText(isDiagnosing() ? tr("Diagnosing...") : tr("Not diagnosed yet"));
@@ -352,12 +389,13 @@ void GapPage::showWords() {
 }
 
 void GapPage::showField() {
-  if (!report_) {
+  const std::optional<gap::GapReport>& report = shown();
+  if (!report) {
     field_->setField({});
     return;
   }
-  const FieldScale scale = fieldScale(gapField(*report_, false, &table_));
-  field_->setField(gapField(*report_, after_->isChecked(), &table_));
+  const FieldScale scale = fieldScale(gapField(*report, false, &table_));
+  field_->setField(gapField(*report, after_->isChecked(), &table_));
   field_->setScaleMax_mm(scale.max_mm);
   field_->setMagnification(scale.magnification);
 }
@@ -374,7 +412,7 @@ void GapPage::showButtons() {
   since_->setEnabled(!isDiagnosing());
   save_report_->setEnabled(!isDiagnosing() && report_.has_value());
   save_scene_->setEnabled(!isDiagnosing());
-  after_->setEnabled(report_.has_value());
+  after_->setEnabled(shown().has_value());
   progress_->setVisible(isDiagnosing());
   header_->layout()->activate();
 }

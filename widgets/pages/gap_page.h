@@ -43,6 +43,8 @@ class GapPage : public QWidget {
   void setScene(const std::optional<simulation::Scene>& scene);
   const std::optional<simulation::Scene>& scene() const { return scene_; }
   const std::optional<gap::GapReport>& report() const { return report_; }
+  /// The report, or what some of the places say until there is one.
+  const std::optional<gap::GapReport>& shown() const { return report_ ? report_ : provisional_; }
   bool isDiagnosing() const { return jobs_.busy(); }
   /// Diagnoses what changed since an earlier recording, a session or a node table.
   void diagnoseSince(const QString& path);
@@ -65,6 +67,9 @@ class GapPage : public QWidget {
   void run(const gap::DiagnosisOptions& options = {});
   void tryAgainAndAgain();
   void chooseEarlier();
+  void diagnoseAll(const gap::DiagnosisOptions& options);
+  void diagnoseIn(double to, const CalibrationTable& table, SampleTable samples, const gap::DiagnosisOptions& options,
+                  std::function<void(Result<gap::GapReport>)> done);
   void onResult(Result<gap::GapReport> result);
   void runOrStop();
   void addToSimulation();
@@ -85,6 +90,7 @@ class GapPage : public QWidget {
   std::optional<simulation::Scene> scene_;
   std::vector<Earlier> earlier_;
   std::optional<gap::GapReport> report_;
+  std::optional<gap::GapReport> provisional_;        ///< Of some of the places, until there is a report of all.
   std::shared_ptr<const CalibrationTable> against_;  ///< Of the last diagnosis.
   QString against_name_;
   BackgroundJobs jobs_{this};

@@ -12,6 +12,7 @@
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/radial/rbf_field.h"
 #include "calib/correctors/radial/rbf_system.h"
+#include "calib/geometry/spacing.h"
 #include "calib/identify/physics_fit.h"
 
 namespace fieldtrue::correctors {

@@ -11,6 +11,7 @@
 #include "calib/correctors/radial/field_position.h"
 #include "calib/correctors/radial/rbf_system.h"
 #include "calib/correctors/radial/rbf_tuning.h"
+#include "calib/geometry/spacing.h"
 
 namespace fieldtrue::correctors {
 namespace {

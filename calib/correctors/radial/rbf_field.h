@@ -88,8 +88,4 @@ std::optional<RadialKernel> radialKernelFrom(const std::string& text);
 /// median of the others.
 Eigen::VectorXd placeNoise_m2(const FitData& data, const Places& places);
 
-/// A subset of places that spans them all and still holds near pairs: half by farthest-point choice, half their nearest
-/// neighbours; ascending. All of them when there are no more than `count`.
-std::vector<std::size_t> spreadPlaces(std::span<const Eigen::Vector3d> p_m, std::size_t count);
-
 }  // namespace fieldtrue::correctors

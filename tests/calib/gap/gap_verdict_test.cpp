@@ -49,6 +49,31 @@ class GapVerdictTest : public QObject {
     QVERIFY(verdictOf(leaving(value, low90), false, false, {}) == GapVerdict::kNoGap);
   }
 
+  /// A wide interval leaves the verdict, and is told: half of what was there, and perhaps all of it, may be left.
+  void saysWhereMostMayBeLeft() {
+    GapReport report;
+    report.verdict = GapVerdict::kExplained;
+    SelectedEffect plate;
+    plate.effect = "finite_plate";
+    plate.equivalents = {"finite_plate"};
+    report.selected.push_back(plate);
+    report.remaining.excess2_before_mm2 = 400.0;
+    report.remaining.fraction = 0.25;
+    const QString unsure = "as far as these places can tell; on places the fit did not see";
+    for (const Left high90 : {Left(0.64), Left()}) {
+      report.remaining.high90 = high90;
+      QVERIFY(!isSureOfMost(report));
+      const QString text = QString::fromStdString(verdictText(report, "gap"));
+      QVERIFY2(text.contains(unsure) && text.endsWith("so more than half may have another cause."), qPrintable(text));
+    }
+    report.remaining.high90 = 0.36;
+    QVERIFY(isSureOfMost(report));
+    const QString text = QString::fromStdString(verdictText(report, "gap"));
+    QVERIFY2(text.endsWith("goes from 20 mm to 10 mm (12 mm at most, 95 % sure)."), qPrintable(text));
+    report.selected.clear();
+    QVERIFY(!isSureOfMost(report));
+  }
+
   void tellsHowFarReadingsLieOff() {
     GapReport report;
     report.floor_position_mm = 1.44;

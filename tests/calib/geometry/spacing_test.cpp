@@ -1,6 +1,9 @@
 #include "calib/geometry/spacing.h"
 
 #include <QTest>
+#include <algorithm>
+#include <cmath>
+#include <functional>
 #include <vector>
 
 #include "tests/support/test_main.h"
@@ -35,6 +38,24 @@ class SpacingTest : public QObject {
 
   void coincidentPointsAreNotApart() {
     QCOMPARE(medianSpacing_m(std::vector<Eigen::Vector3d>(3, Eigen::Vector3d::Ones())), 0.0);
+  }
+
+  void spreadPlacesLeaveNoGapAndKeepNeighbours() {
+    std::vector<Eigen::Vector3d> p_m;
+    for (int k = 0; k < 1000; ++k) p_m.emplace_back(0.1 * (k % 10), 0.1 * (k / 10 % 10), 0.1 * (k / 100));
+    const std::vector<std::size_t> chosen = spreadPlaces(p_m, 200);
+    QCOMPARE(chosen.size(), std::size_t{200});
+    QVERIFY(std::adjacent_find(chosen.begin(), chosen.end(), std::greater_equal<>()) == chosen.end());
+    for (const Eigen::Vector3d& place_m : p_m) {
+      double nearest_m = HUGE_VAL;
+      for (const std::size_t i : chosen) nearest_m = std::min(nearest_m, (p_m[i] - place_m).norm());
+      QVERIFY2(nearest_m < 0.25, qPrintable(QString::number(nearest_m)));
+    }
+    int n_pairs = 0;
+    for (const std::size_t a : chosen)
+      for (const std::size_t b : chosen) n_pairs += a < b && (p_m[a] - p_m[b]).norm() < 0.101 ? 1 : 0;
+    QVERIFY2(n_pairs >= 100, qPrintable(QString::number(n_pairs)));
+    QCOMPARE(spreadPlaces(p_m, 5000).size(), p_m.size());
   }
 };
 

@@ -67,12 +67,14 @@ class GapPageTest : public QObject {
   void tooFewPlacesSayWhatIsMissing_data();
   void tooFewPlacesSayWhatIsMissing();
   void showsWhatTheReportSays();
+  void explainedSaysWhetherItIsSure();
   void switchShowsWhatIsLeft();
   void trustIsAskedFor();
   void changeSinceIsAskedFor();
   void unitsOfTheEarlierAreChecked();
   void addAndUndoChangeTheScene();
   void stopEndsTheRun();
+  void someOfThePlacesAnswerFirst();
   void otherRowsDropTheReport();
   void whyItFailedIsTold();
   void goesWhileRunning();
@@ -179,6 +181,21 @@ void GapPageTest::showsWhatTheReportSays() {
   QCOMPARE(chart(*page, "time").bars[0].value, 3.0);
   QCOMPARE(chart(*page, "origin").bars[0].value, 0.8);
   QCOMPARE(textOf(*page, "gapFinding"), QStringLiteral("Places 0 and 3 hold the same reading."));
+}
+
+void GapPageTest::explainedSaysWhetherItIsSure() {
+  gap::GapReport report = writtenReport();
+  report.verdict = gap::GapVerdict::kExplained;
+  const auto stateOf = [](GapPage& page) { return find<QWidget>(page, "verdictBar")->property("state").toString(); };
+  report.remaining.high90 = 0.8;
+  const auto unsure = pageThatAnswers(report);
+  QVERIFY2(textOf(*unsure, "headline").startsWith("Explained as far as these places can tell: "),
+           qPrintable(textOf(*unsure, "headline")));
+  QCOMPARE(stateOf(*unsure), QString("leave"));
+  report.remaining.high90 = 0.1;
+  const auto sure = pageThatAnswers(report);
+  QVERIFY2(textOf(*sure, "headline").startsWith("Explained: "), qPrintable(textOf(*sure, "headline")));
+  QCOMPARE(stateOf(*sure), QString("apply"));
 }
 
 void GapPageTest::switchShowsWhatIsLeft() {
@@ -288,6 +305,56 @@ void GapPageTest::stopEndsTheRun() {
   QVERIFY(!page.isDiagnosing());
   QVERIFY(!page.report().has_value());
   QVERIFY(!find<QProgressBar>(page, "gapProgress")->isVisible());
+}
+
+void GapPageTest::someOfThePlacesAnswerFirst() {
+  CalibrationTable many = room_.table;
+  for (Node node : room_.table.nodes) {
+    node.node += 1000;
+    node.reference_from_sensor.position_m.x() += 2.0;
+    many.nodes.push_back(node);
+  }
+  std::atomic<bool> is_all_looked_at = false;
+  const auto answer = [&](const CalibrationTable& table, const SampleTable*, const simulation::Scene*,
+                          const gap::DiagnosisOptions&, const RunControl& control) -> Result<gap::GapReport> {
+    gap::GapReport report = writtenReport();
+    report.input.places = static_cast<int>(table.nodes.size());
+    if (table.nodes.size() == many.nodes.size()) {
+      report.verdict = gap::GapVerdict::kUnexplained;
+      while (!is_all_looked_at && !control.stop.stop_requested())
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return report;
+  };
+  GapPage page(*workbench_, answer);
+  page.setRecording(many, {});
+  auto* diagnose = find<QPushButton>(page, "diagnose");
+  const auto isProvisional = [&] { return textOf(page, "headline").startsWith("Provisional: "); };
+  diagnose->click();
+  QTRY_VERIFY_WITH_TIMEOUT(isProvisional(), kWaitMs);
+  QVERIFY(page.isDiagnosing());
+  QVERIFY(!page.report());
+  QVERIFY2(textOf(page, "gapSentence").startsWith("By 60 of the places; all of them are being looked at. Most of"),
+           qPrintable(textOf(page, "gapSentence")));
+  for (const char* button : {"addToSimulation", "saveGapReport", "trustGap"})
+    QVERIFY2(!find<QPushButton>(page, button)->isEnabled(), button);
+  QVERIFY(!page.saveReport(folder_.filePath("provisional.gap.json")));
+  // Stopped: what was told stays, and is no report.
+  diagnose->click();
+  QVERIFY(!page.isDiagnosing());
+  QVERIFY(isProvisional() && !page.report());
+  QVERIFY(textOf(page, "gapSentence").contains("yet to be looked at"));
+  QVERIFY(!find<QPushButton>(page, "saveGapReport")->isEnabled());
+  is_all_looked_at = true;
+  diagnose->click();
+  QTRY_VERIFY_WITH_TIMEOUT(page.report().has_value(), kWaitMs);
+  QVERIFY(!isProvisional());
+  QCOMPARE(page.report()->verdict, gap::GapVerdict::kUnexplained);
+  QVERIFY(!page.isDiagnosing());
+  // Again: what all of them said stays until they are looked at again.
+  is_all_looked_at = false;
+  diagnose->click();
+  QVERIFY(page.isDiagnosing() && page.report() && !isProvisional());
 }
 
 void GapPageTest::otherRowsDropTheReport() {
