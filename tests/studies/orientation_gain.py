@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
 """What orientation as an input of the position error is worth, on places that no fit saw.
 
-orientation_gain.py FIELDTRUE-CLI [TABLE.nodes.csv ...]
+orientation_gain.py FIELDTRUE-CLI [TABLE.nodes.csv ...] [--rooms FOLDER] [--tables-only]
 
-Makes tables of simulated rooms, permutes the orientations of some, and takes the tables given besides. Of each the places
+Makes tables of simulated rooms, permutes the orientations of some, and takes the tables given and the shipped rooms besides
+(48 places in three orientations each). Of each the places
 are dealt to ten folds; every fold's table is fitted with the others alone (alignment, scales, choice of inputs and all)
 and its own rows are corrected by `apply`. Folds, errors and intervals are this script's own: it asks the program for no
 judgement. Printed are the RMS over places with position alone, with `inputs=auto` and with `inputs=pose`, and the change of
 the RMS from position alone to `auto` with its paired 90 % interval (bootstrap over places). Then: what a correction fitted in
 1, 3 and 6 orientations is worth in others. Then the same of orientations: the RMS angle left, by the same folds.
 """
+import argparse
 import csv
+import glob
 import itertools
 import json
 import math
@@ -21,6 +24,7 @@ import sys
 import tempfile
 
 FOLDS = 10
+ROOM_PLAN = "grid:4x4x3@0.8x0.8x0.9:origin=0,0,0:orientations=3"
 POSITION = ("x_m", "y_m", "z_m")
 TURN = ("qw", "qx", "qy", "qz")
 
@@ -164,59 +168,84 @@ def paired_interval(a, b):
     return changes[100], changes[1899]
 
 
-def main():
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    print("| table | rows | position alone | auto | pose | change by auto, 90 % |\n|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as folder:
-        program = Program(sys.argv[1], folder)
+def told(program, name, table):
+    """One line: RMS with position alone, `auto` and `pose`, and what `auto` changes."""
+    def of(inputs):
+        return squares_by_place(program, table, ["--position", f"gaussian_process:inputs={inputs}"])
 
-        def line(name, table):
-            def of(inputs):
-                return squares_by_place(program, table, ["--position", f"gaussian_process:inputs={inputs}"])
+    position, auto = of("position"), of("auto")
+    try:
+        pose = f"{rms_of(of('pose')):.3g}"
+    except ValueError:  # Turned alike.
+        pose = "-"
+    low, high = paired_interval(position, auto)
+    change = rms_of(auto) / rms_of(position) - 1
+    print(f"| {name} | {len(table.rows)} | {rms_of(position):.3g} | {rms_of(auto):.3g} | {pose} | "
+          f"{100 * change:+.0f} % ({100 * low:+.0f} to {100 * high:+.0f}) |", flush=True)
 
-            position, auto = of("position"), of("auto")
-            try:
-                pose = f"{rms_of(of('pose')):.3g}"
-            except ValueError:  # Turned alike.
-                pose = "-"
+
+def tell_made(program):
+    for name, room in SCENES.items():
+        for turns in (3, 6):
+            told(program, f"{name}, {turns} orientations",
+                 program.simulated(room, f"grid:4x4x3@0.2:orientations={turns}"))
+        told(program, f"{name}, each place turned at random", program.simulated(room, scattered_plan(random.Random(2))))
+    for name in ("unequal coils", "metal"):
+        permuted = program.simulated(SCENES[name], "grid:4x4x3@0.2:orientations=6").permuted(random.Random(3))
+        told(program, f"{name}, 6 orientations permuted", permuted)
+
+
+def tell_unseen(program):
+    print("\n| never seen in these orientations | rows | position alone | auto | change by auto, 90 % | within 2 SD | stated SD / RMS |\n"
+          "|---|---|---|---|---|---|---|")
+    for name, room in SCENES.items():
+        unseen = program.simulated(room, scattered_plan(random.Random(2)))
+        for turns in (1, 3, 6):
+            grid = f"grid:4x4x3@0.2:origin=0.3,-0.3,-0.25:orientations={turns}"
+            seen = program.simulated(room, grid)
+            (position, within, _), (auto, within_auto, stated) = (foreign_squares(program, seen, unseen, inputs)
+                                                       for inputs in ("position", "auto"))
             low, high = paired_interval(position, auto)
-            change = rms_of(auto) / rms_of(position) - 1
-            print(f"| {name} | {len(table.rows)} | {rms_of(position):.3g} | {rms_of(auto):.3g} | {pose} | "
-                  f"{100 * change:+.0f} % ({100 * low:+.0f} to {100 * high:+.0f}) |", flush=True)
+            print(f"| {name}, fitted in {turns} | {len(seen.rows)} | {rms_of(position):.3g} | {rms_of(auto):.3g} | "
+                  f"{100 * (rms_of(auto) / rms_of(position) - 1):+.0f} % ({100 * low:+.0f} to {100 * high:+.0f}) | "
+                  f"{100 * within:.0f} %, {100 * within_auto:.0f} % | {stated:.2g} |", flush=True)
 
-        for name, room in SCENES.items():
-            for turns in (3, 6):
-                line(f"{name}, {turns} orientations", program.simulated(room, f"grid:4x4x3@0.2:orientations={turns}"))
-            line(f"{name}, each place turned at random", program.simulated(room, scattered_plan(random.Random(2))))
-        for name in ("unequal coils", "metal"):
-            permuted = program.simulated(SCENES[name], "grid:4x4x3@0.2:orientations=6").permuted(random.Random(3))
-            line(f"{name}, 6 orientations permuted", permuted)
-        print("\n| never seen in these orientations | rows | position alone | auto | change by auto, 90 % | within 2 SD | stated SD / RMS |\n"
-              "|---|---|---|---|---|---|---|")
-        for name, room in SCENES.items():
-            unseen = program.simulated(room, scattered_plan(random.Random(2)))
-            for turns in (1, 3, 6):
-                grid = f"grid:4x4x3@0.2:origin=0.3,-0.3,-0.25:orientations={turns}"
-                seen = program.simulated(room, grid)
-                (position, within, _), (auto, within_auto, stated) = (foreign_squares(program, seen, unseen, inputs)
-                                                           for inputs in ("position", "auto"))
-                low, high = paired_interval(position, auto)
-                print(f"| {name}, fitted in {turns} | {len(seen.rows)} | {rms_of(position):.3g} | {rms_of(auto):.3g} | "
-                      f"{100 * (rms_of(auto) / rms_of(position) - 1):+.0f} % ({100 * low:+.0f} to {100 * high:+.0f}) | "
-                      f"{100 * within:.0f} %, {100 * within_auto:.0f} % | {stated:.2g} |", flush=True)
-        print("\n| orientations | rows | none | " + " | ".join(TURNING) + " |\n|---|---|---|" + "---|" * len(TURNING))
-        for name, room in SCENES.items():
-            for plan, words in (("grid:4x4x3@0.2:orientations=3", "3 orientations"),
-                                (scattered_plan(random.Random(2)), "each place turned at random")):
-                table = program.simulated(room, plan)
-                left = [squares_by_place(program, table, ["--position", "affine", "--orientation", method], square_deg2)
-                        for method in ["none"] + TURNING]
-                print(f"| {name}, {words} | {len(table.rows)} | " + " | ".join(f"{rms_of(one):.3g}" for one in left) + " |",
-                      flush=True)
-        print("\n| table | rows | position alone | auto | pose | change by auto, 90 % |\n|---|---|---|---|---|---|")
-        for path in sys.argv[2:]:
-            line(os.path.basename(path).removesuffix(".nodes.csv"), Table(path))
+
+def tell_turning(program):
+    print("\n| orientations | rows | none | " + " | ".join(TURNING) + " |\n|---|---|---|" + "---|" * len(TURNING))
+    for name, room in SCENES.items():
+        for plan, words in (("grid:4x4x3@0.2:orientations=3", "3 orientations"),
+                            (scattered_plan(random.Random(2)), "each place turned at random")):
+            table = program.simulated(room, plan)
+            left = [squares_by_place(program, table, ["--position", "affine", "--orientation", method], square_deg2)
+                    for method in ["none"] + TURNING]
+            print(f"| {name}, {words} | {len(table.rows)} | " + " | ".join(f"{rms_of(one):.3g}" for one in left) + " |",
+                  flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cli")
+    parser.add_argument("tables", nargs="*")
+    parser.add_argument("--rooms", help="folder of *.scene.json")
+    parser.add_argument("--tables-only", action="store_true", help="leave out what is made here")
+    options = parser.parse_args()
+    head = "| table | rows | position alone | auto | pose | change by auto, 90 % |\n|---|---|---|---|---|---|"
+    with tempfile.TemporaryDirectory() as folder:
+        program = Program(options.cli, folder)
+        if not options.tables_only:
+            print(head)
+            tell_made(program)
+            tell_unseen(program)
+            tell_turning(program)
+            print()
+        print(head)
+        for path in sorted(glob.glob(os.path.join(options.rooms, "*.scene.json"))) if options.rooms else []:
+            with open(path, encoding="utf-8") as text:
+                told(program, os.path.basename(path).removesuffix(".scene.json").replace("_", " ") + ", 3 orientations",
+                     program.simulated(json.load(text), ROOM_PLAN))
+        for path in options.tables:
+            told(program, os.path.basename(path).removesuffix(".nodes.csv"), Table(path))
 
 
 if __name__ == "__main__":

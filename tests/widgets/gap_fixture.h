@@ -15,14 +15,19 @@ struct KnownRoom {
 
 inline const Eigen::Vector3d kBody_m{0.45, 0.3, -0.35};
 
-/// 100 places over a steel ball under the grid.
-inline KnownRoom roomWithSteel() {
+/// A steel ball under the grid.
+inline simulation::Scene steelScene() {
   simulation::Scene scene = gapScene();
   const Eigen::Vector3d in_tracker_m = inverse(scene.reference_from_tracker) * kBody_m;
   scene.effects.push_back({"compact_metal",
                            {{"center_m", {in_tracker_m.x(), in_tracker_m.y(), in_tracker_m.z()}},
                             {"radius_m", 0.14},
                             {"material", "ferromagnetic"}}});
+  return scene;
+}
+
+/// 100 places over it.
+inline KnownRoom roomWithSteel() {
   KnownRoom room;
   room.body_m = kBody_m;
   GapPlan plan;
@@ -30,7 +35,7 @@ inline KnownRoom roomWithSteel() {
   plan.is_scattered = true;
   room.before = recordedIn(gapScene(), gapPlan(plan), 6);
   plan.is_scattered = false;
-  room.table = recordedIn(scene, gapPlan(plan), 7, &room.samples);
+  room.table = recordedIn(steelScene(), gapPlan(plan), 7, &room.samples);
   return room;
 }
 

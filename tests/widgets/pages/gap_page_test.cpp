@@ -82,6 +82,7 @@ class GapPageTest : public QObject {
   void positionOnlyIsDiagnosed();
   void windowFindsTheMetal();
   void windowTellsWhatCame();
+  void windowTellsAProvisionalAnswer();
 
  private:
   /// Whether the first body drawn is the known room's, within 10 cm.
@@ -334,6 +335,7 @@ void GapPageTest::someOfThePlacesAnswerFirst() {
   QTRY_VERIFY_WITH_TIMEOUT(isProvisional(), kWaitMs);
   QVERIFY(page.isDiagnosing());
   QVERIFY(!page.report());
+  QCOMPARE(find<QWidget>(page, "verdictBar")->property("state").toString(), QString());
   QVERIFY2(textOf(page, "gapSentence").startsWith("By 60 of the places; all of them are being looked at. Most of"),
            qPrintable(textOf(page, "gapSentence")));
   for (const char* button : {"addToSimulation", "saveGapReport", "trustGap"})
@@ -463,6 +465,30 @@ void GapPageTest::windowTellsWhatCame() {
   QVERIFY(QDir().mkpath(folder));
   QTest::qWait(400);
   QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-since.png")));
+}
+
+/// 192 places: the body is named and drawn by 60 of them, beside every place of these.
+void GapPageTest::windowTellsAProvisionalAnswer() {
+  MainWindow window;
+  GapPage* page = openedAtGap(window);
+  QVERIFY(page && page->isVisible());
+  page->setRecording(recordedIn(steelScene(), gapPlan({.counts = {8, 6, 4}}), 8), {});
+  QTest::mouseClick(find<QWidget>(*page, "diagnose"), Qt::LeftButton);
+  QTRY_VERIFY_WITH_TIMEOUT(page->shown().has_value(), kWaitMs);
+  QVERIFY(page->isDiagnosing() && !page->report());
+  QVERIFY2(textOf(*page, "headline").contains("Compact metal body"), qPrintable(textOf(*page, "headline")));
+  const ErrorField& field = find<FieldView>(*page, "gapField")->field();
+  QCOMPARE(field.arrows.size(), std::size_t{60});
+  QVERIFY(standsAtTheMetal(field));
+  const QString folder = qEnvironmentVariable("FIELDTRUE_ARTEFACTS");
+  if (!folder.isEmpty()) {
+    QVERIFY(QDir().mkpath(folder));
+    QTest::qWait(100);
+    QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-provisional.png")));
+  }
+  QTRY_VERIFY_WITH_TIMEOUT(page->report().has_value(), kWaitMs);
+  QCOMPARE(page->report()->input.places, 192);
+  QCOMPARE(find<FieldView>(*page, "gapField")->field().arrows.size(), std::size_t{192});
 }
 
 FIELDTRUE_WINDOW_TEST(GapPageTest)
