@@ -1,4 +1,5 @@
 #include <benchmark/benchmark.h>
+#include <ceres/ceres.h>
 #include <sys/resource.h>
 
 #include <Eigen/Cholesky>
@@ -10,6 +11,9 @@
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/first_look.h"
 #include "calib/identify/field_comparison.h"
+#include "calib/identify/refine.h"
+#include "calib/identify/rows.h"
+#include "calib/identify/search.h"
 #include "calib/simulation/simulator.h"
 #include "tests/bench/two_threads.h"
 #include "tests/support/bent_room.h"
@@ -93,6 +97,112 @@ BENCHMARK_CAPTURE(diagnoseRoom, steel_floor_5000, "steel_floor")
     ->Args({17, 17})
     ->Unit(benchmark::kSecond)
     ->UseRealTime();
+
+/// A steel floor found in a recording, its parameters then 3 % off: what the joint refinement starts from.
+struct FloorOff {
+  CalibrationTable table = recorded("steel_floor", 5, 4, 1);
+  identify::GapRows rows = identify::makeGapRows(table.nodes, table.metadata).value();
+  identify::GapSearch search{rows, {}};
+  identify::GapModel start;
+
+  FloorOff() {
+    start = search.rank(search.none(), {}).front().model;
+    for (identify::GapTerm& term : start.terms) {
+      term.linear *= 0.97;
+      term.searched *= 0.97;
+    }
+  }
+};
+
+const FloorOff& floorOff() {
+  static const FloorOff once;
+  return once;
+}
+
+void jointFit(benchmark::State& state) {
+  const FloorOff& off = floorOff();
+  identify::RefinedModel refined;
+  for ([[maybe_unused]] auto _ : state)
+    refined = identify::refineJointly(off.search.physics(), off.start, off.search.whitening(), {});
+  state.counters["cost"] = refined.cost;
+}
+BENCHMARK(jointFit)->Unit(benchmark::kMillisecond);
+
+/// The same rows and derivatives, in steps from the start, for any solver of least squares; no law with tails, no
+/// bounds and no tolerance of the alignment, which the joint fit has besides.
+class StepsFromStart final : public ceres::CostFunction {
+ public:
+  explicit StepsFromStart(const FloorOff& off) : off_(off), block_(off.rows.rows.size(), 0) {
+    const identify::Linearized at = linearizedAt(off.start);
+    center_m_ = identify::alignmentCenter_m(at.settings());
+    n_alignment_ = at.nAlignment();
+    set_num_residuals(static_cast<int>(at.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(at.nuisance().cols()));
+  }
+
+  identify::GapModel moved(const double* steps) const {
+    identify::GapModel model = off_.start;
+    const Eigen::Map<const Eigen::VectorXd> step(steps, parameter_block_sizes()[0]);
+    identify::applyAlignmentStep(step.head(n_alignment_), center_m_, off_.rows, model.alignment);
+    Eigen::Index at = n_alignment_;
+    for (identify::GapTerm& term : model.terms) {
+      for (Eigen::VectorXd* part : {&term.linear, &term.searched}) {
+        *part += step.segment(at, part->size());
+        at += part->size();
+      }
+    }
+    return model;
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const identify::GapModel model = moved(parameters[0]);
+    if (jacobians == nullptr) {
+      Eigen::Index at = 0;
+      for (const identify::Vector6d& r :
+           identify::whitenedResiduals(off_.search.physics(), model, off_.search.whitening())) {
+        Eigen::Map<identify::Vector6d>(residuals + at) = r;
+        at += 6;
+      }
+      return true;
+    }
+    const identify::Linearized now = linearizedAt(model);
+    Eigen::Map<Eigen::VectorXd>(residuals, now.size()) = now.residual();
+    if (jacobians[0] != nullptr)
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+          jacobians[0], now.size(), now.nuisance().cols()) = -now.nuisance();
+    return true;
+  }
+
+ private:
+  identify::Linearized linearizedAt(const identify::GapModel& model) const {
+    return {off_.search.physics(), model, off_.search.whitening(), block_};
+  }
+
+  const FloorOff& off_;
+  std::vector<int> block_;
+  Eigen::Vector3d center_m_;
+  Eigen::Index n_alignment_ = 0;
+};
+
+void jointFitByCeres(benchmark::State& state) {
+  const FloorOff& off = floorOff();
+  double cost = 0.0;
+  for ([[maybe_unused]] auto _ : state) {
+    auto* function = new StepsFromStart(off);  // The problem's, from here on.
+    std::vector<double> steps(static_cast<std::size_t>(function->parameter_block_sizes()[0]), 0.0);
+    ceres::Problem problem;
+    problem.AddResidualBlock(function, nullptr, steps.data());
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+    options.logging_type = ceres::SILENT;
+    options.max_num_iterations = 30;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem, &summary);
+    cost = 2.0 * summary.final_cost;
+  }
+  state.counters["sum_of_squares"] = cost;
+}
+BENCHMARK(jointFitByCeres)->Unit(benchmark::kMillisecond);
 
 void changeSinceEarlier(benchmark::State& state) {
   const auto n = static_cast<int>(state.range(0));
