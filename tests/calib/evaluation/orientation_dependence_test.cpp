@@ -136,7 +136,7 @@ class OrientationDependenceTest : public QObject {
     QTest::addColumn<bool>("by_neighbours");
     const auto add = [](const char* name, int places, const std::vector<Eigen::Quaterniond>& turned, ErrorLaw law,
                         const char* answer, bool by_neighbours) {
-      QTest::newRow(name) << Room{places, std::move(turned), std::move(law)} << QByteArray(answer) << by_neighbours;
+      QTest::newRow(name) << Room{places, turned, std::move(law)} << QByteArray(answer) << by_neighbours;
     };
     add("eight orientations, place only", 60, manyOrientations(8), placeOnly, "no", false);
     add("eight orientations, unequal coils", 60, manyOrientations(8), unequalCoils, "yes", false);
@@ -156,8 +156,8 @@ class OrientationDependenceTest : public QObject {
     add("single visits, place only", 400, {}, placeOnly, "no", true);
     const auto moved = [](const char* name, int places, const std::vector<Eigen::Quaterniond>& turned, ErrorLaw law,
                           const char* answer, bool by_neighbours) {
-      QTest::newRow(name) << Room{places, std::move(turned), std::move(law), PosePart::kPosition, 0.001}
-                          << QByteArray(answer) << by_neighbours;
+      QTest::newRow(name) << Room{places, turned, std::move(law), PosePart::kPosition, 0.001} << QByteArray(answer)
+                          << by_neighbours;
     };
     moved("positions of a bent field", 60, manyOrientations(8), bentField, "no", false);
     moved("positions of a bent field, three orientations", 40, threeOrientations(), bentField, "no", false);

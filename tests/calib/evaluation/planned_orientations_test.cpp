@@ -1,5 +1,6 @@
 #include "calib/evaluation/orientation/planned_orientations.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <QTest>
 #include <cmath>
@@ -40,11 +41,12 @@ Turns cubeTurns() {
 std::vector<PlannedPlace> grid(const Turns& turns, int turned = 27) {
   std::vector<PlannedPlace> plan;
   for (int node = 0; node < 27; ++node) {
+    const int layer = node / 9;
     PlannedPlace place;
     place.node = node;
-    place.index = {node % 3, node / 3 % 3, node / 9};
+    place.index = {node % 3, node / 3 % 3, layer};
     place.reference_from_sensor.position_m =
-        Eigen::Vector3d(0.3 + 0.2 * (node % 3), 0.2 * (node / 3 % 3) - 0.2, 0.2 * (node / 9) + 0.1);
+        Eigen::Vector3d(0.3, -0.2, 0.1) + 0.2 * Eigen::Vector3d(node % 3, node / 3 % 3, layer);
     for (const Eigen::Quaterniond& q : turns) {
       place.reference_from_sensor.orientation = q;
       plan.push_back(place);

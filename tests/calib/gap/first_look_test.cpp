@@ -17,10 +17,11 @@ CalibrationTable twiceVisited(int n) {
   table.metadata.jig_tolerance_m = 0.001;
   for (int visit = 0; visit < 2; ++visit) {
     for (int k = 0; k < n * n * 6; ++k) {
+      const int layer = k / (n * n);
       Node node;
       node.node = 10 + k;
       node.visit = visit;
-      node.reference_from_sensor.position_m = 0.1 * Eigen::Vector3d(k % n, k / n % n, k / (n * n));
+      node.reference_from_sensor.position_m = 0.1 * Eigen::Vector3d(k % n, k / n % n, layer);
       node.tracker_from_sensor.position_m = node.reference_from_sensor.position_m;
       table.nodes.push_back(node);
     }

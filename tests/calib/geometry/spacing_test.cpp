@@ -42,7 +42,9 @@ class SpacingTest : public QObject {
 
   void spreadPlacesLeaveNoGapAndKeepNeighbours() {
     std::vector<Eigen::Vector3d> p_m;
-    for (int k = 0; k < 1000; ++k) p_m.emplace_back(0.1 * (k % 10), 0.1 * (k / 10 % 10), 0.1 * (k / 100));
+    for (int x = 0; x < 10; ++x)
+      for (int y = 0; y < 10; ++y)
+        for (int z = 0; z < 10; ++z) p_m.emplace_back(0.1 * x, 0.1 * y, 0.1 * z);
     const std::vector<std::size_t> chosen = spreadPlaces(p_m, 200);
     QCOMPARE(chosen.size(), std::size_t{200});
     QVERIFY(std::adjacent_find(chosen.begin(), chosen.end(), std::greater_equal<>()) == chosen.end());
