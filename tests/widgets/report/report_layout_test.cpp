@@ -27,6 +27,7 @@ constexpr int kA4_px = 702;
 /// Puts what does not fit into the document's attribute `data-cut`: how far the page, or a part that would scroll or
 /// hide, is wider than its room.
 constexpr const char* kMeasure = R"(<script>
+window.addEventListener('load', function () {  // Before that fonts may still be changing.
 var cut = [];
 document.querySelectorAll('details').forEach(function (d) { d.open = true; });
 var page = document.documentElement;
@@ -38,6 +39,7 @@ document.querySelectorAll('body *').forEach(function (e) {
     cut.push(e.tagName + ' ' + e.scrollWidth + ' in ' + e.clientWidth + ': ' + e.textContent.slice(0, 30));
 });
 page.setAttribute('data-cut', cut.length + ' parts. ' + cut.slice(0, 5).join('; '));
+});
 </script></body>)";
 
 QString browser() { return QStandardPaths::findExecutable(QStringLiteral("chromium")); }
