@@ -1,6 +1,7 @@
 #include "calib/gap/report.h"
 
 #include "calib/gap/verdict.h"
+#include "calib/identify/thresholds.h"
 
 namespace fieldtrue::gap {
 
@@ -41,8 +42,8 @@ bool isNameless(const std::string& effect) {
 }
 
 bool isSureOfMost(const GapReport& report) {
-  constexpr double kMost = 0.5;
-  return !report.selected.empty() && report.remaining.high90 && *report.remaining.high90 < kMost;
+  return !report.selected.empty() && report.remaining.high90 &&
+         *report.remaining.high90 < identify::Thresholds{}.unexplained_left;
 }
 
 std::string howFarOffText(const GapReport& report) {

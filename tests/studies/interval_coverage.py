@@ -3,14 +3,15 @@
 
 interval_coverage.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 30,60,120,567] [--rooms a,b] [--processes N]
 
-Of every room thousands of places are recorded without noise, scattered evenly over its box. Tables are drawn from them;
-each stated position is then moved as a hand misplaces a jig, calm (Gaussian of 2 mm an axis) or with gross slips (one in
-twenty by six times as much). `compare` judges a table: its RMS, its 90 % interval, and the gain with
-its interval. The truth is this script's own: the calibration that `fit` makes of the whole table is applied to 42 places for
-each of the table's (3,000 at least) that no table holds, and the mean square of what is left, plus the known mean square of the misplacing, is what the interval
-should hold: the RMS of this fitted correction at fresh places like those of the table. Untuned methods are left out one by
-one, at all sizes; the tuned ones stand in tables of 60 with ten folds. Printed: the share of tables whose interval holds the
-truth, by cell, with the least and the largest.
+Of every room thousands of places are recorded without noise, scattered evenly over its box. Tables are drawn from
+them; each stated position is then moved as a hand misplaces a jig, calm (Gaussian of 2 mm an axis) or with gross
+slips (one in twenty by six times as much). `compare` judges a table: its RMS, its 90 % interval, and the gain with
+its interval. The truth is this script's own: the calibration that `fit` makes of the whole table is applied to 42
+places for each of the table's (3,000 at least) that no table holds, and the mean square of what is left, plus the
+known mean square of the misplacing, is what the interval should hold: the RMS of this fitted correction at fresh
+places like those of the table. Untuned methods are left out one by one, at all sizes; the tuned ones stand in tables
+of 60 with ten folds. Printed: the share of tables whose interval holds the truth, by cell, with the least and the
+largest.
 """
 import argparse
 import csv

@@ -50,9 +50,9 @@ void writeFoldBack(HtmlWriter& html, const evaluation::FoldBack& fold_back, cons
 }
 
 void writeDependence(HtmlWriter& html, const evaluation::Comparison& comparison) {
-  if (!comparison.position_dependence && !comparison.orientation_dependence) return;
+  if (!comparison.orientation_cover) return;
   html.element("h3", "How the sensor was held");
-  if (const auto& cover = comparison.orientation_cover) html.element("p", cover->text, {{"id", "orientation-cover"}});
+  html.element("p", comparison.orientation_cover->text, {{"id", "orientation-cover"}});
   if (const auto& dependence = comparison.position_dependence)
     html.element("p", dependence->text, {{"id", "position-dependence"}});
   if (const auto& dependence = comparison.orientation_dependence)
@@ -63,7 +63,7 @@ void writeDependence(HtmlWriter& html, const evaluation::Comparison& comparison)
 
 void writeRegion(HtmlWriter& html, const evaluation::Comparison& comparison) {
   const std::string resampling = resamplingText(comparison);
-  if (!comparison.coverage && !comparison.fold_back && !comparison.position_dependence && resampling.empty()) return;
+  if (!comparison.coverage && !comparison.fold_back && !comparison.orientation_cover && resampling.empty()) return;
   html.element("h2", "Region and field");
   if (comparison.coverage) writeCoverage(html, *comparison.coverage);
   if (comparison.fold_back) writeFoldBack(html, *comparison.fold_back, comparison.names);
