@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -20,6 +21,8 @@ using GroupVector = Eigen::Matrix<double, kPerSource, 1>;
 
 /// The smallest prior variance worth telling from none, in squared units; the search is logarithmic from there up to 1.
 constexpr double kSmallestVariance = 1e-12;
+/// Variance of the noise, in units of the one stated.
+constexpr double kLeastNoise = 1e-30;
 
 /// A^T B; a group's columns are six.
 Eigen::MatrixXd thinTransposedTimes(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::MatrixXd& b) {
@@ -250,6 +253,42 @@ class Offers {
   std::vector<char> is_chosen_;
 };
 
+void findNoise(Posterior& posterior) {
+  posterior.setNoiseFactor(std::max(kLeastNoise, posterior.noiseShown()));
+  posterior.solve();
+}
+
+/// @param gain of every group, were it added after the last
+void addGroups(Posterior& posterior, Eigen::VectorXd& gain, const GroupedSystem& system,
+               const GroupSelectionOptions& options, const RunControl& control) {
+  constexpr int kStepsEach = 3;
+  if (options.noise_unknown)
+    posterior.setNoiseFactor(std::max(kLeastNoise, system.y_squared() / std::max(1.0, system.n_rows())));
+  for (std::size_t tries = 0; tries < 2 * options.most_groups + 1 && !control.stop.stop_requested(); ++tries) {
+    const Offers offers(system, posterior);
+    const bool is_full = posterior.groups.size() >= options.most_groups;
+    const auto best = is_full ? std::nullopt : offers.best(options.least_gain);
+    if (!best || tries == 2 * options.most_groups)
+      for (Eigen::Index g = 0; g < system.groups(); ++g) gain[g] = offers.of(g).gain;
+    if (!best) break;
+    posterior.groups.push_back(best->first);
+    posterior.variance.push_back(best->second.variance);
+    posterior.gather();
+    posterior.solve();
+    improveVariances(posterior, system, kStepsEach);
+    if (options.noise_unknown) findNoise(posterior);
+  }
+}
+
+void takeChosen(Posterior& posterior, const GroupSelectionOptions& options) {
+  posterior.variance = options.chosen_variances;
+  posterior.groups.resize(posterior.variance.size());
+  std::iota(posterior.groups.begin(), posterior.groups.end(), Eigen::Index{0});
+  posterior.gather();
+  posterior.solve();
+  if (options.noise_unknown) findNoise(posterior);
+}
+
 }  // namespace
 
 GroupedSystem::GroupedSystem(const Eigen::MatrixXd& design, const Eigen::MatrixXd& nuisance, const Eigen::VectorXd& y,
@@ -276,31 +315,14 @@ Eigen::MatrixXd GroupedSystem::rows(Eigen::Index first_group, Eigen::Index count
 
 GroupSelection selectGroups(const GroupedSystem& system, const GroupSelectionOptions& options,
                             const RunControl& control) {
-  constexpr int kStepsEach = 3;
   constexpr int kStepsLast = 12;
-  constexpr double kLeastNoise = 1e-30;
   Posterior posterior(system, options.noise_factor, options.likely);
-  if (options.noise_unknown)
-    posterior.setNoiseFactor(std::max(kLeastNoise, system.y_squared() / std::max(1.0, system.n_rows())));
   GroupSelection selection;
   selection.gain = Eigen::VectorXd::Zero(system.groups());
-  for (std::size_t tries = 0; tries < 2 * options.most_groups + 1 && !control.stop.stop_requested(); ++tries) {
-    const Offers offers(system, posterior);
-    const bool is_full = posterior.groups.size() >= options.most_groups;
-    const auto best = is_full ? std::nullopt : offers.best(options.least_gain);
-    if (!best || tries == 2 * options.most_groups)
-      for (Eigen::Index g = 0; g < system.groups(); ++g) selection.gain[g] = offers.of(g).gain;
-    if (!best) break;
-    posterior.groups.push_back(best->first);
-    posterior.variance.push_back(best->second.variance);
-    posterior.gather();
-    posterior.solve();
-    improveVariances(posterior, system, kStepsEach);
-    if (options.noise_unknown) {
-      posterior.setNoiseFactor(std::max(kLeastNoise, posterior.noiseShown()));
-      posterior.solve();
-    }
-  }
+  if (options.chosen_variances.empty())
+    addGroups(posterior, selection.gain, system, options, control);
+  else
+    takeChosen(posterior, options);
   improveVariances(posterior, system, kStepsLast);
 
   selection.groups = posterior.groups;

@@ -48,6 +48,8 @@ struct GroupSelectionOptions {
   double noise_factor = 1.0;   ///< Variance of the noise in units of the one stated.
   bool noise_unknown = false;  ///< Found anew after every group, starting from y itself.
   Eigen::Index likely = 0;     ///< First groups that may well be chosen: their products are made at once.
+  /// Prior variances of the first groups, where these are chosen beforehand and no other is to enter.
+  std::vector<double> chosen_variances;
 };
 
 /// The groups chosen, and the posterior of their unknowns.

@@ -17,8 +17,9 @@ namespace fieldtrue::correctors {
 namespace {
 
 constexpr int kMostSteps = 30;
+constexpr int kStepsOnceFinal = 6;           ///< By then it has settled, or never will.
 constexpr double kSettled = 0.04;            ///< Of the noise's SD.
-constexpr std::size_t kCandidatesKept = 90;  ///< Of the first step's, by what each would still add.
+constexpr std::size_t kCandidatesKept = 60;  ///< Of the first step's, by what each would still add.
 
 /// The linear model of one step, rows whitened, unknowns scaled so that each source moves the places by about its
 /// amplitude.
@@ -60,7 +61,9 @@ class Fitter {
   Result<HarmonicFit> run() {
     take(rigidMisfit(DisturbedField()));
     const double without_sources_m2 = misfit_m2_;
-    for (int step = 0; step < kMostSteps; ++step) {
+    int n_final = 0;
+    for (int step = 0; step < kMostSteps && n_final < kStepsOnceFinal; ++step) {
+      n_final += is_choice_final_ ? 1 : 0;
       if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The harmonic field's fit was stopped");
       const double moved_m = improve(linearise(step == 0 ? firstRows() : rowsAtField()), step);
       control_.progress(static_cast<double>(step + 1) / kMostSteps);
@@ -192,10 +195,11 @@ class Fitter {
     const GroupedSystem system(linear.design, basis, linear.y, box_.extent_m());
     const bool unknown = data_.jig_sd_m <= 0.0;
     const auto n_chosen = static_cast<Eigen::Index>(chosen_.sites.size());  // The first candidates, see refine().
-    const GroupSelection selection = selectGroups(
-        system,
-        {is_choice_final_ ? 0.0 : options_.least_gain, options_.most_sources, noiseForStep(), unknown, n_chosen},
-        control_);
+    const GroupSelection selection =
+        selectGroups(system,
+                     {options_.least_gain, options_.most_sources, noiseForStep(), unknown, n_chosen,
+                      is_choice_final_ ? variancesIn(linear) : std::vector<double>()},
+                     control_);
     noise_factor_ = std::clamp(selection.noise_factor, 1e-16, 1e16);
 
     Eigen::VectorXd effect = Eigen::VectorXd::Zero(linear.y.size());
@@ -206,7 +210,7 @@ class Fitter {
     const Eigen::Matrix<double, 6, 1> motion = qr.solve(linear.y - effect);
     moveTruth(motion);
     const bool whole = keep(selection, linear);
-    is_choice_final_ = is_choice_final_ || goesRound();
+    is_choice_final_ = is_choice_final_ || goesRound() || wanders();
     refine(selection.gain, step);
     if (!whole) return std::numeric_limits<double>::infinity();
     // Whitened by about the jig's SD.
@@ -239,6 +243,16 @@ class Fitter {
     if (!whole) field_from_truth_ = misfit.field_from_truth;
     take(std::move(misfit));
     return whole;
+  }
+
+  /// Prior variances of the sources chosen, in a step's scale.
+  std::vector<double> variancesIn(const Linearisation& linear) const {
+    std::vector<double> variances;
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) {
+      const double scale = linear.scale[static_cast<std::size_t>(chosen_.sites[k])];
+      variances.push_back(chosen_.variances[k] * scale * scale);
+    }
+    return variances;
   }
 
   static Chosen chosenBy(const GroupSelection& selection, const Linearisation& linear) {
@@ -299,6 +313,18 @@ class Fitter {
     const bool is_round = was_left && is_least;
     choices_.push_back(std::move(now));
     return is_round;
+  }
+
+  /// Whether the last choices, each another, left as much as those before, and the present one about the least.
+  bool wanders() const {
+    constexpr std::ptrdiff_t kLast = 6;
+    constexpr double kAlike = 0.03;  // Of the squares.
+    if (std::ssize(choices_) <= kLast) return false;
+    const auto leaves_less = [](const Choice& a, const Choice& b) { return a.misfit_m2 < b.misfit_m2; };
+    const auto last = choices_.end() - kLast;
+    const double least_before_m2 = std::min_element(choices_.begin(), last, leaves_less)->misfit_m2;
+    const double least_m2 = std::min_element(last, choices_.end(), leaves_less)->misfit_m2;
+    return misfit_m2_ <= (1.0 + kAlike) * least_m2 && misfit_m2_ >= (1.0 - kAlike) * least_before_m2;
   }
 
   /// Candidates of the next step: those chosen, their closer neighbours, and of the rest those that offered most; all

@@ -136,6 +136,7 @@ class HarmonicFieldTest : public QObject {
   void believesNoShiftFarAboveTheLargestSeen();
   void multipliesSixColumns();
   void addsAGroupByItsEvidence();
+  void keepsGroupsChosenBefore();
   void removesWhatMetalDoes();
   void isFarBetterThanASmoothFit();
   void holdsForAPlateToo();
@@ -283,6 +284,21 @@ void HarmonicFieldTest::addsAGroupByItsEvidence() {
   FT_VERIFY_MATCH(near(chosen.prior_variance[0], 0.4, 0.01));
   FT_VERIFY_MATCH(near(chosen.amplitudes[2], 0.8 * std::sqrt(300.0) / 10.0, 0.01));
   options.least_gain = 7.18;
+  QVERIFY(selectGroups(system, options, {}).groups.empty());
+}
+
+// The same fixed point from elsewhere, though the group would not enter by itself; and no other beside it.
+void HarmonicFieldTest::keepsGroupsChosenBefore() {
+  const TwoGroups rows(10.0, std::sqrt(300.0));
+  const GroupedSystem system = rows.system();
+  GroupSelectionOptions options;
+  options.least_gain = 7.18;
+  options.chosen_variances = {1.0, 0.1};
+  const GroupSelection both = selectGroups(system, options, {});
+  // The group that the rows do not pull at is left with no variance, and goes.
+  QCOMPARE(both.groups, std::vector<Eigen::Index>{1});
+  FT_VERIFY_MATCH(near(both.prior_variance[0], 0.4, 0.01));
+  options.chosen_variances = {1.0};
   QVERIFY(selectGroups(system, options, {}).groups.empty());
 }
 
