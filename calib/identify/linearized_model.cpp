@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "calib/core/statistics.h"
 #include "calib/field/tracker_model.h"
 
 namespace fieldtrue::identify {
@@ -165,11 +166,25 @@ LinearPrior priorOf(const effects::EffectFit& fit) {
   return prior;
 }
 
-bool isBentStrongly(std::span<const Vector6d> residuals, const Whitening& whitening, int channels) {
+bool isBentStrongly(const GapRows& rows, std::span<const Vector6d> moved, const Whitening& whitening) {
   constexpr double kStrongly = 5.0;  // RMS, in noise.
+  constexpr double kMissed = 1.0;    // In noise.
+  constexpr double kOfRows = 0.9;
+  constexpr double kDipole = 3.0;  // Its field falls with the third power of the distance.
+  const double unit = std::sqrt(static_cast<double>(rows.channels()));
+  const std::vector<Vector6d> white = whitened({moved.begin(), moved.end()}, whitening);
   double squares = 0.0;
-  for (const Vector6d& left : whitened({residuals.begin(), residuals.end()}, whitening)) squares += left.squaredNorm();
-  return squares > kStrongly * kStrongly * static_cast<double>(residuals.size()) * channels;
+  std::vector<double> missed;
+  for (std::size_t i = 0; i < white.size(); ++i) {
+    const double distance_m = rows.rows[i].tracker_from_sensor.position_m.norm();
+    const double bent = std::max(kDipole * moved[i].head<3>().norm() / distance_m, moved[i].tail<3>().norm());
+    const double size = white[i].norm() / unit;
+    squares += size * size;
+    missed.push_back(bent * size);
+  }
+  if (missed.empty()) return false;
+  return squares > kStrongly * kStrongly * static_cast<double>(missed.size()) ||
+         quantile(std::move(missed), kOfRows) > kMissed;
 }
 
 namespace {
@@ -200,7 +215,7 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
   const GapRows& rows = physics.rows();
   n_prior_ = rows.alignment_known && hasFreeAlignment(rows) ? 6 : 0;
   residual_ = Eigen::VectorXd::Zero(n * channels_ + n_prior_);
-  const bool is_half_way = response == ResponseAt::kHalfWayIfBent && isBentStrongly(residuals, whitening, channels_);
+  const bool is_half_way = response == ResponseAt::kHalfWayIfBent && isBentStrongly(rows, residuals, whitening);
   const double way = is_half_way ? 0.5 : 1.0;
   for (std::size_t k = 0; k < order_.size(); ++k) {
     const std::size_t i = order_[k];
@@ -216,7 +231,7 @@ Linearized::Linearized(const GapPhysics& physics, const GapModel& state, const W
     if (static_cast<std::size_t>(b) >= segments_.size()) segments_.push_back({row, 0});
     segments_.back().count += channels_;
   }
-  if (isBentStrongly(movedBy(at, reported, channels_), whitening, channels_)) bend(physics, state, reported);
+  if (isBentStrongly(rows, movedBy(at, reported, channels_), whitening)) bend(physics, state, reported);
   addAlignment(rows, state.alignment);
   addTerms(state);
 }

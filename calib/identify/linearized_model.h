@@ -38,8 +38,11 @@ struct Segment {
   Eigen::Index count = 0;
 };
 
-/// Whether poses are bent so far that what moved them must be taken half way along.
-bool isBentStrongly(std::span<const Vector6d> residuals, const Whitening& whitening, int channels);
+/// Whether poses are moved so far that they do not follow the field linearly: by several times the noise, or at a tenth
+/// of the rows by so much that what a linear model misses, about the share by which the field is bent, is noise and
+/// more.
+/// @param moved of each row
+bool isBentStrongly(const GapRows& rows, std::span<const Vector6d> moved, const Whitening& whitening);
 
 /// Where the tracker's response is taken: at the model's pose, or, where poses are bent by many times their noise, half
 /// way from there to the reported one. What is half way follows the noise: a flexible fit would explain the noise by

@@ -27,6 +27,13 @@ double pitchOf_m(std::span<const field::SensorSetting> settings) {
   return nearest_m.empty() ? 0.1 : median(std::move(nearest_m));
 }
 
+/// A part of what already runs in several threads, stopped with the whole.
+RunControl inOneThread(const RunControl& control) {
+  RunControl part;
+  part.stop = control.stop;
+  return part;
+}
+
 }  // namespace
 
 GapSearch::GapSearch(const GapRows& rows, std::vector<std::unique_ptr<field::PhysicalEffect>> believed, NoiseFrom noise,
@@ -100,7 +107,7 @@ std::vector<GapModel> GapSearch::simplestBesideAlignment(const RunControl& contr
 }
 
 bool GapSearch::isBent(const GapModel& model) const {
-  return isBentStrongly(physics_.residuals(model), whitening_, rows_.channels());
+  return isBentStrongly(rows_, physics_.residuals(model), whitening_);
 }
 
 GapModel GapSearch::seenFrom(const GapModel& model) const {
@@ -290,15 +297,16 @@ void GapSearch::shareCenters(std::vector<TriedEffect>& tried, const Linearized& 
     const auto is_near = [&](const Eigen::Vector3d& other_m) { return (other_m - center_m).norm() < kApart_m; };
     if (std::none_of(centers_m.begin(), centers_m.end(), is_near)) centers_m.push_back(center_m);
   }
-  for (TriedEffect& one : tried) {
+  control.parallel_for(tried.size(), [&](std::size_t i) {
+    TriedEffect& one = tried[i];
     const EffectWay& way = ways_[one.way];
-    if (!way.fit->searchesPlace() || control.stop.stop_requested()) continue;
+    if (!way.fit->searchesPlace() || control.stop.stop_requested()) return;
     const Linearized& at = way.needs_time ? in_time : in_space;
-    const ScanResult again = scan(at, *way.fit, startsAt(*way.fit, centers_m), kStarts, control);
+    const ScanResult again = scan(at, *way.fit, startsAt(*way.fit, centers_m), kStarts, inOneThread(control));
     refineFrom(again.best, at, base, one);
     const double held_out = std::accumulate(again.held_out_gain.begin(), again.held_out_gain.end(), 0.0);
     one.held_out_gain = std::max(one.held_out_gain, held_out);
-  }
+  });
 }
 
 void GapSearch::finish(TriedEffect& tried, double base_bic) const {
@@ -336,11 +344,14 @@ std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunCont
   const GapModel from = seenFrom(base.model);
   const Linearized in_space(physics_, from, whitening_, space_blocks_, ResponseAt::kHalfWayIfBent);
   const Linearized in_time(physics_, from, whitening_, time_blocks_, ResponseAt::kHalfWayIfBent);
+  std::vector<std::optional<TriedEffect>> of_ways(ways_.size());
+  control.parallel_for(ways_.size(), [&](std::size_t way) {
+    of_ways[way] = tryWay(way, in_space, in_time, from, inOneThread(control));
+  });
+  if (control.stop.stop_requested()) return {};
   std::vector<TriedEffect> tried;
-  for (std::size_t way = 0; way < ways_.size(); ++way) {
-    if (control.stop.stop_requested()) return {};
-    if (auto one = tryWay(way, in_space, in_time, from, control)) tried.push_back(std::move(*one));
-  }
+  for (auto& one : of_ways)
+    if (one) tried.push_back(std::move(*one));
   const auto better = [](const TriedEffect& a, const TriedEffect& b) { return a.bic_gain > b.bic_gain; };
   std::stable_sort(tried.begin(), tried.end(), better);
   shareCenters(tried, in_space, in_time, from, control);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Whether `diagnose` finds what bends readings by decimetres: floors, a wall and a body, on many plans.
 
-strong_bends.py FIELDTRUE-CLI ROOMS-FOLDER [--rooms a,b] [--plans a,b] [--seeds N] [--processes N]
+strong_bends.py FIELDTRUE-CLI ROOMS-FOLDER [--rooms a,b] [--plans a,b] [--seeds N] [--untimed] [--processes N]
 
 Each room is the shipped steel floor's with something else that errs in it; each plan is recorded from the rig's origin and,
 of grids, from the origin that `plan` takes where none is stated, which goes down to the floor; random places lie in the box of
@@ -20,9 +20,10 @@ import sys
 import tempfile
 
 BOX_M = (2.44, 2.44, 1.83)
-GRIDS = ("5x5x4@0.3", "6x6x5@0.25", "9x9x7@0.3048")
+GRIDS = ("5x5x4@0.3", "6x6x5@0.25", "9x9x7@0.3048", "5x5x4@0.6096")
 PLANS = tuple(grid + origin for grid in GRIDS for origin in ("", " default")) + ("random 60", "random 200")
 NEAR_CM, NEAR_DEG, LEFT = 10, 5, 0.02
+TIMES = ("t_start_s", "t_end_s")
 
 
 def plane(toward, distance_m, material, strength):
@@ -82,9 +83,21 @@ def how_near(effect, found):
     return 100 * math.dist(at_m, truth["center_m"]), 0.0
 
 
+def leave_out_times(path):
+    """Of a node table, as of a tracker that states none."""
+    with open(path, encoding="utf-8") as file:
+        lines = file.read().splitlines()
+    head = next(line for line in lines if not line.startswith("#")).split(",")
+    kept = [at for at, name in enumerate(head) if name not in TIMES]
+    with open(path, "w", encoding="utf-8") as file:
+        for line in lines:
+            cells = line.split(",")
+            file.write((line if line.startswith("#") else ",".join(cells[at] for at in kept)) + "\n")
+
+
 def study(job):
     """What became of one recording; None where the plan's places lie within the metal."""
-    program, rooms, room, plan, seed = job
+    program, rooms, room, plan, seed, is_untimed = job
     with tempfile.TemporaryDirectory() as folder:
         nodes, report, scene_path = (os.path.join(folder, name) for name in ("n.nodes.csv", "r.gap.json", "s.scene.json"))
         scene = scene_of(rooms, room)
@@ -94,6 +107,8 @@ def study(job):
                                str(seed), "--nodes", nodes], capture_output=True, check=False)
         if made.returncode:
             return room, plan, seed, None
+        if is_untimed:
+            leave_out_times(nodes)
         before_s = os.times().children_user
         subprocess.run([program, "diagnose", "--threads", "1", "--nodes", nodes, "--out", report], capture_output=True,
                        check=True)
@@ -117,11 +132,12 @@ def main():
     parser.add_argument("rooms_folder")
     parser.add_argument("--rooms", default=",".join(ROOMS))
     parser.add_argument("--plans", default=",".join(PLANS))
-    parser.add_argument("--seeds", type=int, default=3, help="recordings of each random plan; one of each grid")
+    parser.add_argument("--seeds", type=int, default=3, help="recordings of each plan")
+    parser.add_argument("--untimed", action="store_true", help="leave the times of the rows out")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     given = parser.parse_args()
-    jobs = [(given.cli, given.rooms_folder, room, plan, seed) for room in given.rooms.split(",")
-            for plan in given.plans.split(",") for seed in range(1, 1 + (given.seeds if "random" in plan else 1))]
+    jobs = [(given.cli, given.rooms_folder, room, plan, seed, given.untimed) for room in given.rooms.split(",")
+            for plan in given.plans.split(",") for seed in range(1, 1 + given.seeds)]
     counts = {}
     print("room                   plan                 seed      bend  verdict           left     off            CPU  named")
     with multiprocessing.Pool(given.processes) as pool:
