@@ -49,8 +49,8 @@ void addCharge(const SheetSource& source, const SheetField& field) {
   for (std::size_t i = 0; i < count; ++i) {
     const double dx = x_m[i] - at_x, dy = y_m[i] - at_y, dz = z_m[i];
     const double r2 = dx * dx + (dy * dy + dz * dz);
-    const double r3 = r2 * std::sqrt(r2);
-    add(dx / r3, dy / r3, dz / r3, strength, i, count, sum);
+    const double per_r3 = 1.0 / (r2 * std::sqrt(r2));
+    add(per_r3 * dx, per_r3 * dy, per_r3 * dz, strength, i, count, sum);
   }
 }
 

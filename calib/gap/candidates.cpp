@@ -139,19 +139,33 @@ void describeTerm(const identify::RefinedModel& refined, std::size_t term, GapCa
     candidate.location_covariance_m2 = sensitivity.location * covariance * sensitivity.location.transpose();
 }
 
-/// Replaces the interval of each searched parameter by where the profile likelihood falls by 2.706 / 2.
-void profileSearched(const identify::GapSearch& search, const identify::RefinedModel& refined, std::size_t term,
-                     GapCandidate& candidate) {
-  const TermPlace place = placeOf(refined, term);
-  const std::vector<effects::FitParameter> names = refined.model.terms[term].fit->searched();
-  for (Eigen::Index d = 0; d < place.searched; ++d) {
-    const std::string& name = names[static_cast<std::size_t>(d)].name;
-    const auto is_it = [&](const Estimate& e) { return e.name == name; };
+/// Where the profile likelihood of each searched parameter of each term falls by 2.706 / 2.
+std::vector<std::vector<identify::ProfileInterval>> profilesOf(const identify::GapSearch& search,
+                                                               const identify::RefinedModel& refined,
+                                                               const RunControl& control) {
+  std::vector<std::vector<identify::ProfileInterval>> of_terms;
+  std::vector<std::pair<std::size_t, std::size_t>> parameters;
+  for (std::size_t t = 0; t < refined.model.terms.size(); ++t) {
+    of_terms.emplace_back(static_cast<std::size_t>(refined.model.terms[t].searched.size()));
+    for (std::size_t d = 0; d < of_terms[t].size(); ++d) parameters.emplace_back(t, d);
+  }
+  control.parallel_for(parameters.size(), [&](std::size_t k) {
+    const auto [t, d] = parameters[k];
+    of_terms[t][d] = identify::profileInterval(search, refined, t, static_cast<Eigen::Index>(d));
+  });
+  return of_terms;
+}
+
+/// Replaces the intervals of searched parameters.
+void setIntervals(const std::vector<identify::ProfileInterval>& intervals, const identify::GapTerm& term,
+                  GapCandidate& candidate) {
+  const std::vector<effects::FitParameter> names = term.fit->searched();
+  for (std::size_t d = 0; d < intervals.size(); ++d) {
+    const auto is_it = [&](const Estimate& e) { return e.name == names[d].name; };
     const auto found = std::find_if(candidate.parameters.begin(), candidate.parameters.end(), is_it);
     if (found == candidate.parameters.end()) continue;
-    const identify::ProfileInterval interval = identify::profileInterval(search, refined, term, d);
-    if (interval.low) found->low90 = *interval.low;
-    if (interval.high) found->high90 = *interval.high;
+    if (intervals[d].low) found->low90 = *intervals[d].low;
+    if (intervals[d].high) found->high90 = *intervals[d].high;
   }
 }
 
@@ -289,14 +303,15 @@ Shrinkage shrinkageOfStep(const HowFar& far, std::size_t effect) {
 }
 
 std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, const Judgement& judgement,
-                                             const std::vector<GapCandidate>& candidates) {
+                                             const std::vector<GapCandidate>& candidates, const RunControl& control) {
   const identify::EffectSelection& selection = judgement.selection;
-  const std::vector<double> credit = creditShares(search, selection);
+  const std::vector<double> credit = creditShares(search, selection, control);
+  const auto profiles = profilesOf(search, selection.model, control);
   std::vector<SelectedEffect> selected;
   for (std::size_t t = 0; t < selection.ways.size(); ++t) {
     SelectedEffect effect;
     describeTerm(selection.model, t, effect);
-    profileSearched(search, selection.model, t, effect);
+    setIntervals(profiles[t], selection.model.model.terms[t], effect);
     widenPlaced(fittedOf(selection.model.model.terms[t]), search.thresholds(), effect);
     keepWithinSearch(*selection.model.model.terms[t].fit, effect);
     effect.credit_fraction = credit[t];
@@ -316,19 +331,20 @@ std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, 
   return selected;
 }
 
-std::vector<double> creditShares(const identify::GapSearch& search, const identify::EffectSelection& selection) {
+std::vector<double> creditShares(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                                 const RunControl& control) {
   const std::size_t n = selection.ways.size();
   if (n == 0) return {};
   if (n == 1) return {1.0};
   const identify::GapModel& full = selection.model.model;
   std::vector<double> value(std::size_t{1} << n, 0.0);
-  for (std::size_t subset = 0; subset < value.size(); ++subset) {
+  control.parallel_for(value.size(), [&](std::size_t subset) {
     identify::GapModel model;
     model.alignment = full.alignment;
     for (std::size_t t = 0; t < n; ++t)
       if ((subset >> t & 1U) != 0) model.terms.push_back(full.terms[t]);
     value[subset] = -whitenedSquares(search, search.refined(model).model);
-  }
+  });
   const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1.0); };
   std::vector<double> credit(n, 0.0);
   for (std::size_t t = 0; t < n; ++t) {

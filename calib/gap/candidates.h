@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/core/run_control.h"
 #include "calib/gap/judgement.h"
 #include "calib/gap/report.h"
 
@@ -16,13 +17,15 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
                                              bool has_gap, double scattered_share);
 
 std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, const Judgement& judgement,
-                                             const std::vector<GapCandidate>& candidates);
+                                             const std::vector<GapCandidate>& candidates,
+                                             const RunControl& control = {});
 
 /// What a selected effect takes away where no fit saw it, the effects before it being there.
 Shrinkage shrinkageOfStep(const HowFar& far, std::size_t effect);
 
 /// Share of the explained sum of squares of each selected effect, averaged over the orders of adding.
 /// @source Shapley 1953, Contributions to the Theory of Games II 307
-std::vector<double> creditShares(const identify::GapSearch& search, const identify::EffectSelection& selection);
+std::vector<double> creditShares(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                                 const RunControl& control = {});
 
 }  // namespace fieldtrue::gap

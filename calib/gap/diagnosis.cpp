@@ -159,13 +159,13 @@ void describeAlignment(const identify::GapAlignment& alignment, const identify::
 /// @param belongs_together whether the rows are of one set-up; else nothing is told of what they leave, it means
 /// nothing
 void describeJudgement(const identify::GapSearch& search, const Judgement& judgement, std::optional<bool> known_gap,
-                       bool belongs_together, GapReport& report) {
+                       bool belongs_together, const RunControl& control, GapReport& report) {
   const identify::GapRows& rows = search.physics().rows();
   const bool has_gap = decide(search, judgement, known_gap, report);
   describeAlignment(judgement.selection.model.model.alignment, rows, report);
   report.p_value = search.structureOfNone().p_value;
   report.origin = search.structureOfNone().origin;
-  report.selected = describeSelected(search, judgement, report.candidates);
+  report.selected = describeSelected(search, judgement, report.candidates, control);
   report.rival = rivalOf(judgement);
   if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
     report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
@@ -219,7 +219,7 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   if (control.stop.stop_requested()) return stopped();
   control.progress(0.9 * part);
 
-  describeJudgement(search, judgement, known_gap, belongs_together, report);
+  describeJudgement(search, judgement, known_gap, belongs_together, control, report);
   report.smallest_detectable = smallestDetectable(search);
   report.isolability = isolabilityOf(search, kStartsForIsolability, Imitators::kOfCoarseGrid, control);
   if (control.stop.stop_requested()) return stopped();

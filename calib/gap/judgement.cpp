@@ -73,24 +73,19 @@ class Judge {
     while (selection.ways.size() > 1 && !control_.stop.stop_requested()) {
       double least = search_.thresholds().least_nats;
       std::optional<std::size_t> idle;
-      identify::RefinedModel best_rest;
-      double best_nats = 0.0;
-      identify::UnnamedLaws best_laws;
-      for (std::size_t t = 0; t < selection.ways.size(); ++t) {
-        const identify::RefinedModel rest = without(selection, t);
-        identify::UnnamedLaws laws;
-        const double nats = natsOf(rest.model, laws);
-        if (judgement.nats_over_unnamed - nats >= least) continue;
-        least = judgement.nats_over_unnamed - nats;
+      const std::vector<identify::RefinedModel> rests = withoutEach(selection);
+      std::vector<double> nats(rests.size());
+      std::vector<identify::UnnamedLaws> laws(rests.size());
+      control_.parallel_for(rests.size(), [&](std::size_t t) { nats[t] = natsOf(rests[t].model, laws[t]); });
+      for (std::size_t t = 0; t < rests.size(); ++t) {
+        if (judgement.nats_over_unnamed - nats[t] >= least) continue;
+        least = judgement.nats_over_unnamed - nats[t];
         idle = t;
-        best_rest = rest;
-        best_nats = nats;
-        best_laws = laws;
       }
       if (!idle) return;
-      drop(*idle, best_rest, judgement);
-      judgement.nats_over_unnamed = best_nats;
-      laws_.beside = best_laws;
+      drop(*idle, rests[*idle], judgement);
+      judgement.nats_over_unnamed = nats[*idle];
+      laws_.beside = laws[*idle];
     }
   }
 
@@ -104,21 +99,22 @@ class Judge {
     bool is_harmful = false;
     for (std::size_t s = 0; s + 1 < scores.step.size(); ++s) is_harmful = is_harmful || harms(s);
     if (!is_harmful || control_.stop.stop_requested()) return false;
-    std::size_t least_missed = 0;
-    std::optional<identify::RefinedModel> rest;
-    for (std::size_t t = 0; t < selection.ways.size(); ++t) {
-      identify::RefinedModel tried = without(selection, t);
-      if (rest && search_.bicOf(tried.model) >= search_.bicOf(rest->model)) continue;
-      rest = std::move(tried);
-      least_missed = t;
-    }
-    drop(least_missed, *rest, judgement);
+    const std::vector<identify::RefinedModel> rests = withoutEach(selection);
+    std::vector<double> bic;
+    for (const identify::RefinedModel& rest : rests) bic.push_back(search_.bicOf(rest.model));
+    const auto least_missed = static_cast<std::size_t>(std::min_element(bic.begin(), bic.end()) - bic.begin());
+    drop(least_missed, rests[least_missed], judgement);
     judgement.nats_over_unnamed = selection.ways.empty() ? 0.0 : natsOf(selection.model.model, laws_.beside);
     return true;
   }
 
-  identify::RefinedModel without(const identify::EffectSelection& selection, std::size_t term) const {
-    return search_.refined(identify::withoutTerm(selection.model.model, term));
+  /// Each effect left out in turn.
+  std::vector<identify::RefinedModel> withoutEach(const identify::EffectSelection& selection) const {
+    std::vector<identify::RefinedModel> rests(selection.ways.size());
+    control_.parallel_for(rests.size(), [&](std::size_t term) {
+      rests[term] = search_.refined(identify::withoutTerm(selection.model.model, term));
+    });
+    return rests;
   }
 
   void drop(std::size_t term, const identify::RefinedModel& rest, Judgement& judgement) const {

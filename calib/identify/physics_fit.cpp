@@ -190,6 +190,23 @@ Result<std::vector<ScenePositions>> refitted(const GapSearch& search, const GapM
   return scenes;
 }
 
+Result<GapRows> rowsOf(const CalibrationTable& table) {
+  return makeGapRows(recording::cleanRows(table).nodes, table.metadata);
+}
+
+CalibrationTable searchedPart(CalibrationTable table, const std::set<int>& searched_nodes) {
+  if (!searched_nodes.empty())
+    std::erase_if(table.nodes, [&](const Node& node) { return searched_nodes.count(node.node) == 0; });
+  return table;
+}
+
+/// The model's parameters as all rows have them, with the noise found in those searched.
+GapModel refinedOn(const GapRows& rows, const GapSearch& search, const GapModel& model) {
+  if (rows.rows.size() == search.physics().size()) return model;
+  const Whitening whitening = makeWhitening(rows, search.placingSd_m(), search.placingSd_rad());
+  return refineJointly(GapPhysics(rows, {}), model, whitening, {search.law()}).model;
+}
+
 PhysicsFit noPhysics(PhysicsFit fit, std::string why) {
   fit.positions.reset();
   fit.without_fold.clear();
@@ -202,8 +219,9 @@ PhysicsFit noPhysics(PhysicsFit fit, std::string why) {
 
 Result<PhysicsFit> fitPhysics(const CalibrationTable& table, const PhysicsFitOptions& options,
                               const RunControl& control) {
-  const auto rows = makeGapRows(recording::cleanRows(table).nodes, table.metadata);
-  if (!rows || rows->place_nodes.size() < Thresholds{}.fewest_places_for_causes)
+  const auto all = rowsOf(table);
+  const auto rows = rowsOf(searchedPart(table, options.searched_nodes));
+  if (!all || !rows || rows->place_nodes.size() < Thresholds{}.fewest_places_for_causes)
     return noPhysics({}, "there are fewer places than a cause can be told from");
   const GapSearch search(*rows, {});
   EffectSelectionOptions selecting;
@@ -218,9 +236,9 @@ Result<PhysicsFit> fitPhysics(const CalibrationTable& table, const PhysicsFitOpt
     (std::count(terms.begin(), terms.end(), t) > 0 ? fit.named : fit.left_out).push_back(model.terms[t].effect->id);
   if (terms.empty())
     return noPhysics(std::move(fit), "what stands out is an error of the rig, or depends on more than the position");
-  auto positions = positionsOf(search.physics(), model, terms);
+  auto positions = positionsOf(search.physics(), refinedOn(*all, search, model), terms);
   auto scenes = refitted(search, model, terms, options.fold_of_node, control);
-  if (!positions || !scenes || !explainsEveryReading(*positions, *rows))
+  if (!positions || !scenes || !explainsEveryReading(*positions, *all))
     return noPhysics(std::move(fit), "the fitted scene has no place for some of the readings");
   fit.positions = *std::move(positions);
   fit.without_fold = *std::move(scenes);

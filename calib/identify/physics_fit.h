@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -60,7 +61,8 @@ struct PhysicsFit {
 
 struct PhysicsFitOptions {
   int most_effects = 2;             ///< 1 to 4.
-  std::map<int, int> fold_of_node;  ///< Folds 0..n-1 of all nodes; empty = nothing is refitted.
+  std::set<int> searched_nodes;     ///< Where effects are looked for; all places refine what is found. Empty = all.
+  std::map<int, int> fold_of_node;  ///< Folds 0..n-1 of the nodes searched; empty = nothing is refitted.
 };
 
 /// Selects effects as a diagnosis does, alignment and all parameters refitted together, and keeps those that act on the

@@ -129,6 +129,13 @@ class Selector {
     return search_.refined(withoutTerm(selection.model.model, term));
   }
 
+  /// Each effect left out in turn.
+  std::vector<RefinedModel> withoutEach(const EffectSelection& selection) const {
+    std::vector<RefinedModel> rests(selection.ways.size());
+    control_.parallel_for(rests.size(), [&](std::size_t term) { rests[term] = without(selection, term); });
+    return rests;
+  }
+
   /// Replaces earlier effects by others where these are better now that the last one is there.
   void exchange(EffectSelection& selection) {
     for (std::size_t term = 0; term + 1 < selection.ways.size(); ++term) {
@@ -150,17 +157,15 @@ class Selector {
       const double bic = search_.bicOf(selection.model.model);
       double least = thresholds_.least_gain_more;
       std::optional<std::size_t> cheapest;
-      RefinedModel best_rest;
-      for (std::size_t term = 0; term < selection.ways.size(); ++term) {
-        RefinedModel rest = without(selection, term);
-        const double cost = search_.bicOf(rest.model) - bic;
+      std::vector<RefinedModel> rests = withoutEach(selection);
+      for (std::size_t term = 0; term < rests.size(); ++term) {
+        const double cost = search_.bicOf(rests[term].model) - bic;
         if (cost >= least) continue;
         least = cost;
         cheapest = term;
-        best_rest = std::move(rest);
       }
       if (!cheapest) return;
-      selection.model = std::move(best_rest);
+      selection.model = std::move(rests[*cheapest]);
       selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(*cheapest));
     }
   }
@@ -188,17 +193,15 @@ class Selector {
 
   void rankAlternatives(EffectSelection& selection) {
     double most = -std::numeric_limits<double>::infinity();
-    RefinedModel rest;
-    for (std::size_t term = 0; term < selection.ways.size(); ++term) {
-      const RefinedModel reduced = without(selection, term);
-      const double cost = search_.bicOf(reduced.model);
+    const std::vector<RefinedModel> rests = withoutEach(selection);
+    for (std::size_t term = 0; term < rests.size(); ++term) {
+      const double cost = search_.bicOf(rests[term].model);
       if (cost > most) {
         most = cost;
         selection.leading = term;
-        rest = reduced;
       }
     }
-    selection.alternatives = ranked(rest);
+    selection.alternatives = ranked(rests[selection.leading]);
   }
 
   /// Among the alternatives the leading effect stands as it was selected, where that is the better fit: it was tried

@@ -89,10 +89,10 @@ class PhysicsResidual : public PositionModel {
 };
 
 /// The rows as a table whose reference frame is the aligned truth: what is left of the alignment is fitted again.
-CalibrationTable tableOf(const FitData& data, std::span<const std::size_t> rows) {
+CalibrationTable tableOf(const FitData& data) {
   CalibrationTable table;
   std::map<int, int> visits;
-  for (const std::size_t row : rows) {
+  for (std::size_t row = 0; row < data.size(); ++row) {
     Node node;
     node.node = data.node[row];
     node.visit = visits[node.node]++;
@@ -228,7 +228,8 @@ Result<identify::PhysicsFit> findScene(const FitData& data, const Places& places
   options.fold_of_node = foldsOf(places);
   RunControl part = control;
   part.progress = [&](double fraction) { control.progress(0.7 * fraction); };
-  auto fit = identify::fitPhysics(tableOf(data, rows), options, part);
+  for (const std::size_t row : rows) options.searched_nodes.insert(data.node[row]);
+  auto fit = identify::fitPhysics(tableOf(data), options, part);
   if (!fit || !fit->positions) return fit;
   if (!helpsHeldOut(rowsOfFitData(data, rows), fit->without_fold, options.fold_of_node, settings)) {
     fit->positions.reset();
@@ -290,9 +291,9 @@ PositionMethod physicsResidualPosition() {
       kMostEffects, "Most effects", {1, 4}, 2,
       "No more effects than this are sought behind the data, and no more than one for every 60 places."));
   method.settings.push_back(
-      declare::integer(kSearchPlaces, "Places for the scene", {50, 3000}, 120,
+      declare::integer(kSearchPlaces, "Places for the scene", {50, 3000}, 80,
                        "With more places than these, the scene is sought on a well-spread part of them; "
-                       "the Gaussian process takes all."));
+                       "all refine it, and the Gaussian process takes all."));
   method.fit = fitPhysicsResidual;
   method.read = readPhysicsResidualPosition;
   method.cost = FitCost::kVeryCostly;

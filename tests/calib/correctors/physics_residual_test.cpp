@@ -147,9 +147,30 @@ class PhysicsResidualTest : public QObject {
   void endsWhereNoPhysicsBends() {
     QFETCH(std::uint32_t, seed);
     const CalibrationTable table = bentRoom(120, seed);
-    const auto ours = fitPosition("physics_residual", calibration::makeFitData(table.nodes, table.metadata, {}));
+    const FitData data = calibration::makeFitData(table.nodes, table.metadata, {});
+    const auto ours = fitPosition("physics_residual", data, {{"search_places", "120"}});
     FT_VERIFY_OK(ours);
     FT_VERIFY_MATCH(holdsAll((*ours)->note(), {"No scene"}));
+  }
+
+  /// What is found on a quarter of the places stands where all of them put it, and not where the quarter does.
+  void allPlacesRefineTheScene() {
+    const CalibrationTable whole = recorded(roomWith(true), 1, {4, 8, 6});
+    CalibrationTable quarter = whole;
+    std::erase_if(quarter.nodes, [](const Node& node) { return node.node % 4 != 0; });
+    identify::PhysicsFitOptions options;
+    const auto centerIn = [&options](const CalibrationTable& table) {
+      const identify::PhysicsFit fit = identify::fitPhysics(table, options, {}).value();
+      const std::vector<double> at = fit.positions.value().scene().effects.front().parameters.at("center_m");
+      return Eigen::Vector3d(at[0], at[1], at[2]);
+    };
+    const Eigen::Vector3d by_all_m = centerIn(whole);
+    const Eigen::Vector3d by_quarter_m = centerIn(quarter);
+    for (const Node& node : quarter.nodes) options.searched_nodes.insert(node.node);
+    const Eigen::Vector3d refined_m = centerIn(whole);
+    const double apart_m = (by_quarter_m - by_all_m).norm();
+    QVERIFY2((refined_m - by_all_m).norm() < 0.2 * apart_m,
+             qPrintable(QString("%1 of %2 m").arg((refined_m - by_all_m).norm()).arg(apart_m)));
   }
 
   /// The simulator is the forward direction, solved by another path than the inversion.
