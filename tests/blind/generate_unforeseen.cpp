@@ -172,7 +172,36 @@ std::span<const std::vector<Kind>> unforeseenBatches() {
       {"unforeseen:hemisphere_guard_pushes_off_a_plane", 1, drawHemisphereGuard},
       {"unforeseen:near:one_coil_slipped_within_the_sensor", 1, drawSlippedCoil},
   };
-  static const std::array kBatches = {kFirst, kSecond};
+  static const std::vector<Kind> kThird = {
+      {"unforeseen:fan_drive_sweeps_across_the_carrier", 1, drawSweepingDrive},
+      {"unforeseen:tram_pulls_off_between_slots", 1, drawTram},
+      {"unforeseen:stimulator_fires_in_trains", 1, drawStimulator},
+      {"unforeseen:compressor_iron_saturates_while_running", 1, drawCompressor},
+      {"unforeseen:counterweight_swings_against_the_sensor", 1, drawCounterweight},
+      {"unforeseen:tall_posts_are_carbon_tubes", 1, drawCarbonPosts},
+      {"unforeseen:cleaning_robot_runs_under_the_jig", 1, drawCleaningRobot},
+      {"unforeseen:cable_reel_gives_off_turns", 1, drawCableReel},
+      {"unforeseen:warm_glue_creeps_whichever_way_is_down", 1, drawWarmGlue},
+      {"unforeseen:cork_keeps_the_dents_of_the_last_places", 1, drawDentedCork, kRigAxes},
+      {"unforeseen:handwheel_turns_lost_until_the_stop", 1, drawLostTurns, kRigAxes},
+      {"unforeseen:resin_wells_out_of_some_holes", 1, drawResin, kRigAxes},
+      {"unforeseen:heights_levelled_with_a_sloping_sight", 1, drawSlopingSight, kRigAxes},
+      {"unforeseen:plank_bends_under_the_block", 1, drawBendingPlank, kRigAxes},
+      {"unforeseen:tired_arm_droops_at_high_places", 1, drawTiredArm, kRigAxes},
+      {"unforeseen:unlocked_castors_roll_at_each_push", 1, drawCastors, kRigAxes},
+      {"unforeseen:block_turned_round_where_cable_is_short", 1, drawTurnedBlock},
+      {"unforeseen:drive_current_comes_home_by_the_screen", 1, drawScreenCurrent},
+      {"unforeseen:range_by_a_straight_line_from_the_last_fix", 1, drawLastRange},
+      {"unforeseen:one_bit_of_the_converter_weighs_wrong", 1, drawWrongBit},
+      {"unforeseen:hops_between_unlike_carriers", 1, drawCarrierHops},
+      {"unforeseen:slack_is_laid_along_the_drive_cable", 1, drawSlackCable},
+      {"unforeseen:firmware_has_too_few_digits_of_pi", 1, drawShortPi},
+      {"unforeseen:halves_of_the_demodulator_do_not_balance", 1, drawUnlikeHalves},
+      {"unforeseen:shorted_turn_comes_and_goes", 1, drawShortedTurn},
+      {"unforeseen:window_slips_and_carriers_leak", 1, drawSlippingWindow},
+      {"unforeseen:electric_field_through_a_torn_screen", 1, drawTornScreen},
+  };
+  static const std::array kBatches = {kFirst, kSecond, kThird};
   return kBatches;
 }
 

@@ -123,4 +123,35 @@ Drawn drawSlowRelease(const Setup& setup, Random& random);
 Drawn drawHemisphereGuard(const Setup& setup, Random& random);
 Drawn drawSlippedCoil(const Setup& setup, Random& random);
 
+// The third batch.
+Drawn drawSweepingDrive(const Setup& setup, Random& random);
+Drawn drawTram(const Setup& setup, Random& random);
+Drawn drawStimulator(const Setup& setup, Random& random);
+Drawn drawCompressor(const Setup& setup, Random& random);
+Drawn drawCounterweight(const Setup& setup, Random& random);
+Drawn drawCarbonPosts(const Setup& setup, Random& random);
+Drawn drawCleaningRobot(const Setup& setup, Random& random);
+Drawn drawCableReel(const Setup& setup, Random& random);
+
+Drawn drawWarmGlue(const Setup& setup, Random& random);
+Drawn drawDentedCork(const Setup& setup, Random& random);
+Drawn drawLostTurns(const Setup& setup, Random& random);
+Drawn drawResin(const Setup& setup, Random& random);
+Drawn drawSlopingSight(const Setup& setup, Random& random);
+Drawn drawBendingPlank(const Setup& setup, Random& random);
+Drawn drawTiredArm(const Setup& setup, Random& random);
+Drawn drawCastors(const Setup& setup, Random& random);
+Drawn drawTurnedBlock(const Setup& setup, Random& random);
+
+Drawn drawScreenCurrent(const Setup& setup, Random& random);
+Drawn drawLastRange(const Setup& setup, Random& random);
+Drawn drawWrongBit(const Setup& setup, Random& random);
+Drawn drawCarrierHops(const Setup& setup, Random& random);
+Drawn drawSlackCable(const Setup& setup, Random& random);
+Drawn drawShortPi(const Setup& setup, Random& random);
+Drawn drawUnlikeHalves(const Setup& setup, Random& random);
+Drawn drawShortedTurn(const Setup& setup, Random& random);
+Drawn drawSlippingWindow(const Setup& setup, Random& random);
+Drawn drawTornScreen(const Setup& setup, Random& random);
+
 }  // namespace blind::unforeseen
