@@ -125,7 +125,7 @@ Drawn drawSlippedCoil(const Setup& setup, Random& random);
 
 // The third batch.
 Drawn drawSweepingDrive(const Setup& setup, Random& random);
-Drawn drawTram(const Setup& setup, Random& random);
+Drawn drawLift(const Setup& setup, Random& random);
 Drawn drawStimulator(const Setup& setup, Random& random);
 Drawn drawCompressor(const Setup& setup, Random& random);
 Drawn drawCounterweight(const Setup& setup, Random& random);
@@ -138,7 +138,6 @@ Drawn drawDentedCork(const Setup& setup, Random& random);
 Drawn drawLostTurns(const Setup& setup, Random& random);
 Drawn drawResin(const Setup& setup, Random& random);
 Drawn drawSlopingSight(const Setup& setup, Random& random);
-Drawn drawBendingPlank(const Setup& setup, Random& random);
 Drawn drawTiredArm(const Setup& setup, Random& random);
 Drawn drawCastors(const Setup& setup, Random& random);
 Drawn drawTurnedBlock(const Setup& setup, Random& random);
@@ -152,6 +151,5 @@ Drawn drawShortPi(const Setup& setup, Random& random);
 Drawn drawUnlikeHalves(const Setup& setup, Random& random);
 Drawn drawShortedTurn(const Setup& setup, Random& random);
 Drawn drawSlippingWindow(const Setup& setup, Random& random);
-Drawn drawTornScreen(const Setup& setup, Random& random);
 
 }  // namespace blind::unforeseen

@@ -38,19 +38,21 @@ std::size_t begunBefore(const std::vector<Row>& rows, double time_s) {
   return static_cast<std::size_t>(next - rows.begin());
 }
 
-/// How a beam on supports at 0 and 1 gives way under a load on it or beyond them, per span.
-struct Bend {
-  double sunk = 0, slope = 0;
-};
-Bend bendUnder(double load) {
-  if (load < 0.5) {
-    const Bend mirrored = bendUnder(1 - load);
-    return {mirrored.sunk, -mirrored.slope};
+/// For how long between two moments the block is not lower than a height, the rows in order: it stays at each place
+/// until the next row begins.
+double timeAbove_s(const std::vector<Row>& rows, double z_m, double from_s, double until_s) {
+  double sum_s = 0;
+  const std::size_t begun = begunBefore(rows, until_s);
+  for (std::size_t n = 0; n < begun; ++n) {
+    if (rows[n].place_m.z() < z_m) continue;
+    const double leaves_s = n + 1 < begun ? rows[n + 1].start_s : until_s;
+    sum_s += std::max(0.0, leaves_s - std::max(rows[n].start_s, from_s));
   }
-  const double beyond = load - 1;
-  if (beyond > 0) return {beyond * beyond * (1 + beyond) / 3, beyond / 3 + beyond * beyond / 2};
-  return {load * load * beyond * beyond / 3, load * beyond * (2 * load - 1) / 3};
+  return sum_s;
 }
+
+/// A vector turned by half a turn about an axis.
+Vector3d halfTurned(const Vector3d& v, const Vector3d& axis) { return 2 * v.dot(axis) * axis - v; }
 
 }  // namespace
 
@@ -76,12 +78,14 @@ Drawn drawWarmGlue(const Setup& setup, Random& random) {
       pose.orientation = turned(turn_per_m * (pose.orientation * seat.cross(creep)), pose.orientation);
     });
   };
-  return drawnOf({"warm_glue_creeps_whichever_way_is_down", "the sensor creeps on its warm glue, down as it is held",
-                  "creep_m", 1e-6, 0.3, json{{"lamp_s", lamp_s}, {"turn_rad_per_m", turn_per_m}}},
-                 apply);
+  return drawnOf(
+      {"near:warm_glue_creeps_whichever_way_is_down", "the sensor creeps on its warm glue, down as it is held",
+       "creep_m", 1e-6, 0.3, json{{"lamp_s", lamp_s}, {"turn_rad_per_m", turn_per_m}}},
+      apply);
 }
 
-/// The block stands on cork, which for a while keeps the dents of the places measured before: it sinks toward them.
+/// One sheet of cork lies under all places and for a while keeps the dents of those measured before, whatever their
+/// height: the block sinks toward them.
 Drawn drawDentedCork(const Setup& setup, Random& random) {
   const std::vector<Row> rows = inOrder(setup);
   const double wide_m = setup.pitch_m * uniform(random, 0.8, 1.3);
@@ -93,7 +97,8 @@ Drawn drawDentedCork(const Setup& setup, Random& random) {
       double sunk = 0;
       const std::size_t before = begunBefore(rows, row.start_s - 1e-6);
       for (std::size_t n = begunBefore(rows, row.start_s - 3 * recovers_s); n < before; ++n) {
-        const Vector3d toward = (rows[n].place_m - row.place_m) / wide_m;
+        Vector3d toward = (rows[n].place_m - row.place_m) / wide_m;
+        toward.z() = 0;
         const double age = (row.start_s - rows[n].start_s) / recovers_s;
         const double dent = std::exp(-age - 0.5 * toward.squaredNorm());
         sunk += dent;
@@ -108,20 +113,27 @@ Drawn drawDentedCork(const Setup& setup, Random& random) {
                  apply);
 }
 
-/// The carriage is moved by counted turns of a handwheel; a turn is lost or gained now and then, until it is back at
-/// its stop.
+/// The carriage is moved by counted turns of a handwheel; a turn is lost or gained now and then as it moves, until it
+/// is back at its stop.
 Drawn drawLostTurns(const Setup& setup, Random& random) {
   const Extents extents = extentsOf(setup);
   const std::vector<Row> rows = inOrder(setup);
   const int axis = extents.longSide();
   const double at_stop_m = extents.low_m(axis) + 0.3 * setup.pitch_m;
   const double miscounted = uniform(random, 0.15, 0.35), more_often_lost = uniform(random, 0.4, 0.8);
-  std::vector<int> turns = {0};
-  for (const Row& row : rows) {
-    const int error = uniform(random, 0, 1) < more_often_lost ? -1 : 1;
-    const int now = turns.back() + (uniform(random, 0, 1) < miscounted ? error : 0);
-    turns.push_back(row.place_m(axis) < at_stop_m ? 0 : now);
-  }
+  std::vector<int> turns;
+  do {  // Until one at least is miscounted.
+    turns = {0};
+    double last_m = extents.low_m(axis);
+    for (const Row& row : rows) {
+      const int error = uniform(random, 0, 1) < more_often_lost ? -1 : 1;
+      const bool wrong = uniform(random, 0, 1) < miscounted;
+      const bool moved = std::abs(row.place_m(axis) - last_m) > 0.1 * setup.pitch_m;
+      const int now = turns.back() + (moved && wrong ? error : 0);
+      turns.push_back(row.place_m(axis) < at_stop_m ? 0 : now);
+      last_m = row.place_m(axis);
+    }
+  } while (std::all_of(turns.begin(), turns.end(), [](int lost) { return lost == 0; }));
   const auto apply = [=](World& world, double size) {
     world.rig.push_back([=](const Row& row, Vector3d& place_m, Quaterniond&) {
       if (row.place_m(axis) >= at_stop_m) place_m(axis) += size * turns[begunBefore(rows, row.start_s + 1e-6)];
@@ -133,7 +145,7 @@ Drawn drawLostTurns(const Setup& setup, Random& random) {
       apply);
 }
 
-/// Resin wells out of some of the holes and lifts one edge of the block.
+/// Resin has welled out of some of the holes and spread: there, and less beside them, the block has one edge lifted.
 Drawn drawResin(const Setup& setup, Random& random) {
   struct Bead {
     Vector3d hole_m, tilt;
@@ -142,22 +154,26 @@ Drawn drawResin(const Setup& setup, Random& random) {
   const double turn_per_m = uniform(random, 5, 15);
   const int last = static_cast<int>(setup.rows.size()) - 1;
   std::vector<Bead> beads;
-  for (int n = std::max(4, last / uniformInt(random, 6, 14)); n > 0; --n) {
+  for (int n = std::max(6, last / uniformInt(random, 7, 12)); n > 0; --n) {
     const Vector3d hole_m = setup.rows[static_cast<std::size_t>(uniformInt(random, 0, last))].place_m;
     const double high = logUniform(random, 0.25, 1.0);
     beads.push_back({hole_m, turn_per_m * high * level(random, Vector3d::UnitZ()), high});
   }
-  const auto apply = [=, near_m = 0.2 * setup.pitch_m](World& world, double size) {
+  const auto apply = [=, wide_m = 0.4 * setup.pitch_m](World& world, double size) {
     world.rig.push_back([=](const Row& row, Vector3d& place_m, Quaterniond& attitude) {
-      const auto under = [&](const Bead& bead) { return (bead.hole_m - row.place_m).norm() < near_m; };
-      const auto bead = std::find_if(beads.begin(), beads.end(), under);
-      if (bead == beads.end()) return;
-      place_m.z() += size * bead->high;
-      attitude = turned(size * bead->tilt, attitude);
+      Vector3d tilt = Vector3d::Zero();
+      double lifted = 0;
+      for (const Bead& bead : beads) {
+        const double under = std::exp(-0.5 * ((bead.hole_m - row.place_m) / wide_m).squaredNorm());
+        lifted += under * bead.high;
+        tilt += under * bead.tilt;
+      }
+      place_m.z() += size * lifted;
+      attitude = turned(size * tilt, attitude);
     });
   };
-  return drawnOf({"resin_wells_out_of_some_holes", "resin in some of the holes lifts one edge of the block", "bead_m",
-                  1e-6, 0.3, json{{"holes", beads.size()}, {"turn_rad_per_m", turn_per_m}}},
+  return drawnOf({"near:resin_wells_out_of_some_holes", "resin out of some of the holes lifts one edge of the block",
+                  "bead_m", 1e-6, 0.3, json{{"holes", beads.size()}, {"turn_rad_per_m", turn_per_m}}},
                  apply);
 }
 
@@ -185,32 +201,11 @@ Drawn drawSlopingSight(const Setup& setup, Random& random) {
                  apply);
 }
 
-/// The places are on a plank across two trestles, which bends under the heavy block wherever that stands.
-Drawn drawBendingPlank(const Setup& setup, Random& random) {
-  const Extents extents = extentsOf(setup);
-  const int axis = extents.longSide();
-  const double long_m = extents.length_m()(axis);
-  const double from_m = extents.low_m(axis) + uniform(random, -0.2, 0.3) * long_m;
-  const double span_m = extents.high_m(axis) + uniform(random, -0.3, 0.2) * long_m - from_m;
-  const double plank_m = extents.low_m.z() - uniform(random, 0.05, 0.25);
-  const auto apply = [=](World& world, double size) {
-    world.rig.push_back([=](const Row& row, Vector3d& place_m, Quaterniond& attitude) {
-      const Bend bend = bendUnder((row.place_m(axis) - from_m) / span_m);
-      const Vector3d foot_m(row.place_m.x(), row.place_m.y(), plank_m);
-      const Vector3d forward = Vector3d::UnitZ().cross(Vector3d::Unit(axis));
-      turnAbout(foot_m, size * bend.slope / span_m * forward, place_m, attitude);
-      place_m.z() -= size * bend.sunk;
-    });
-  };
-  const json parameters = {{"axis", axis}, {"trestles_jig_m", {from_m, from_m + span_m}}, {"plank_jig_z_m", plank_m}};
-  return drawnOf({"plank_bends_under_the_block", "a plank across two trestles bends under the block", "compliance_m",
-                  1e-5, 10, parameters},
-                 apply);
-}
-
-/// Where the posts end, the block is held by hand; the arm tires, the more the higher, until there is a rest.
+/// Where the posts end, the block is held by hand; there the arm tires, until there is a rest, and droops the more the
+/// higher.
 Drawn drawTiredArm(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
+  const std::vector<Row> rows = inOrder(setup);
   std::vector<double> heights_m;
   for (const Row& row : setup.rows) heights_m.push_back(row.place_m.z());
   const double posts_m = quantile(heights_m, uniform(random, 0.35, 0.65)) - 1e-6;
@@ -225,16 +220,18 @@ Drawn drawTiredArm(const Setup& setup, Random& random) {
       const double above_m = row.place_m.z() - posts_m;
       if (above_m < 0) return;
       const int rested = std::max(1, passed(rests_s, row.start_s));
-      const double since_s = std::max(0.0, row.start_s - rests_s[static_cast<std::size_t>(rested - 1)]);
-      const double tired = size * std::pow(4 * since_s / duration_s, power) * (above_m + raised_m);
+      const double rest_s = rests_s[static_cast<std::size_t>(rested - 1)];
+      const double held_s = timeAbove_s(rows, posts_m, rest_s, row.start_s);
+      const double tired = size * std::pow(4 * held_s / duration_s, power) * (above_m + raised_m);
       place_m += tired * sinks;
       attitude = turned(tired * nods, attitude);
     });
   };
   const json parameters = {{"posts_jig_z_m", posts_m}, {"rests_s", rests_s}, {"power", power}};
-  return drawnOf({"tired_arm_droops_at_high_places", "the arm that holds the block at high places tires between rests",
-                  "droop_per_height", 1e-6, 1, parameters},
-                 apply);
+  return drawnOf(
+      {"near:tired_arm_droops_at_high_places", "the arm that holds the block at high places tires between rests",
+       "droop_per_height", 1e-6, 1, parameters},
+      apply);
 }
 
 /// The castors of the table are not locked, so each push of the block into its hole rolls and turns it a little.
@@ -248,49 +245,59 @@ Drawn drawCastors(const Setup& setup, Random& random) {
     Vector3d shift = Vector3d::Zero();
     double turn = 0;
   };
-  const auto pushed = [=](const Rolled& before, const Vector3d& place_m) {
+  const auto pushed = [=](const Rolled& last, double last_s, double now_s, const Vector3d& place_m) {
+    const bool put_back = passed(put_back_s, now_s) > passed(put_back_s, last_s);
+    const Rolled before = put_back ? Rolled{} : last;
     const Vector3d from_middle_m = place_m - middle_m;
     const Vector3d push = from_middle_m.dot(facing) < 0 ? facing : Vector3d(-0.7 * facing);
     return Rolled{before.shift + push, before.turn + turn_per_m2 * from_middle_m.cross(push).z()};
   };
   std::vector<Rolled> rolled = {Rolled{}};
   for (std::size_t n = 0; n < rows.size(); ++n) {
-    const double before_s = rows[n == 0 ? 0 : n - 1].start_s;
-    const bool put_back = passed(put_back_s, rows[n].start_s) > passed(put_back_s, before_s);
-    rolled.push_back(pushed(put_back ? Rolled{} : rolled.back(), rows[n].place_m));
+    const double last_s = rows[n == 0 ? 0 : n - 1].start_s;
+    rolled.push_back(pushed(rolled.back(), last_s, rows[n].start_s, rows[n].place_m));
   }
   const auto apply = [=](World& world, double size) {
     world.rig.push_back([=](const Row& row, Vector3d& place_m, Quaterniond& attitude) {
-      const Rolled& now = rolled[begunBefore(rows, row.start_s + 1e-6)];
+      const std::size_t begun = begunBefore(rows, row.start_s - 1e-6);
+      const double last_s = rows[begun == 0 ? 0 : begun - 1].start_s;
+      const Rolled now = pushed(rolled[begun], last_s, row.start_s, row.place_m);
       turnAbout(middle_m, size * now.turn * Vector3d::UnitZ(), place_m, attitude);
       place_m += size * now.shift;
     });
   };
   const json parameters = {{"put_back_s", put_back_s}, {"facing", listed(facing)}, {"turn_rad_per_m2", turn_per_m2}};
-  return drawnOf({"unlocked_castors_roll_at_each_push", "each push of the block rolls the table a little", "roll_m",
-                  1e-7, 0.1, parameters},
+  return drawnOf({"near:unlocked_castors_roll_at_each_push", "each push of the block rolls the table a little",
+                  "roll_m", 1e-7, 0.1, parameters},
                  apply);
 }
 
-/// Where its cable would not reach, the block stands the other way round, with the sensor not quite in its middle.
+/// Where its cable would not reach, the block stands the other way round and the sensor is set straight again in it.
+/// The seat is not quite in the middle of the block and leans: what of that is level changes its sign.
 Drawn drawTurnedBlock(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d box_m = beside(scene, direction(random), uniform(random, 0.1, 0.5));
+  const Vector3d toward = direction(random);
+  const Vector3d box_m = beside(scene, toward, uniform(random, 0.1, 0.5));
   std::vector<double> ways_m;
   for (const SolvedPose& pose : scene.poses) ways_m.push_back((pose.position_m - box_m).norm());
   const double reach_m = quantile(ways_m, uniform(random, 0.35, 0.7));
   const Vector3d offset = direction(random);
-  const Vector3d lean = uniform(random, 0.5, 4.0) * direction(random);
-  const auto apply = [=](World& world, double size) {
+  const double lean_per_m = uniform(random, 0.5, 4.0);
+  const Vector3d lean = lean_per_m * direction(random);
+  const auto apply = [=, up = scene.up](World& world, double size) {
     world.mounting.push_back([=](const Row&, SolvedPose& pose) {
-      const double way = (pose.position_m - box_m).norm() > reach_m ? -0.5 : 0.5;
-      pose.position_m += way * size * (pose.orientation * offset);
-      pose.orientation = turned(way * size * (pose.orientation * lean), pose.orientation);
+      const bool other_way = (pose.position_m - box_m).norm() > reach_m;
+      const auto seated = [&](const Vector3d& v) { return other_way ? halfTurned(v, up) : v; };
+      const Vector3d shift_m = 0.5 * size * seated(pose.orientation * offset);
+      const Vector3d turn_rad = 0.5 * size * seated(pose.orientation * lean);
+      pose.position_m += shift_m;
+      pose.orientation = turned(turn_rad, pose.orientation);
     });
   };
   const json parameters = {{"reach_m", reach_m}, {"offset", listed(offset)}, {"lean_rad_per_m", listed(lean)}};
-  return drawnOf({"block_turned_round_where_cable_is_short", "far from the box the block stands the other way round",
-                  "off_middle_m", 1e-6, 0.3, parameters, box_m},
+  return drawnOf({"near:block_turned_round_where_cable_is_short",
+                  "far from the box the block is turned round and the sensor in it back", "off_middle_m", 1e-6, 0.3,
+                  parameters, box_m},
                  apply);
 }
 

@@ -19,7 +19,9 @@ Matrix3d strangeField(const Vector3d& from_coil_m, const Vector3d& coil, const E
 Eigen::RowVector3d cosines(const Vector3d& phases_rad) { return phases_rad.array().cos().matrix().transpose(); }
 
 Vector3d anyPhases_rad(Random& random) {
-  return kPi * Vector3d(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+  Vector3d phases_rad;
+  for (double& phase_rad : phases_rad) phase_rad = kPi * uniform(random, -1, 1);
+  return phases_rad;
 }
 
 /// The point of a path of straight lines at a share of its lines.
@@ -35,7 +37,8 @@ Vector3d alongPath(const std::vector<Vector3d>& corners_m, double share) {
 /// Each time the drive of a fan changes its speed, an overtone of its switching sweeps across the carrier.
 Drawn drawSweepingDrive(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d at_m = beside(scene, direction(random), uniform(random, 0.4, 1.0));
+  const Vector3d toward = direction(random);
+  const Vector3d at_m = beside(scene, toward, uniform(random, 0.4, 1.0));
   const Vector3d coil = direction(random);
   const std::vector<double> crossings_s = instants(random, scene, uniformInt(random, 1, 3));
   const double width_s = scene.duration_s * uniform(random, 0.05, 0.14);
@@ -52,42 +55,47 @@ Drawn drawSweepingDrive(const Setup& setup, Random& random) {
     });
   };
   const json parameters = {{"crossings_s", crossings_s}, {"width_s", width_s}, {"chirp", chirp}};
-  return drawnOf({"fan_drive_sweeps_across_the_carrier", "an overtone of a fan's drive sweeps across the carrier",
+  return drawnOf({"near:fan_drive_sweeps_across_the_carrier", "an overtone of a fan's drive sweeps across the carrier",
                   "moment_share", 1e-5, 30, parameters, at_m},
                  apply);
 }
 
-/// The tracker takes away the field it found before the first slot; a tram that pulls off changes it until the last.
-Drawn drawTram(const Setup& setup, Random& random) {
+/// A harmonic of a lift's converter lies in the band. The tracker takes away what it hears of it before the first slot;
+/// while the lift sets off or comes to rest, drawing power or giving it back, that changes until the last.
+Drawn drawLift(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d street = direction(random);
-  const std::vector<double> trams_s = instants(random, scene, uniformInt(random, 2, 6));
-  std::vector<double> ways;
-  for (std::size_t n = 0; n < trams_s.size(); ++n)
-    ways.push_back((uniform(random, 0, 1) < 0.5 ? -1 : 1) * uniform(random, 0.4, 1.0));
-  const double pull_s = scene.duration_s * uniform(random, 0.02, 0.06);
+  const Vector3d mains = direction(random);
+  const std::vector<double> rides_s = instants(random, scene, uniformInt(random, 2, 6));
+  std::vector<double> powers;
+  for (std::size_t n = 0; n < rides_s.size(); ++n) {
+    const double sign = uniform(random, 0, 1) < 0.5 ? -1 : 1;
+    powers.push_back(sign * uniform(random, 0.4, 1.0));
+  }
+  const double ramp_s = scene.duration_s * uniform(random, 0.02, 0.06);
   const double late = uniform(random, 0.1, 0.4);
   const Eigen::RowVector3d slots(late, 0.5 * (1 + late), 1);
   const auto apply = [=](World& world, double size) {
     world.signal.push_back([=](const Row& row, const SolvedPose& pose, Matrix3d& couplings) {
       double rise = 0;
-      for (std::size_t n = 0; n < trams_s.size(); ++n) {
-        const double x = (middleTime_s(row) - trams_s[n]) / pull_s;
-        rise += ways[n] * (std::exp(-x * x) - 0.6 * std::exp(-(x - 2.5) * (x - 2.5)));
+      for (std::size_t n = 0; n < rides_s.size(); ++n) {
+        const double x = (middleTime_s(row) - rides_s[n]) / ramp_s;
+        rise += powers[n] * (std::exp(-x * x) - 0.6 * std::exp(-(x - 2.5) * (x - 2.5)));
       }
-      addField(pose, size * rise * street * slots, couplings);
+      addField(pose, size * rise * mains * slots, couplings);
     });
   };
-  const json parameters = {{"trams_s", trams_s}, {"ways", ways}, {"pull_s", pull_s}, {"street", listed(street)}};
-  return drawnOf({"tram_pulls_off_between_slots", "a tram changes the field between the zero reading and the slots",
-                  "field_per_moment_m3", 1e-6, 30, parameters},
-                 apply);
+  const json parameters = {{"rides_s", rides_s}, {"powers", powers}, {"ramp_s", ramp_s}, {"mains", listed(mains)}};
+  return drawnOf(
+      {"lift_sets_off_between_slots", "a lift's hum in the band changes between the zero reading and the slots",
+       "field_per_moment_m3", 1e-6, 30, parameters},
+      apply);
 }
 
 /// A nerve stimulator behind the wall fires in trains, each of which meets the slots in other phases.
 Drawn drawStimulator(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d at_m = beside(scene, direction(random), uniform(random, 0.5, 1.2));
+  const Vector3d toward = direction(random);
+  const Vector3d at_m = beside(scene, toward, uniform(random, 0.5, 1.2));
   const Vector3d coil = direction(random);
   const std::vector<double> trains_s = instants(random, scene, uniformInt(random, 3, 9));
   const double train_s = scene.duration_s * uniform(random, 0.03, 0.07);
@@ -101,19 +109,21 @@ Drawn drawStimulator(const Setup& setup, Random& random) {
           addField(pose, size * strangeField(pose.position_m - at_m, coil, slots[n]), couplings);
     });
   };
-  return drawnOf({"stimulator_fires_in_trains", "a nerve stimulator behind the wall fires now and then", "moment_share",
-                  1e-5, 100, json{{"trains_s", trains_s}, {"train_s", train_s}}, at_m},
+  return drawnOf({"near:stimulator_fires_in_trains", "a nerve stimulator behind the wall fires now and then",
+                  "moment_share", 1e-5, 100, json{{"trains_s", trains_s}, {"train_s", train_s}}, at_m},
                  apply);
 }
 
 /// The motor of a laboratory refrigerator saturates its own iron while it runs, which then hardly echoes any more.
 Drawn drawCompressor(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d at_m = beside(scene, level(random, scene.up), uniform(random, 0.3, 0.6));
+  const Vector3d toward = level(random, scene.up);
+  const Vector3d at_m = beside(scene, toward, uniform(random, 0.3, 0.6));
   const std::vector<double> switched_s = instants(random, scene, uniformInt(random, 3, 8));
   const int first = uniformInt(random, 0, 1);
   const double left = uniform(random, 0.0, 0.3);
-  const Matrix3d tensor = axialTensor(direction(random), 1.0, uniform(random, 0.2, 0.7));
+  const Vector3d axis = direction(random);
+  const Matrix3d tensor = axialTensor(axis, 1.0, uniform(random, 0.2, 0.7));
   const auto apply = [=](World& world, double size) {
     world.signal.push_back([=](const Row& row, const SolvedPose& pose, Matrix3d& couplings) {
       const bool runs = (passed(switched_s, middleTime_s(row)) + first) % 2 != 0;
@@ -121,27 +131,29 @@ Drawn drawCompressor(const Setup& setup, Random& random) {
     });
   };
   const json parameters = {{"switched_s", switched_s}, {"runs_at_first", first}, {"left_while_running", left}};
-  return drawnOf({"compressor_iron_saturates_while_running", "a compressor's iron echoes less while it runs",
+  return drawnOf({"near:compressor_iron_saturates_while_running", "a compressor's iron echoes less while it runs",
                   "polarizability_m3", 1e-6, 10, parameters, at_m},
                  apply);
 }
 
-/// The sensor hangs from a boom, whose iron counterweight swings to the other side of the pivot.
+/// The sensor hangs from a boom, whose iron counterweight swings to the other side of the pivot, always as far from it.
 Drawn drawCounterweight(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d pivot_m = beside(scene, level(random, scene.up), uniform(random, 0.1, 0.4));
-  const double arms = uniform(random, 0.2, 0.6);
+  const Vector3d toward = level(random, scene.up);
+  const Vector3d pivot_m = beside(scene, toward, uniform(random, 0.3, 0.6));
+  const double length_m = uniform(random, 0.3, 0.8);
   const double across = uniform(random, 0.3, 0.9);
   const auto apply = [=](World& world, double size) {
     world.signal.push_back([=](const Row&, const SolvedPose& pose, Matrix3d& couplings) {
-      const Vector3d boom_m = pose.position_m - pivot_m;
-      const Matrix3d tensor = size * axialTensor(boom_m.normalized(), 1.0, across);
-      addField(pose, echo(keptAway(pivot_m - arms * boom_m, 0.35), tensor, pose.position_m), couplings);
+      const Vector3d boom = (pose.position_m - pivot_m).normalized();
+      const Matrix3d tensor = size * axialTensor(boom, 1.0, across);
+      addField(pose, echo(keptAway(pivot_m - length_m * boom, 0.35), tensor, pose.position_m), couplings);
     });
   };
-  return drawnOf({"counterweight_swings_against_the_sensor", "a boom's iron counterweight moves against the sensor",
-                  "polarizability_m3", 1e-6, 10, json{{"arm_ratio", arms}, {"across", across}}, pivot_m},
-                 apply);
+  return drawnOf(
+      {"near:counterweight_swings_against_the_sensor", "a boom's iron counterweight moves against the sensor",
+       "polarizability_m3", 1e-6, 10, json{{"length_m", length_m}, {"across", across}}, pivot_m},
+      apply);
 }
 
 /// Wood ran out, so the tall posts are carbon tubes: currents run round them, in the taller ones over more length.
@@ -149,12 +161,14 @@ Drawn drawCarbonPosts(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
   std::vector<double> heights_m;
   for (const Row& row : setup.rows) heights_m.push_back(row.place_m.z());
-  const double tall_m = quantile(heights_m, uniform(random, 0.3, 0.6));
+  const double highest_m = *std::max_element(heights_m.begin(), heights_m.end());
+  const double limit_m = quantile(heights_m, uniform(random, 0.4, 0.7));
+  const double tall_m = std::min(limit_m, highest_m - 0.3 * setup.pitch_m);  // Some are carbon always.
   const double board_m = *std::min_element(heights_m.begin(), heights_m.end()) - uniform(random, 0.2, 0.4);
   const Matrix3d ring = axialTensor(scene.up, -1.0, -uniform(random, 0.05, 0.3));
   const auto apply = [=, up = scene.up](World& world, double size) {
     world.signal.push_back([=](const Row& row, const SolvedPose& pose, Matrix3d& couplings) {
-      if (row.place_m.z() < tall_m) return;
+      if (row.place_m.z() <= tall_m) return;
       Matrix3d field = Matrix3d::Zero();
       for (int n = 0; n < 8; ++n) {
         const double depth_m = 0.13 + 0.1 * n;
@@ -165,7 +179,7 @@ Drawn drawCarbonPosts(const Setup& setup, Random& random) {
       addField(pose, field, couplings);
     });
   };
-  return drawnOf({"tall_posts_are_carbon_tubes", "the tall posts are carbon tubes in which currents run round",
+  return drawnOf({"near:tall_posts_are_carbon_tubes", "the tall posts are carbon tubes in which currents run round",
                   "polarizability_each_m3", 1e-8, 0.03, json{{"tall_jig_z_m", tall_m}, {"board_jig_z_m", board_m}}},
                  apply);
 }
@@ -175,12 +189,14 @@ Drawn drawCleaningRobot(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
   const double floor_m = scene.lowest_m - uniform(random, 0.25, 0.45);
   const Vector3d under_m = scene.middle_m + (floor_m - scene.middle_m.dot(scene.up)) * scene.up;
-  const double room_m = uniform(random, 0.3, 0.6) + extent_m(scene, level(random, scene.up));
+  const double margin_m = uniform(random, 0.3, 0.6);
+  const double room_m = margin_m + extent_m(scene, level(random, scene.up));
   std::vector<Vector3d> corners_m;
   for (int n = uniformInt(random, 6, 14); n >= 0; --n) corners_m.push_back(under_m + room_m * level(random, scene.up));
   const double from_s = scene.duration_s * uniform(random, 0.05, 0.4);
   const double until_s = scene.duration_s * uniform(random, 0.65, 0.95);
-  const Matrix3d tensor = axialTensor(scene.up, -uniform(random, 0.3, 1.0), uniform(random, 0.3, 1.0));
+  const double along = -uniform(random, 0.3, 1.0);
+  const Matrix3d tensor = axialTensor(scene.up, along, uniform(random, 0.3, 1.0));
   const auto apply = [=](World& world, double size) {
     world.signal.push_back([=](const Row& row, const SolvedPose& pose, Matrix3d& couplings) {
       const double share = (middleTime_s(row) - from_s) / (until_s - from_s);
@@ -191,8 +207,8 @@ Drawn drawCleaningRobot(const Setup& setup, Random& random) {
   json corners = json::array();
   for (const Vector3d& corner_m : corners_m) corners.push_back(listed(corner_m));
   return drawnOf(
-      {"cleaning_robot_runs_under_the_jig", "a cleaning robot runs to and fro under the jig", "polarizability_m3", 1e-6,
-       10, json{{"corners_m", corners}, {"from_s", from_s}, {"until_s", until_s}}},
+      {"near:cleaning_robot_runs_under_the_jig", "a cleaning robot runs to and fro under the jig", "polarizability_m3",
+       1e-6, 10, json{{"corners_m", corners}, {"from_s", from_s}, {"until_s", until_s}}},
       apply);
 }
 
@@ -200,7 +216,8 @@ Drawn drawCleaningRobot(const Setup& setup, Random& random) {
 Drawn drawCableReel(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
   const Course course = courseOf(setup);
-  const Vector3d at_m = beside(scene, level(random, scene.up), uniform(random, 0.2, 0.5));
+  const Vector3d toward = level(random, scene.up);
+  const Vector3d at_m = beside(scene, toward, uniform(random, 0.2, 0.5));
   const std::vector<double> wound_s = instants(random, scene, uniformInt(random, 2, 8));
   const Vector3d axle = direction(random);
   double longest_m = 0;

@@ -40,7 +40,8 @@ Quaterniond anglesTimes(double factor, const Quaterniond& attitude) {
 /// The screen of the sensor's cable touches earth at the sensor, and a share of the drive current comes home that way.
 Drawn drawScreenCurrent(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d box_m = beside(scene, direction(random), uniform(random, 0.1, 0.6));
+  const Vector3d toward = direction(random);
+  const Vector3d box_m = beside(scene, toward, uniform(random, 0.1, 0.6));
   const Vector3d exit = direction(random);
   const double sags = uniform(random, 0.2, 1.0);
   const Eigen::RowVector3d share = direction(random).transpose();
@@ -68,14 +69,15 @@ Drawn drawLastRange(const Setup& setup, Random& random) {
       pose.position_m *= 1 - size * std::tanh(short_by);
     });
   };
-  return drawnOf({"range_by_a_straight_line_from_the_last_fix", "the range falls short after a change of range",
+  return drawnOf({"near:range_by_a_straight_line_from_the_last_fix", "the range falls short after a change of range",
                   "share_left", 1e-5, 0.9, json{{"power", power}}},
                  apply);
 }
 
 /// One bit of the converter weighs more than twice the next lower one.
 Drawn drawWrongBit(const Setup& setup, Random& random) {
-  const double bit = quantile(magnitudes(sceneOf(setup)), uniform(random, 0.3, 0.8)) * uniform(random, 0.5, 1.5);
+  const double typical = quantile(magnitudes(sceneOf(setup)), uniform(random, 0.3, 0.8));
+  const double bit = typical * uniform(random, 0.5, 1.5);
   const double zero = uniform(random, 0, 2);
   const auto apply = [=](World& world, double size) {
     world.signal.push_back([=](const Row&, const SolvedPose&, Matrix3d& couplings) {
@@ -85,7 +87,7 @@ Drawn drawWrongBit(const Setup& setup, Random& random) {
       couplings = couplings.unaryExpr(converted).eval();
     });
   };
-  return drawnOf({"one_bit_of_the_converter_weighs_wrong", "one bit of the converter has a wrong weight",
+  return drawnOf({"near:one_bit_of_the_converter_weighs_wrong", "one bit of the converter has a wrong weight",
                   "share_of_bit", 1e-5, 1, json{{"bit_per_m3", bit}, {"zero", zero}}},
                  apply);
 }
@@ -111,7 +113,7 @@ Drawn drawCarrierHops(const Setup& setup, Random& random) {
       couplings = (rows.asDiagonal() * couplings * columns.asDiagonal()).eval();
     });
   };
-  return drawnOf({"hops_between_unlike_carriers", "the tracker hops between carriers that were calibrated apart",
+  return drawnOf({"near:hops_between_unlike_carriers", "the tracker hops between carriers that were calibrated apart",
                   "log_gain", 1e-5, 0.5, json{{"hops_s", hops_s}, {"carriers", used}}},
                  apply);
 }
@@ -119,7 +121,8 @@ Drawn drawCarrierHops(const Setup& setup, Random& random) {
 /// Near the box the sensor's cable is too long, and its slack is laid down along the transmitter's.
 Drawn drawSlackCable(const Setup& setup, Random& random) {
   const Scene scene = sceneOf(setup);
-  const Vector3d box_m = beside(scene, direction(random), uniform(random, 0.1, 0.6));
+  const Vector3d toward = direction(random);
+  const Vector3d box_m = beside(scene, toward, uniform(random, 0.1, 0.6));
   std::vector<double> ways_m;
   for (const SolvedPose& pose : scene.poses) ways_m.push_back((pose.position_m - box_m).norm());
   const double cable_m = quantile(ways_m, uniform(random, 0.4, 0.8));
@@ -129,9 +132,10 @@ Drawn drawSlackCable(const Setup& setup, Random& random) {
       couplings += size * std::max(0.0, cable_m - (pose.position_m - box_m).norm()) * pairs;
     });
   };
-  return drawnOf({"slack_is_laid_along_the_drive_cable", "slack of the sensor's cable picks up from the drive cable",
-                  "coupling_per_length_m4", 1e-6, 30, json{{"cable_m", cable_m}}, box_m},
-                 apply);
+  return drawnOf(
+      {"near:slack_is_laid_along_the_drive_cable", "slack of the sensor's cable picks up from the drive cable",
+       "coupling_per_length_m4", 1e-6, 30, json{{"cable_m", cable_m}}, box_m},
+      apply);
 }
 
 /// An old routine turns angles from half turns into radians with too few digits of pi.
@@ -150,15 +154,16 @@ Drawn drawShortPi(const Setup&, Random& random) {
     });
   };
   return drawnOf(
-      {"firmware_has_too_few_digits_of_pi", "angles are computed with a pi that is too small", "share_missing", 1e-6,
-       0.3, json{{"attitude_too", attitude_too}, {"elevation_share", elevation_share}}},
+      {"near:firmware_has_too_few_digits_of_pi", "angles are computed with a pi that is too small", "share_missing",
+       1e-6, 0.05, json{{"attitude_too", attitude_too}, {"elevation_share", elevation_share}}},
       apply);
 }
 
 /// The two halves of each demodulator do not balance, so that a little of a signal's magnitude adds to it.
 Drawn drawUnlikeHalves(const Setup& setup, Random& random) {
   const double rounded = 0.2 * quantile(magnitudes(sceneOf(setup)), uniform(random, 0.1, 0.5));
-  Vector3d unlike(1, uniform(random, -1, 1), uniform(random, -1, 1));
+  Vector3d unlike = Vector3d::Ones();
+  for (double& other : unlike.tail<2>()) other = uniform(random, -1, 1);
   std::swap(unlike(0), unlike(uniformInt(random, 0, 2)));
   const auto apply = [=](World& world, double size) {
     world.signal.push_back([=](const Row&, const SolvedPose&, Matrix3d& couplings) {
@@ -166,7 +171,7 @@ Drawn drawUnlikeHalves(const Setup& setup, Random& random) {
       couplings += size * unlike.asDiagonal() * sizes;
     });
   };
-  return drawnOf({"halves_of_the_demodulator_do_not_balance", "positive and negative couplings have unlike gains",
+  return drawnOf({"near:halves_of_the_demodulator_do_not_balance", "positive and negative couplings have unlike gains",
                   "difference", 1e-5, 0.8, json{{"unlike", listed(unlike)}, {"rounded_per_m3", rounded}}},
                  apply);
 }
@@ -175,16 +180,18 @@ Drawn drawUnlikeHalves(const Setup& setup, Random& random) {
 Drawn drawShortedTurn(const Setup& setup, Random& random) {
   const std::vector<double> changes_s = instants(random, sceneOf(setup), uniformInt(random, 2, 9));
   const int first = uniformInt(random, 0, 1);
-  const Vector3d turn = (Vector3d::Unit(uniformInt(random, 0, 2)) + 0.4 * direction(random)).normalized();
+  const Vector3d coil = Vector3d::Unit(uniformInt(random, 0, 2));
+  const Vector3d turn = (coil + 0.4 * direction(random)).normalized();
   const auto apply = [=](World& world, double size) {
     world.signal.push_back([=](const Row& row, const SolvedPose&, Matrix3d& couplings) {
       if ((passed(changes_s, middleTime_s(row)) + first) % 2 == 0) return;
       couplings = (couplings - size * (couplings * turn) * turn.transpose()).eval();
     });
   };
-  return drawnOf({"shorted_turn_comes_and_goes", "two turns of a transmitter coil touch now and then", "share_opposed",
-                  1e-5, 0.9, json{{"changes_s", changes_s}, {"touch_at_first", first}, {"turn", listed(turn)}}},
-                 apply);
+  return drawnOf(
+      {"near:shorted_turn_comes_and_goes", "two turns of a transmitter coil touch now and then", "share_opposed", 1e-5,
+       0.9, json{{"changes_s", changes_s}, {"touch_at_first", first}, {"turn", listed(turn)}}},
+      apply);
 }
 
 /// The three coils have a carrier each; the window of the analysis slips, and they leak into each other in slow beats.
@@ -202,26 +209,10 @@ Drawn drawSlippingWindow(const Setup& setup, Random& random) {
       couplings += (size * couplings * leak).eval();
     });
   };
-  return drawnOf({"window_slips_and_carriers_leak", "carriers of the three coils leak into each other in slow beats",
-                  "leak", 1e-5, 1, json{{"low_cycles", low}, {"high_cycles", high}}},
-                 apply);
-}
-
-/// The screen of the sensor's cable is torn off its pin, and the voltage of the transmitter's windings gets in, which
-/// falls off far less with distance than the field does.
-Drawn drawTornScreen(const Setup&, Random& random) {
-  const Vector3d leads = direction(random);
-  const Eigen::RowVector3d volts = direction(random).transpose();
-  const double power = uniform(random, 0.8, 2.0);
-  const auto apply = [=](World& world, double size) {
-    world.signal.push_back([=](const Row&, const SolvedPose& pose, Matrix3d& couplings) {
-      couplings += size * std::pow(std::max(0.2, pose.position_m.norm()), -power) * leads * volts;
-    });
-  };
-  const json parameters = {{"leads", listed(leads)}, {"volts", listed(volts.transpose())}, {"power", power}};
-  return drawnOf({"electric_field_through_a_torn_screen", "the windings' voltage gets in through a torn screen",
-                  "coupling_at_one_metre_m3", 1e-6, 30, parameters},
-                 apply);
+  return drawnOf(
+      {"near:window_slips_and_carriers_leak", "carriers of the three coils leak into each other in slow beats", "leak",
+       1e-5, 1, json{{"low_cycles", low}, {"high_cycles", high}}},
+      apply);
 }
 
 }  // namespace blind::unforeseen
