@@ -315,7 +315,8 @@ class Fitter {
     return is_round;
   }
 
-  /// Whether the last choices, each another, left as much as those before, and the present one about the least.
+  /// Whether the last choices leave as much as those before, and the present one of them about the least: it goes on
+  /// changing, and to no good.
   bool wanders() const {
     constexpr std::ptrdiff_t kLast = 6;
     constexpr double kAlike = 0.03;  // Of the squares.
