@@ -4,7 +4,7 @@
 automatic_choice.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 40,60,120] [--rooms a,b,...] [--processes N]
 
 Tables are drawn from rooms as in interval_coverage.py, calm and with gross slips. Every method, and `auto`, is fitted to the
-whole table by `fit` and applied to 24,000 places that the table does not hold; the figures are this script's own. Printed, a
+whole table by `fit` and applied to 3,000 places that the table does not hold; the figures are this script's own. Printed, a
 table a line: the RMS before, with `auto`, what it chose, and of the method that errs least there; then the median and the
 largest of RMS(auto) / RMS(best), and how often `auto` is worse than no correction.
 """

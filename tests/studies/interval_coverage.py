@@ -69,7 +69,7 @@ def write(path, head, rows):
         writer.writerows(rows)
 
 
-def record(cli, rooms, room, n_fresh, folder):
+def record(cli, rooms, room, folder, n_fresh=FEWEST_FRESH):
     """Readings without noise at places scattered over the room's box."""
     with open(os.path.join(rooms, f"{room}.scene.json"), encoding="utf-8") as text:
         scene = json.load(text)
@@ -110,7 +110,7 @@ def cell(job):
     cli, rooms, room, heavy, n_places, n_tables, tuned = job
     held = {}
     with tempfile.TemporaryDirectory() as folder:
-        head, rows = record(cli, rooms, room, max(FEWEST_FRESH, FRESH_A_PLACE * n_places), folder)
+        head, rows = record(cli, rooms, room, folder, max(FEWEST_FRESH, FRESH_A_PLACE * n_places))
         fresh, table = os.path.join(folder, "fresh.csv"), os.path.join(folder, "table.nodes.csv")
         write(fresh, head, rows[POOL:])
         draw, misplacing = random.Random(f"{room} {heavy} {n_places} {tuned}"), Misplacing(heavy)

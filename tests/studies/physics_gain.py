@@ -3,7 +3,7 @@
 
 physics_gain.py FIELDTRUE-CLI ROOMS-FOLDER [TABLE.nodes.csv ...] [--tables N] [--places 60] [--processes N]
 
-In every room tables are drawn as in interval_coverage.py; both methods are fitted to each and applied to 24,000 places that the
+In every room tables are drawn as in interval_coverage.py; both methods are fitted to each and applied to 3,000 places that the
 table does not hold. Of a table given the places are dealt to ten folds as in orientation_gain.py. All figures are this
 script's own. Printed: the RMS of both and their ratio, of a real table with its paired 90 % interval (bootstrap over places).
 """

@@ -4,7 +4,7 @@
 uncertainty_coverage.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 60,120] [--rooms a,b] [--methods m,n] [--processes N]
 
 Tables are drawn from rooms as in interval_coverage.py, calm and with gross slips; the jig's 2 mm are stated. Each method is
-fitted to a table by `fit` and applied to 24,000 places that no table holds. `uncertainty_m` is the root of the sum of the
+fitted to a table by `fit` and applied to 3,000 places that no table holds. `uncertainty_m` is the root of the sum of the
 variances of the three axes, so were they alike and Gaussian nine errors in ten would be below 1.4436 times it (chi-square
 of three). Printed, by room and method: the share of errors below that (aim 0.85 to 0.95), of those inside the middle half of the box
 along each axis and of the others apart, and the RMS of what is stated over that of the errors.
