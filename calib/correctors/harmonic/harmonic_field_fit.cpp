@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "calib/correctors/harmonic/harmonic_field_choices.h"
 #include "calib/correctors/harmonic/harmonic_field_evidence.h"
 #include "calib/correctors/harmonic/harmonic_field_sites.h"
 #include "calib/field/dipole_field.h"
@@ -36,12 +37,6 @@ struct Chosen {
   std::vector<Eigen::Index> sites;  ///< Into the candidates.
   std::vector<TensorAmplitudes> tensors;
   std::vector<double> variances;  ///< Prior variance of each tensor.
-};
-
-/// Where the sources of one step stand, in an order of their own, and what they leave.
-struct Choice {
-  std::vector<Eigen::Vector3d> places_m;
-  double misfit_m2 = 0.0;
 };
 
 class Fitter {
@@ -210,7 +205,8 @@ class Fitter {
     const Eigen::Matrix<double, 6, 1> motion = qr.solve(linear.y - effect);
     moveTruth(motion);
     const bool whole = keep(selection, linear);
-    is_choice_final_ = is_choice_final_ || goesRound() || wanders();
+    choices_.add(placesOfSources_m(), misfit_m2_);
+    is_choice_final_ = is_choice_final_ || choices_.isLastFinal();
     refine(selection.gain, step);
     if (!whole) return std::numeric_limits<double>::infinity();
     // Whitened by about the jig's SD.
@@ -295,39 +291,6 @@ class Fitter {
     take(std::move(misfit));
   }
 
-  /// Whether the choice has come round to one made before and is, of those in between, the one that leaves least: each
-  /// change of the field would go on making the next one the likelier.
-  bool goesRound() {
-    constexpr double kAsGood = 1.0 + 1e-4;  // Of one choice at two rounds.
-    Choice now;
-    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) now.places_m.push_back(placeOf_m(k));
-    std::sort(now.places_m.begin(), now.places_m.end(), [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-      return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
-    });
-    now.misfit_m2 = misfit_m2_;
-    const auto same = [&](const Choice& other) { return other.places_m == now.places_m; };
-    const auto before = std::find_if(choices_.begin(), choices_.end(), same);
-    const bool was_left = !std::all_of(before, choices_.end(), same);
-    const bool is_least = std::all_of(before, choices_.end(),
-                                      [&](const Choice& other) { return now.misfit_m2 <= kAsGood * other.misfit_m2; });
-    const bool is_round = was_left && is_least;
-    choices_.push_back(std::move(now));
-    return is_round;
-  }
-
-  /// Whether the last choices leave as much as those before, and the present one of them about the least: it goes on
-  /// changing, and to no good.
-  bool wanders() const {
-    constexpr std::ptrdiff_t kLast = 6;
-    constexpr double kAlike = 0.03;  // Of the squares.
-    if (std::ssize(choices_) <= kLast) return false;
-    const auto leaves_less = [](const Choice& a, const Choice& b) { return a.misfit_m2 < b.misfit_m2; };
-    const auto last = choices_.end() - kLast;
-    const double least_before_m2 = std::min_element(choices_.begin(), last, leaves_less)->misfit_m2;
-    const double least_m2 = std::min_element(last, choices_.end(), leaves_less)->misfit_m2;
-    return misfit_m2_ <= (1.0 + kAlike) * least_m2 && misfit_m2_ >= (1.0 - kAlike) * least_before_m2;
-  }
-
   /// Candidates of the next step: those chosen, their closer neighbours, and of the rest those that offered most; all
   /// of a new lattice when the places turn out to stand elsewhere. Once the choice is final, those chosen.
   void refine(const Eigen::VectorXd& gain, int step) {
@@ -369,6 +332,12 @@ class Fitter {
     return sites_[static_cast<std::size_t>(chosen_.sites[source])].at_m;
   }
 
+  std::vector<Eigen::Vector3d> placesOfSources_m() const {
+    std::vector<Eigen::Vector3d> places_m;
+    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) places_m.push_back(placeOf_m(k));
+    return places_m;
+  }
+
   std::vector<FieldSource> sources() const {
     std::vector<FieldSource> sources;
     for (std::size_t k = 0; k < chosen_.sites.size(); ++k)
@@ -396,7 +365,7 @@ class Fitter {
   double noise_factor_ = 1.0;
   std::vector<Site> sites_;
   Chosen chosen_;
-  std::vector<Choice> choices_;  ///< Of every step.
+  HarmonicChoices choices_;  ///< Of every step.
   bool is_choice_final_ = false;
   double misfit_m2_ = 0.0;                    ///< Of the field found so far.
   std::vector<Eigen::Vector3d> corrected_m_;  ///< By the field found so far.
