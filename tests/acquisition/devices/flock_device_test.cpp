@@ -1,10 +1,8 @@
 #include "acquisition/devices/flock_device.h"
 
 #include <QTest>
-#include <algorithm>
 
 #include "acquisition/emulators/flock_emulator.h"
-#include "calib/core/statistics.h"
 #include "calib/core/units.h"
 #include "tests/acquisition/devices/line_bench.h"
 #include "tests/acquisition/emulators/shaking_source.h"
@@ -103,10 +101,7 @@ class FlockDeviceTest : public QObject {
   void stopsWhileConnecting();
 };
 
-void FlockDeviceTest::streamsOverEveryCarrier_data() {
-  QTest::addColumn<QByteArray>("carrier");
-  for (const char* carrier : {"in process", "pty", "tcp"}) QTest::newRow(carrier) << QByteArray(carrier);
-}
+void FlockDeviceTest::streamsOverEveryCarrier_data() { addCarriers(); }
 
 void FlockDeviceTest::streamsOverEveryCarrier() {
   QFETCH(QByteArray, carrier);
@@ -115,14 +110,7 @@ void FlockDeviceTest::streamsOverEveryCarrier() {
   bench.device->start();
   QTRY_VERIFY2_WITH_TIMEOUT(probe.samples.size() >= 104, qPrintable(probe.last_text), 15000);
   QCOMPARE(probe.state, DeviceState::kRunning);
-  double last_s = 0.0;
-  for (const auto& sample : probe.samples) {
-    QCOMPARE(sample.status, std::string());
-    QCOMPARE(sample.sensor, 0);
-    QVERIFY(sample.time_s > last_s);
-    last_s = sample.time_s;
-    FT_VERIFY_MATCH(near(sample.tracker_from_sensor, kBirdPose, kNear_m, kNear_rad));
-  }
+  checkStanding(probe.samples, kBirdPose, kNear_m, kNear_rad);
   FT_VERIFY_MATCH(near(probe.samples[103].time_s - probe.samples[0].time_s, 103.0 / 103.3, 0.15));
   const TableMetadata about = bench.device->describe();
   FT_VERIFY_MATCH(near(*about.rate_hz, 103.3, 0.05));
@@ -288,17 +276,8 @@ void FlockDeviceTest::faults() {
   QCOMPARE(probe.failures, now.fails ? 1 : 0);
   const QString said = now.fails ? probe.last_text : probe.texts.join('\n');
   FT_VERIFY_MATCH(holdsAll(said.toStdString(), now.says));
-  // Nothing wrong can be averaged: what carries no status is right, or falls to the outlier test.
   const auto good = probe.good();
-  if (good.empty()) return;
-  if (now.leaves_outliers) {
-    const auto statistics = averageSamples(good);
-    FT_VERIFY_OK(statistics);
-    QVERIFY(!statistics->rejections.empty());
-    FT_VERIFY_MATCH(near(statistics->mean, kBirdPose, kNear_m, kNear_rad));
-    return;
-  }
-  for (const auto& sample : good) FT_VERIFY_MATCH(near(sample.tracker_from_sensor, kBirdPose, kNear_m, kNear_rad));
+  checkGood(good, now, kBirdPose, kNear_m, kNear_rad);
   // A bird that says the same twice has not measured twice.
   for (std::size_t i = 1; fault == "repeats" && i < good.size(); ++i) {
     QVERIFY(good[i].tracker_from_sensor.position_m != good[i - 1].tracker_from_sensor.position_m);
@@ -372,15 +351,7 @@ void FlockDeviceTest::nothingPluggedIn() {
 }
 
 void FlockDeviceTest::stopsWhileConnecting() {
-  for (const int after_ms : {0, 10, 40, 120}) {
-    LineBench bench = makeFlockBench("in process", rowOfBirds(2));
-    bench.device->start();
-    QTest::qWait(after_ms);
-    bench.device->stop();
-    bench.device->stop();
-    QTRY_COMPARE(bench.probe->state, DeviceState::kClosed);
-    QCOMPARE(bench.probe->failures, 0);
-  }
+  checkStopsWhileConnecting([] { return makeFlockBench("in process", rowOfBirds(2)); });
 }
 
 FIELDTRUE_TEST(FlockDeviceTest)

@@ -3,6 +3,7 @@
 #include <QTemporaryDir>
 #include <QTest>
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -138,8 +139,47 @@ inline std::string untried(const std::vector<FaultCase>& cases, const std::strin
   return names;
 }
 
-/// Runs a bench whose one sensor stands still, and holds the driver to the case: nothing wrong can be averaged, for
-/// what carries no status is right, or falls to the outlier test.
+/// Readings without a status: nothing wrong can be averaged, for each is right, or falls to the outlier test.
+inline void checkGood(const std::vector<Sample>& good, const FaultCase& now, const Pose& pose, double tolerance_m,
+                      double tolerance_rad) {
+  if (good.empty()) return;
+  if (!now.leaves_outliers) {
+    for (const auto& sample : good) FT_VERIFY_MATCH(near(sample.tracker_from_sensor, pose, tolerance_m, tolerance_rad));
+    return;
+  }
+  const auto statistics = averageSamples(good);
+  FT_VERIFY_OK(statistics);
+  QVERIFY(!statistics->rejections.empty());
+  FT_VERIFY_MATCH(near(statistics->mean, pose, tolerance_m, tolerance_rad));
+}
+
+/// Readings of one sensor that stands still: all good, one after the other.
+inline void checkStanding(const std::vector<Sample>& samples, const Pose& pose, double tolerance_m,
+                          double tolerance_rad) {
+  double last_s = 0.0;
+  for (const auto& sample : samples) {
+    QCOMPARE(sample.status, std::string());
+    QCOMPARE(sample.sensor, 0);
+    QVERIFY(sample.time_s > last_s);
+    last_s = sample.time_s;
+    FT_VERIFY_MATCH(near(sample.tracker_from_sensor, pose, tolerance_m, tolerance_rad));
+  }
+}
+
+/// A driver that is stopped, twice, whatever it is about to say: it closes, and calls it no failure.
+inline void checkStopsWhileConnecting(const std::function<LineBench()>& make_bench) {
+  for (const int after_ms : {0, 10, 40, 120}) {
+    LineBench bench = make_bench();
+    bench.device->start();
+    QTest::qWait(after_ms);
+    bench.device->stop();
+    bench.device->stop();
+    QTRY_COMPARE(bench.probe->state, acquisition::DeviceState::kClosed);
+    QCOMPARE(bench.probe->failures, 0);
+  }
+}
+
+/// Runs a bench whose one sensor stands still, and holds the driver to the case.
 inline void tryFault(LineBench& bench, const FaultCase& now, const Pose& pose, double tolerance_m,
                      double tolerance_rad) {
   using acquisition::DeviceState;
@@ -158,17 +198,8 @@ inline void tryFault(LineBench& bench, const FaultCase& now, const Pose& pose, d
     QTest::qWait(50);
     QCOMPARE(probe.failures, 1);
   }
-  const auto good = probe.good();
-  if (good.empty()) return;
-  if (now.leaves_outliers) {
-    const auto statistics = averageSamples(good);
-    FT_VERIFY_OK(statistics);
-    QVERIFY(!statistics->rejections.empty());
-    FT_VERIFY_MATCH(near(statistics->mean, pose, tolerance_m, tolerance_rad));
-    return;
-  }
-  for (const auto& sample : good) FT_VERIFY_MATCH(near(sample.tracker_from_sensor, pose, tolerance_m, tolerance_rad));
-  if (now.marks_readings) QVERIFY(good.size() < probe.samples.size());
+  checkGood(probe.good(), now, pose, tolerance_m, tolerance_rad);
+  if (now.marks_readings) QVERIFY(probe.good().size() < probe.samples.size());
 }
 
 }  // namespace fieldtrue::testing

@@ -2,12 +2,10 @@
 
 #include <QTemporaryDir>
 #include <QTest>
-#include <algorithm>
 #include <fstream>
 
 #include "acquisition/devices/registry.h"
 #include "acquisition/emulators/ndi_emulator.h"
-#include "calib/core/statistics.h"
 #include "tests/acquisition/devices/line_bench.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -139,10 +137,7 @@ class NdiDeviceTest : public QObject {
   void addresses();
 };
 
-void NdiDeviceTest::tracksOverEveryCarrier_data() {
-  QTest::addColumn<QByteArray>("carrier");
-  for (const char* carrier : {"in process", "pty", "tcp"}) QTest::newRow(carrier) << QByteArray(carrier);
-}
+void NdiDeviceTest::tracksOverEveryCarrier_data() { addCarriers(); }
 
 void NdiDeviceTest::tracksOverEveryCarrier() {
   QFETCH(QByteArray, carrier);
@@ -151,14 +146,7 @@ void NdiDeviceTest::tracksOverEveryCarrier() {
   bench.device->start();
   QTRY_VERIFY2_WITH_TIMEOUT(probe.samples.size() >= 60, qPrintable(probe.last_text), 15000);
   QCOMPARE(probe.state, DeviceState::kRunning);
-  double last_s = 0.0;
-  for (const auto& sample : probe.samples) {
-    QCOMPARE(sample.status, std::string());
-    QCOMPARE(sample.sensor, 0);
-    QVERIFY(sample.time_s > last_s);
-    last_s = sample.time_s;
-    FT_VERIFY_MATCH(near(sample.tracker_from_sensor, kToolPose, 1e-7, 2e-6));
-  }
+  checkStanding(probe.samples, kToolPose, 1e-7, 2e-6);
   // It was asked much oftener than it has frames: the same frame is one reading.
   FT_VERIFY_MATCH(near(probe.samples[59].time_s - probe.samples[0].time_s, 59.0 / 40.0, 0.1));
   const TableMetadata about = bench.device->describe();
@@ -364,20 +352,10 @@ void NdiDeviceTest::faults() {
   QCOMPARE(probe.failures, now.fails ? 1 : 0);
   const QString said = now.fails ? probe.last_text : probe.texts.join('\n');
   FT_VERIFY_MATCH(holdsAll(said.toStdString(), now.says));
-  // Nothing wrong can be averaged: what carries no status is right, or falls to the outlier test.
   auto good = probe.good();
-  if (good.empty()) return;
-  const double near_m = binary ? 1e-6 : 1e-5;
-  if (now.leaves_outliers) {
-    std::erase_if(good, [](const Sample& sample) { return sample.sensor != 0; });
-    const auto statistics = averageSamples(good);
-    FT_VERIFY_OK(statistics);
-    QVERIFY(!statistics->rejections.empty());
-    FT_VERIFY_MATCH(near(statistics->mean, kToolPose, near_m, 3e-4));
-    return;
-  }
-  for (const auto& sample : good) FT_VERIFY_MATCH(near(sample.tracker_from_sensor, kToolPose, near_m, 3e-4));
-  QCOMPARE(good.size() < probe.samples.size(), now.marks_readings);
+  if (now.leaves_outliers) std::erase_if(good, [](const Sample& sample) { return sample.sensor != 0; });
+  checkGood(good, now, kToolPose, binary ? 1e-6 : 1e-5, 3e-4);
+  if (!good.empty() && !now.leaves_outliers) QCOMPARE(good.size() < probe.samples.size(), now.marks_readings);
 }
 
 void NdiDeviceTest::breakAndSpeed_data() {
@@ -448,15 +426,7 @@ void NdiDeviceTest::goesSilent() {
 }
 
 void NdiDeviceTest::stopsWhileConnecting() {
-  for (const int after_ms : {0, 10, 40, 120}) {
-    LineBench bench = makeNdiBench("in process", rowOfTools(2));
-    bench.device->start();
-    QTest::qWait(after_ms);
-    bench.device->stop();
-    bench.device->stop();
-    QTRY_COMPARE(bench.probe->state, DeviceState::kClosed);
-    QCOMPARE(bench.probe->failures, 0);
-  }
+  checkStopsWhileConnecting([] { return makeNdiBench("in process", rowOfTools(2)); });
 }
 
 void NdiDeviceTest::addresses() {

@@ -12,6 +12,7 @@
 #include "acquisition/plan/place_state.h"
 #include "calib/tables/metadata_keys.h"
 #include "tests/acquisition/session/controller_bench.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -31,16 +32,14 @@ const Eigen::Vector3d kElsewhere_m{0.0, 0.36, 0.48};  ///< 0.6 m long.
 class AcquisitionControllerTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int n_files_ = 0;
-  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
+  testing::SessionFolder folder_;
 
  private slots:
   void wholePlanByHand() { wholePlan(false); }
   void wholePlanAutomatically() { wholePlan(true); }
 
   void tablesEqualAnIndependentAverage() {
-    Bench bench(newPath(), planOf({2, 2, 2}));
+    Bench bench(folder_.newPath(), planOf({2, 2, 2}));
     while (bench.n_finished == 0) bench.takeHere();
     bench.readTables();
     QCOMPARE(bench.table.nodes.size(), std::size_t{8});
@@ -61,7 +60,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void aStandIsNeverTakenTwice() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.controller.setAutomatic(true);
     bench.tracker->carryTo(bench.placePose(0));
     bench.tracker->stand(20.0);
@@ -79,7 +78,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void aSensorFoundStandingWaits() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->true_pose = bench.placePose(0);
     bench.controller.setAutomatic(true);
     bench.tracker->stand(2.5);
@@ -89,7 +88,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void knownFrameTakesOnlyNearThePlace() {
-    Bench bench(newPath(), planOf({2, 2, 3}));
+    Bench bench(folder_.newPath(), planOf({2, 2, 3}));
     bench.controller.setAutomatic(true);
     for (int i = 0; i < 6; ++i) {
       bench.tracker->carryTo(bench.placePose(*bench.controller.status().current));
@@ -111,7 +110,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void aSensorElsewhereIsRefusedOnceAndThenMarked() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     for (int i = 0; i < 6; ++i) bench.takeHere();
     const std::size_t place = *bench.controller.status().current;
     Pose wrong = bench.placePose(place);
@@ -142,7 +141,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void aRefusedTakeIsForgottenWhereTheSensorComesHome() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     for (int i = 0; i < 6; ++i) bench.takeHere();
     const Pose right = bench.placePose(*bench.controller.status().current);
     bench.tracker->setDownAt({right.position_m + kElsewhere_m, right.orientation});
@@ -157,7 +156,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void anEarlierWrongTakeIsNamedByTheOthers() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     for (int i = 0; i < 8; ++i) {
       Pose place = bench.placePose(*bench.controller.status().current);
       if (i == 1) place.position_m += kElsewhere_m;
@@ -173,9 +172,9 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void aSessionBeginsByHand() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.controller.setAutomatic(true);
-    bench.controller.openSession(newPath(), QString::fromStdString(toJson(planOf({2, 2, 2})).dump()));
+    bench.controller.openSession(folder_.newPath(), QString::fromStdString(toJson(planOf({2, 2, 2})).dump()));
     QVERIFY(!bench.controller.status().automatic);
     bench.tracker->carryTo(bench.placePose(0));
     bench.tracker->stand(5.0);
@@ -183,7 +182,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void retakeSkipUndoRedo() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     for (int i = 0; i < 3; ++i) bench.takeHere();
     bench.controller.skip();
     auto status = bench.controller.status();
@@ -220,7 +219,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void goToAndBack() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.takeHere();
     bench.controller.goTo(5);
     QVERIFY(bench.controller.status().current == 5u);
@@ -231,7 +230,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void deviceLostInMidNodeAndBack() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.takeHere();
     bench.tracker->setDownAt(bench.placePose(1));
     bench.controller.take();
@@ -262,7 +261,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void deviceLostBetweenTakesIsSaidOnce() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->lose();
     bench.tracker->lose();
     QCOMPARE(bench.device_failures, QStringList{"The cable was pulled (trying again by itself)"});
@@ -275,7 +274,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void aLostTrackerIsNotStartedAgainWhereNobodyWantsIt() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.controller.setReconnects(false);
     bench.tracker->lose();
     QCOMPARE(bench.device_failures, QStringList{"The cable was pulled."});
@@ -285,7 +284,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void movedTakeStartsOverAndIsSuspicious() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.25);
@@ -301,7 +300,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void noSignalFailsInWords() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.controller.setAutomatic(true);
     bench.tracker->stand(1.0, "k");
     QCOMPARE(bench.controller.status().reason, QString("no signal: the tracker reports error k"));
@@ -311,7 +310,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void cancelledTakeStoresNothing() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.3);
@@ -322,7 +321,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void fullDiskIsToldAndNothingIsLost() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     Bench bench(path);
     bench.takeHere();
     signal(SIGXFSZ, SIG_IGN);
@@ -342,7 +341,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void reopeningResumes() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     std::vector<Node> before;
     {
       Bench bench(path);
@@ -379,7 +378,7 @@ class AcquisitionControllerTest : public QObject {
   void clockGoesOnWhileTheSessionIsClosed() {
     QFETCH(double, after_s);
     QFETCH(double, resumed_s);
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       Bench bench(path);
       bench.takeHere();
@@ -393,7 +392,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void metadataComesFromTheDevice() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.readTables();
     QVERIFY(bench.table.metadata.tracker == "fake" && bench.table.metadata.rate_hz == kRate_hz);
     QVERIFY(bench.table.metadata.rig == "wooden jig");
@@ -401,12 +400,12 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void badSessionsAreToldAndTheOpenOneStays() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     Bench bench(path);
     bench.controller.openSession(folder_.filePath("none.fieldtrue"), {});
     QCOMPARE(bench.failures.size(), 1);
     QVERIFY(bench.failures[0].contains("no such session file"));
-    bench.controller.openSession(newPath(), "{\"grid\": \"5x5@1\"}");
+    bench.controller.openSession(folder_.newPath(), "{\"grid\": \"5x5@1\"}");
     QCOMPARE(bench.failures.size(), 2);
     QVERIFY(bench.failures[1].contains("expected NXxNYxNZ"));
     QCOMPARE(bench.controller.status().session->path, path);
@@ -434,7 +433,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void statusComesAtMostThirtyTimesASecond() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     int n_status = 0;
     connect(&bench.controller, &AcquisitionController::statusChanged, this, [&] { ++n_status; });
     QElapsedTimer timer;
@@ -449,7 +448,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void aTakeThatFallsShortIsMarked() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.controller.setTakeLength({TakeLength::Until::kSeconds, 0.5});
     bench.takeHere();
     QCOMPARE(bench.nodes.at(0).n_used, 61);  // Half a second at 120 a second, both ends.
@@ -465,7 +464,7 @@ class AcquisitionControllerTest : public QObject {
   }
 
   void samplesPerNodeIsASetting() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.controller.setTakeLength({TakeLength::Until::kSamples, 25});
     bench.takeHere();
     QCOMPARE(bench.nodes.at(0).n_used, 25);
@@ -475,7 +474,7 @@ class AcquisitionControllerTest : public QObject {
 
  private:
   void wholePlan(bool automatic) {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.controller.setAutomatic(automatic);
     std::vector<int> expected;
     for (int place = 0; place < 18; ++place) {

@@ -1,10 +1,10 @@
 #include <QElapsedTimer>
 #include <QFile>
-#include <QTemporaryDir>
 #include <QTest>
 
 #include "acquisition/session/guarded_call.h"
 #include "tests/acquisition/session/controller_bench.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/silent_port.h"
 #include "tests/support/test_main.h"
@@ -49,9 +49,7 @@ QString planText(std::array<int, 3> counts) { return QString::fromStdString(toJs
 class ControllerBarrierTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int n_files_ = 0;
-  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
+  testing::SessionFolder folder_;
 
  private slots:
   void whatTheDevicesSignalsRaiseIsTold_data() {
@@ -64,7 +62,7 @@ class ControllerBarrierTest : public QObject {
   void whatTheDevicesSignalsRaiseIsTold() {
     QFETCH(int, fault);
     QFETCH(QByteArray, fragment);
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     auto owned = std::make_unique<ThrowingTracker>();
     ThrowingTracker* tracker = owned.get();
     bench.tracker = tracker;
@@ -86,7 +84,7 @@ class ControllerBarrierTest : public QObject {
   }
 
   void whatASlotRaisesIsTold() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     auto owned = std::make_unique<ThrowingTracker>();
     ThrowingTracker* tracker = owned.get();
     bench.tracker = tracker;
@@ -111,7 +109,7 @@ class ControllerBarrierTest : public QObject {
   }
   void theOpenSessionIsNotOpenedAgain() {
     QFETCH(QString, spelling);
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     Bench bench(path);
     bench.takeHere();
     bench.tracker->setDownAt(bench.placePose(1));
@@ -132,7 +130,7 @@ class ControllerBarrierTest : public QObject {
   }
 
   void noSessionIsMadeInPlaceOfTheOpenOne() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     Bench bench(path);
     bench.takeHere();
     bench.controller.openSession(path, planText({2, 2, 2}));

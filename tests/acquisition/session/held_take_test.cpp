@@ -1,8 +1,8 @@
-#include <QTemporaryDir>
 #include <QTest>
 
 #include "acquisition/plan/place_state.h"
 #include "tests/acquisition/session/controller_bench.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -47,9 +47,7 @@ struct HeldBench : Bench {
 class HeldTakeTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int n_files_ = 0;
-  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
+  testing::SessionFolder folder_;
 
  private slots:
   void whatWasSaidIsDone_data() {
@@ -77,7 +75,7 @@ class HeldTakeTest : public QObject {
     QFETCH(bool, skipped);
     QFETCH(int, failures);
     // One reading a second: some thirty of the sixty have come.
-    HeldBench bench(newPath(), static_cast<AtTimeLimit>(at_time_limit), by_error ? kFar : TakeLength(),
+    HeldBench bench(folder_.newPath(), static_cast<AtTimeLimit>(at_time_limit), by_error ? kFar : TakeLength(),
                     by_error ? kRate_hz : 1.0);
     QCOMPARE(bench.stored.size(), stored ? std::size_t{1} : std::size_t{0});
     QCOMPARE(bench.controller.status().recorded->n_skipped, skipped ? std::size_t{1} : std::size_t{0});
@@ -89,7 +87,7 @@ class HeldTakeTest : public QObject {
   }
 
   void againIsTwice() {
-    HeldBench bench(newPath(), AtTimeLimit::kAgain);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAgain);
     QCOMPARE(bench.take_failures.size(), 1);
     QCOMPARE(bench.controller.status().take, TakeState::kCollecting);
     bench.tracker->stand(2.0 * (kLimit_s + kToRest_s));
@@ -101,7 +99,7 @@ class HeldTakeTest : public QObject {
   }
 
   void aPersonIsAskedAndNothingGoesOn() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     QCOMPARE(bench.held.size(), 1);
     FT_VERIFY_MATCH(testing::holdsAll(bench.held[0].toStdString(), {kShort, "after 30 s"}));
     QVERIFY(bench.could_keep[0]);
@@ -118,7 +116,7 @@ class HeldTakeTest : public QObject {
   }
 
   void keptItIsMarked() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     bench.controller.keepTake();
     QCOMPARE(bench.stored, std::vector<int>{0});
     QVERIFY2(bench.suspicions[0].contains(kShort), qPrintable(bench.suspicions[0]));
@@ -128,7 +126,7 @@ class HeldTakeTest : public QObject {
   }
 
   void waitingLongEnoughHasWhatWasAskedFor() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     for (int waits = 0; waits < 4 && bench.stored.empty(); ++waits) {
       bench.controller.waitLonger();
       QCOMPARE(bench.controller.status().take, TakeState::kCollecting);
@@ -144,7 +142,7 @@ class HeldTakeTest : public QObject {
   }
 
   void whatItHadStaysHoweverLateTheAnswer() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     const int collected = bench.controller.status().collected;
     bench.tracker->stand(60.0);
     bench.controller.waitLonger();
@@ -154,7 +152,7 @@ class HeldTakeTest : public QObject {
   }
 
   void aJigThatMovedMeanwhileStartsOver() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     bench.tracker->true_pose.position_m.x() += 0.004;
     bench.tracker->stand(2.0);
     QCOMPARE(bench.controller.status().take, TakeState::kHeld);
@@ -167,7 +165,7 @@ class HeldTakeTest : public QObject {
 
   /// Pressed while a hand still corrects the jig, which ends where it was.
   void longerIsFromRestOn() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     const int collected = bench.controller.status().collected;
     const Pose place = bench.placePose(0);
     bench.tracker->carryTo({place.position_m + Eigen::Vector3d(0.01, 0.0, 0.0), place.orientation}, 0.5);
@@ -179,7 +177,7 @@ class HeldTakeTest : public QObject {
   }
 
   void againItBeginsAnew() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     bench.controller.takeAgain();
     bench.tracker->stand(1.0);
     const AcquisitionStatus status = bench.controller.status();
@@ -193,7 +191,7 @@ class HeldTakeTest : public QObject {
   }
 
   void carryingTheJigOnKeepsIt() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     bench.tracker->stand(5.0);
     bench.tracker->carryTo(bench.placePose(1));
     QCOMPARE(bench.stored, std::vector<int>{0});
@@ -204,7 +202,7 @@ class HeldTakeTest : public QObject {
 
   /// The place that was taken before was left long ago: that is no reason to end what is held at the next one.
   void oneThatIsHeldAtTheNextPlaceStaysSo() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.takeHere();
     QCOMPARE(bench.stored, std::vector<int>{0});
     bench.controller.setTakeLength(kFar);
@@ -222,7 +220,7 @@ class HeldTakeTest : public QObject {
 
   /// A silent sensor has nothing to be kept; back again, it has what was asked for.
   void whereNothingIsToBeKept() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     QStringList held;
     bool can_keep = true;
     QObject::connect(&bench.controller, &AcquisitionController::takeHeld,
@@ -247,7 +245,7 @@ class HeldTakeTest : public QObject {
   }
 
   void aTrackerThatIsLostEndsIt() {
-    HeldBench bench(newPath(), AtTimeLimit::kAsk);
+    HeldBench bench(folder_.newPath(), AtTimeLimit::kAsk);
     bench.tracker->lose();
     QCOMPARE(bench.take_failures.size(), 1);
     QVERIFY(bench.controller.status().take == TakeState::kFailed);

@@ -1,5 +1,4 @@
 #include <QFileInfo>
-#include <QTemporaryDir>
 #include <QTest>
 #include <map>
 
@@ -7,6 +6,7 @@
 #include "calib/tables/table_io.h"
 #include "calib/tables/table_writer.h"
 #include "tests/acquisition/session/controller_bench.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/acquisition/session/session_samples.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -24,9 +24,7 @@ using testing::storeTake;
 class LooseSamplesTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int n_files_ = 0;
-  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
+  testing::SessionFolder folder_;
 
   static std::map<std::string, int> countByStatus(const SampleTable& samples) {
     std::map<std::string, int> counts;
@@ -47,7 +45,7 @@ class LooseSamplesTest : public QObject {
 
  private slots:
   void betweenThePlacesTenASecond() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->stand(6.0);
     bench.readTables();
     const auto counts = countByStatus(bench.samples);
@@ -77,7 +75,7 @@ class LooseSamplesTest : public QObject {
   }
 
   void cancelledTakesAreKeptWhole() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       Bench bench(path);
       bench.takeHere();
@@ -107,7 +105,7 @@ class LooseSamplesTest : public QObject {
   }
 
   void failedAndRestartedTakesAreKept() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->true_pose = bench.placePose(0);
     bench.tracker->stand(0.6);
     bench.controller.take();
@@ -131,7 +129,7 @@ class LooseSamplesTest : public QObject {
 
   /// In batches: between two writes of the file many readings come together, and closing leaves none behind.
   void theyAreWrittenTogether() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       auto store = SessionStore::create(path, smallPlan(), fullMetadata());
       FT_VERIFY_OK(store);
@@ -156,8 +154,8 @@ class LooseSamplesTest : public QObject {
   }
 
   void aTakeBringsThemAlong() {
-    const QString path = newPath();
-    const QString copy = newPath();
+    const QString path = folder_.newPath();
+    const QString copy = folder_.newPath();
     auto store = SessionStore::create(path, smallPlan(), fullMetadata());
     FT_VERIFY_OK(store);
     FT_VERIFY_OK(store->keepLoose({{readingAt(0.5), 7}}));
@@ -174,7 +172,7 @@ class LooseSamplesTest : public QObject {
   /// day that is the same for all sizes is what one row takes.
   void aDayIsSmall() {
     const double part = 1.0 / 40.0, day_s = 8.0 * 3600.0;
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       auto store = SessionStore::create(path, smallPlan(), fullMetadata());
       FT_VERIFY_OK(store);

@@ -1,8 +1,8 @@
-#include <QTemporaryDir>
 #include <QTest>
 #include <algorithm>
 
 #include "tests/acquisition/session/controller_bench.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
 
@@ -25,9 +25,7 @@ constexpr double kRested_m = 3e-4;
 class MovingTakeTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int n_files_ = 0;
-  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
+  testing::SessionFolder folder_;
 
   /// Carries the jig towards a place, to arrive after so long.
   static Pose before(const Pose& place, double seconds) {
@@ -41,7 +39,7 @@ class MovingTakeTest : public QObject {
   }
   void askedForOnTheWay() {
     QFETCH(double, rate_hz);
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->rate_hz = rate_hz;
     const Pose place = bench.placePose(0);
     bench.tracker->true_pose = before(place, kCarriedFor_s);
@@ -70,7 +68,7 @@ class MovingTakeTest : public QObject {
   }
 
   void aTakeThatMovedGoesOnWhenTheJigRests() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     const Pose place = bench.placePose(0);
     bench.tracker->true_pose = before(place, 3.0);
     bench.tracker->stand(2.0);
@@ -86,7 +84,7 @@ class MovingTakeTest : public QObject {
   }
 
   void aJigThatNeverRestsFails() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     const Pose place = bench.placePose(0);
     bench.tracker->true_pose = before(place, 40.0);
     bench.tracker->carryTo(before(place, 35.0), 5.0);
@@ -99,7 +97,7 @@ class MovingTakeTest : public QObject {
   }
 
   void itIsJudgedWhereTheJigCameToRest() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     for (int i = 0; i < 6; ++i) bench.takeHere();
     const Pose place = bench.placePose(*bench.controller.status().current);
     const Pose wrong{place.position_m + Eigen::Vector3d(0.0, 0.36, 0.48), place.orientation};
@@ -120,7 +118,7 @@ class MovingTakeTest : public QObject {
   }
   void byItselfWithFewReadings() {
     QFETCH(double, rate_hz);
-    Bench bench(newPath(), planOf({2, 2, 1}));
+    Bench bench(folder_.newPath(), planOf({2, 2, 1}));
     bench.tracker->rate_hz = rate_hz;
     bench.controller.setTakeLength({TakeLength::Until::kSamples, 10});
     bench.controller.setAutomatic(true);
@@ -137,7 +135,7 @@ class MovingTakeTest : public QObject {
 
   /// The clock runs on where a recording has a gap: what was before may have been elsewhere.
   void aGapBeginsAgain() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->true_pose = bench.placePose(0);
     bench.tracker->stand(2.0);
     bench.controller.take();
@@ -154,7 +152,7 @@ class MovingTakeTest : public QObject {
 
   /// Where so few readings come that rest cannot be seen, a take that is asked for is one.
   void aTrackerTooSlowToTell() {
-    Bench bench(newPath());
+    Bench bench(folder_.newPath());
     bench.tracker->rate_hz = 0.8;
     bench.controller.setTakeLength({TakeLength::Until::kSamples, 10});
     bench.tracker->true_pose = bench.placePose(0);

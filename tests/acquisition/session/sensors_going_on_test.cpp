@@ -1,9 +1,9 @@
-#include <QTemporaryDir>
 #include <QTest>
 #include <algorithm>
 
 #include "acquisition/session/recorded_sensors.h"
 #include "tests/acquisition/session/raw_sql.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/acquisition/session/two_sensors.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -16,9 +16,7 @@ using namespace fieldtrue::testing;
 class SensorsGoingOnTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int count_ = 0;
-  QString newPath() { return folder_.filePath(QStringLiteral("s%1.fieldtrue").arg(++count_)); }
+  testing::SessionFolder folder_;
   /// A session of its own, and the stream heard in it.
   static void beginNext(TwoSensors& bench, const QString& path) {
     bench.controller.openSession(path, QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
@@ -27,7 +25,7 @@ class SensorsGoingOnTest : public QObject {
 
  private slots:
   void aSessionGoesOnWithItsOwnSensors() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       TwoSensors bench(path);
       bench.controller.setSensors({1, 0});
@@ -50,7 +48,7 @@ class SensorsGoingOnTest : public QObject {
   }
 
   void whichOfThemIsNotThereIsSaid() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       TwoSensors bench(path);
       bench.takeHere();
@@ -68,7 +66,7 @@ class SensorsGoingOnTest : public QObject {
   }
 
   void aSessionOfOneSensorGoesOnWithIt() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       Bench one(path, planOf({2, 2, 1}));
       one.takeHere();
@@ -84,7 +82,7 @@ class SensorsGoingOnTest : public QObject {
   }
 
   void theChoiceIsKeptWithTheSession() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       TwoSensors bench(path);
       bench.tracker->stand(0.5);
@@ -102,36 +100,36 @@ class SensorsGoingOnTest : public QObject {
     bench.takeHere();
     QCOMPARE(bench.sensorsOfTable(), Numbers({1}));
     // The next session begins as if nothing had been chosen.
-    beginNext(bench, newPath());
+    beginNext(bench, folder_.newPath());
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
   }
 
   void theNextSessionIsNotLedByThatOfTheOneBefore() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->stand(0.5);
     bench.controller.setSensors({1, 0});
     QCOMPARE(bench.recorded(), Numbers({1, 0}));
-    beginNext(bench, newPath());
+    beginNext(bench, folder_.newPath());
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
     QCOMPARE(bench.controller.status().live->sensor, 0);
   }
 
   void whatIsChosenBeforeASessionIsOfIt() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->stand(0.5);
     bench.controller.closeSession();
     bench.controller.setSensors({1, 0});
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     beginNext(bench, path);
     QCOMPARE(bench.recorded(), Numbers({1, 0}));
     bench.controller.closeSession();
     QCOMPARE(readSensors(SessionStore::open(path)->state(kSensorsState).value()).value(), Numbers({1, 0}));
-    beginNext(bench, newPath());
+    beginNext(bench, folder_.newPath());
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
   }
 
   void aSensorPluggedInBeforeTheFirstTakeIsRecorded() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->stand(1.0);
     bench.tracker->on_jig[2] = kThird;
     bench.tracker->stand(0.1);
@@ -151,7 +149,7 @@ class SensorsGoingOnTest : public QObject {
   }
 
   void aSensorPluggedInDuringATakeIsNot() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.1);
@@ -164,7 +162,7 @@ class SensorsGoingOnTest : public QObject {
   }
 
   void oneThatIsLeftOutByChoiceIsNoNews() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->stand(1.0);
     bench.controller.setSensors({0});
     bench.tracker->on_jig[2] = kThird;
@@ -174,7 +172,7 @@ class SensorsGoingOnTest : public QObject {
   }
 
   void aSessionGoesOnWithoutADeadOne() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       TwoSensors bench(path);
       bench.takeHere();
@@ -216,7 +214,7 @@ class SensorsGoingOnTest : public QObject {
 
   void whereTheLeadingOneIsDeadTheLowestLeads() {
     // So far from it that its positions cannot stand for those of the sensor that led.
-    TwoSensors bench(newPath(), planOf({3, 2, 2}));
+    TwoSensors bench(folder_.newPath(), planOf({3, 2, 2}));
     bench.tracker->on_jig[1].jig_from_sensor.position_m = {0.0, 0.5, 0.3};
     bench.tracker->on_jig[2] = kThird;
     bench.controller.setSensors({1, 2, 0});

@@ -3,10 +3,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <QTemporaryDir>
 #include <QTest>
 
 #include "acquisition/session/session_store.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/acquisition/session/session_samples.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -15,6 +15,8 @@ using namespace fieldtrue;
 using namespace fieldtrue::acquisition;
 using testing::fullMetadata;
 using testing::kSamples;
+using testing::newStore;
+using testing::opened;
 using testing::sameSamples;
 using testing::samplesOf;
 using testing::smallPlan;
@@ -24,24 +26,11 @@ using testing::storeTake;
 class SessionCrashTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int n_files_ = 0;
-
-  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
-  SessionStore newStore(const QString& path) {
-    auto store = SessionStore::create(path, smallPlan(), fullMetadata());
-    if (!store) qFatal("%s", store.error().message.c_str());
-    return *std::move(store);
-  }
-  SessionStore opened(const QString& path) {
-    auto store = SessionStore::open(path);
-    if (!store) qFatal("%s", store.error().message.c_str());
-    return *std::move(store);
-  }
+  testing::SessionFolder folder_;
 
  private slots:
   void fullDiskStoresNothingOfTheTake() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       SessionStore store = newStore(path);
       FT_VERIFY_OK(storeTake(store, 0, 1));
@@ -70,7 +59,7 @@ class SessionCrashTest : public QObject {
 
   /// The system itself refuses to let the file grow: the write fails in the middle of a take.
   void refusedWriteStoresNothingOfTheTake() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     { SessionStore store = newStore(path); }
     const pid_t child = fork();
     if (child == 0) {
@@ -102,7 +91,7 @@ class SessionCrashTest : public QObject {
 
   /// Kills a program that stores takes at any moment: all takes it was told of are there, whole, and at most one more.
   void killedProgramLosesAtMostTheTakeInProgress() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     { SessionStore store = newStore(path); }
     std::mt19937_64 random(11);
     for (int round = 0; round < 15; ++round) {

@@ -53,6 +53,19 @@ inline std::vector<Sample> samplesOf(int take) {
   return samples;
 }
 
+/// A new session of the small plan.
+inline acquisition::SessionStore newStore(const QString& path) {
+  auto store = acquisition::SessionStore::create(path, smallPlan(), fullMetadata());
+  if (!store) qFatal("%s", store.error().message.c_str());
+  return *std::move(store);
+}
+
+inline acquisition::SessionStore opened(const QString& path) {
+  auto store = acquisition::SessionStore::open(path);
+  if (!store) qFatal("%s", store.error().message.c_str());
+  return *std::move(store);
+}
+
 inline Result<void> storeTake(acquisition::SessionStore& store, std::size_t place, int take,
                               const std::string& suspicious = {}) {
   const std::vector<Sample> samples = samplesOf(take);

@@ -3,15 +3,14 @@
 #include <QDir>
 #include <QElapsedTimer>
 #include <QProcess>
-#include <QSqlDatabase>
-#include <QSqlQuery>
-#include <QTemporaryDir>
 #include <QTest>
 #include <cmath>
 #include <cstdio>
 #include <random>
 
 #include "acquisition/plan/place_state.h"
+#include "tests/acquisition/session/raw_sql.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/acquisition/session/session_samples.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -20,6 +19,8 @@ using namespace fieldtrue;
 using namespace fieldtrue::acquisition;
 using testing::fullMetadata;
 using testing::kSamples;
+using testing::newStore;
+using testing::opened;
 using testing::sameSamples;
 using testing::samplesOf;
 using testing::smallPlan;
@@ -30,41 +31,16 @@ namespace {
 /// Argument with which this program only tries to open a session and prints what came of it.
 constexpr const char* kTryOpen = "--try-open";
 
-/// Changes a closed session behind the store's back.
-void tamper(const QString& path, const QString& sql) {
-  {
-    QSqlDatabase database = QSqlDatabase::addDatabase("QSQLITE", "tamper");
-    database.setDatabaseName(path);
-    QVERIFY(database.open());
-    QVERIFY(QSqlQuery(database).exec(sql));
-    database.close();
-  }
-  QSqlDatabase::removeDatabase("tamper");
-}
-
 }  // namespace
 
 class SessionStoreTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int n_files_ = 0;
-
-  QString newPath() { return folder_.filePath(QString("%1.fieldtrue").arg(n_files_++)); }
-  SessionStore newStore(const QString& path) {
-    auto store = SessionStore::create(path, smallPlan(), fullMetadata());
-    if (!store) qFatal("%s", store.error().message.c_str());
-    return *std::move(store);
-  }
-  SessionStore opened(const QString& path) {
-    auto store = SessionStore::open(path);
-    if (!store) qFatal("%s", store.error().message.c_str());
-    return *std::move(store);
-  }
+  testing::SessionFolder folder_;
 
  private slots:
   void newSessionIsAllPlanned() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     SessionStore store = newStore(path);
     QCOMPARE(store.places().size(), std::size_t{12});
     QCOMPARE(store.states().value(), std::vector<PlaceState>(12, PlaceState::kPlanned));
@@ -74,7 +50,7 @@ class SessionStoreTest : public QObject {
   }
 
   void beginIsKept() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     const QDateTime begin({2024, 2, 29}, {23, 59, 59, 123}, Qt::UTC);
     {
       const auto store = SessionStore::create(path, {}, {}, begin);
@@ -87,7 +63,7 @@ class SessionStoreTest : public QObject {
   }
 
   void everythingSurvivesClosing() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       SessionStore store = newStore(path);
       FT_VERIFY_OK(storeTake(store, 0, 10));
@@ -124,7 +100,7 @@ class SessionStoreTest : public QObject {
   }
 
   void metadataIsKept() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     { SessionStore store = newStore(path); }
     SessionStore store = opened(path);
     const TableMetadata kept = store.metadata(), expected = fullMetadata();
@@ -142,7 +118,7 @@ class SessionStoreTest : public QObject {
   }
 
   void nodeHoldsWhatTheSamplesSay() {
-    SessionStore store = newStore(newPath());
+    SessionStore store = newStore(folder_.newPath());
     FT_VERIFY_OK(storeTake(store, 4, 3));
     const NodeStatistics expected = averageSamples(samplesOf(3)).value();
     const Node node = store.nodes(4).value().at(0);
@@ -163,7 +139,7 @@ class SessionStoreTest : public QObject {
   }
 
   void retakeSupersedesAndUndoBringsBack() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     SessionStore store = newStore(path);
     FT_VERIFY_OK(storeTake(store, 0, 1));
     FT_VERIFY_OK(storeTake(store, 0, 2));
@@ -176,7 +152,7 @@ class SessionStoreTest : public QObject {
   }
 
   void skippingATakenPlaceMarksItsRow() {
-    SessionStore store = newStore(newPath());
+    SessionStore store = newStore(folder_.newPath());
     FT_VERIFY_OK(storeTake(store, 0, 1));
     FT_VERIFY_OK(store.skip(0, "wobbly"));
     FT_VERIFY_OK(store.skip(1, "pillar"));
@@ -190,7 +166,7 @@ class SessionStoreTest : public QObject {
 
   /// Hundreds of random actions against the plainest model of undo: a list of actions and a position in it.
   void undoAnyNumberOfTimes() {
-    SessionStore store = newStore(newPath());
+    SessionStore store = newStore(folder_.newPath());
     struct Action {
       std::size_t place;
       int take;  // -1: skip
@@ -229,7 +205,7 @@ class SessionStoreTest : public QObject {
   }
 
   void oneFileWhenClosed() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       SessionStore store = newStore(path);
       FT_VERIFY_OK(storeTake(store, 0, 1));
@@ -242,7 +218,7 @@ class SessionStoreTest : public QObject {
   }
 
   void secondProgramIsKeptOut() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       SessionStore store = newStore(path);
       const auto second = SessionStore::open(path);
@@ -267,7 +243,7 @@ class SessionStoreTest : public QObject {
   }
   void wrongFilesAreNamed() {
     QFETCH(QByteArray, content);
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     QFile file(path);
     QVERIFY(file.open(QIODevice::WriteOnly));
     file.write(content);
@@ -288,7 +264,7 @@ class SessionStoreTest : public QObject {
   }
   void damagedFilesAreNamed() {
     QFETCH(double, kept);
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     {
       SessionStore store = newStore(path);
       for (std::size_t place = 0; place < 12; ++place) FT_VERIFY_OK(storeTake(store, place, 1));
@@ -301,28 +277,28 @@ class SessionStoreTest : public QObject {
   }
 
   void newerVersionIsNamed() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     { SessionStore store = newStore(path); }
-    tamper(path, "PRAGMA user_version=2");
+    testing::runSql(path, {"PRAGMA user_version=2"});
     const auto store = SessionStore::open(path);
     QVERIFY(!store && store.error().code == ErrorCode::kNewerVersion);
     FT_VERIFY_MATCH(testing::holdsAll(store.error().message, {"newer version of Fieldtrue", "format 2"}));
   }
 
   void otherDatabaseIsNamed() {
-    const QString path = newPath();
-    tamper(path, "CREATE TABLE recipes(name TEXT)");
+    const QString path = folder_.newPath();
+    testing::runSql(path, {"CREATE TABLE recipes(name TEXT)"});
     const auto store = SessionStore::open(path);
     QVERIFY(!store && store.error().code == ErrorCode::kBadInput);
   }
 
   void missingAndExistingFiles() {
-    const auto missing = SessionStore::open(newPath());
+    const auto missing = SessionStore::open(folder_.newPath());
     QVERIFY(!missing && missing.error().code == ErrorCode::kIo);
     FT_VERIFY_MATCH(testing::holdsAll(missing.error().message, {"no such session file"}));
     const auto folder = SessionStore::open(folder_.path());
     QVERIFY(!folder && folder.error().code == ErrorCode::kIo);
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     { SessionStore store = newStore(path); }
     const auto twice = SessionStore::create(path, smallPlan(), {});
     QVERIFY(!twice && twice.error().code == ErrorCode::kIo);
@@ -335,7 +311,7 @@ class SessionStoreTest : public QObject {
   void largePlanIsQuick() {
     Plan plan;
     plan.counts = {50, 20, 10};
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     auto store = SessionStore::create(path, plan, {});
     FT_VERIFY_OK(store);
     QCOMPARE(store->places().size(), std::size_t{10000});

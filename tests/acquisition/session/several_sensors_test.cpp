@@ -1,5 +1,4 @@
 #include <QFile>
-#include <QTemporaryDir>
 #include <QTest>
 #include <algorithm>
 #include <set>
@@ -7,6 +6,7 @@
 
 #include "acquisition/protocols/sample_status.h"
 #include "acquisition/session/imported_session.h"
+#include "tests/acquisition/session/session_folder.h"
 #include "tests/acquisition/session/session_samples.h"
 #include "tests/acquisition/session/two_sensors.h"
 #include "tests/support/matchers.h"
@@ -21,13 +21,11 @@ using namespace fieldtrue::testing;
 class SeveralSensorsTest : public QObject {
   Q_OBJECT
 
-  QTemporaryDir folder_;
-  int count_ = 0;
-  QString newPath() { return folder_.filePath(QStringLiteral("s%1.fieldtrue").arg(++count_)); }
+  testing::SessionFolder folder_;
 
  private slots:
   void everyRowIsTheMeanOfItsSensor() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     for (int place = 0; place < 4; ++place) bench.takeHere();
     bench.readTables();
     QCOMPARE(bench.n_finished, 1);
@@ -63,7 +61,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void theLeadingOneIsTheLowestAndIsShown() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->stand(0.6);
     const AcquisitionStatus status = bench.controller.status();
     QCOMPARE(bench.recorded(), Numbers({0, 1}));
@@ -81,7 +79,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void takesByItselfAreOfAll() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.controller.setAutomatic(true);
     for (std::size_t place = 0; place < 4; ++place) {
       bench.tracker->carryTo(bench.placePose(place));
@@ -93,7 +91,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void oneThatFallsSilentEndsTheTakeAndIsNamed() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.2);
@@ -129,7 +127,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void oneThatIsUnpluggedDoesNotReport() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->stand(0.5);
     bench.tracker->on_jig[1].is_plugged = false;
     for (int n = 0; n < 3.0 * kRate_hz; ++n) {
@@ -144,7 +142,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void theLeadingOneMayFallSilentToo() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.2);
@@ -156,7 +154,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void motionStartsAllOver() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.3);
@@ -172,7 +170,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void oneThatHasEnoughGoesOnWatching() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->on_jig[1].every = 4;
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
@@ -194,7 +192,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void slowlyCarriedIsNotTakenByItself() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->rate_hz = 30.0;
     for (int sensor = 0; sensor < 4; ++sensor) {
       bench.tracker->on_jig[sensor].jig_from_sensor.position_m.y() = 0.04 * sensor;
@@ -213,7 +211,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void whatIsSuspiciousIsToldOfItsSensor() {
-    TwoSensors bench(newPath(), planOf({3, 2, 1}));
+    TwoSensors bench(folder_.newPath(), planOf({3, 2, 1}));
     for (int place = 0; place < 4; ++place) bench.takeHere();
     bench.tracker->on_jig[1].noise_m = 4e-3;
     bench.takeHere();
@@ -224,7 +222,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void oneThatDoesNotRideOnTheJigIsTold() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->on_jig[2] = kThird;
     bench.tracker->on_jig[2].lies_in_room = true;
     for (int place = 0; place < 4; ++place) bench.takeHere();
@@ -237,7 +235,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void retakeUndoAndSkipAreOfTheWholeTake() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.takeHere();
     bench.takeHere();
     bench.readTables();
@@ -272,7 +270,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void aDiskThatIsFullKeepsNothingOfIt() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     auto store = SessionStore::create(path, smallPlan(), {});
     FT_VERIFY_OK(store);
     std::vector<Sample> first = samplesOf(1), second = samplesOf(2);
@@ -293,7 +291,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void theStoreGivesBackWhatEachRecorded() {
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     std::vector<Sample> first = samplesOf(1), second = samplesOf(2);
     for (Sample& sample : first) sample.sensor = 3;  // It leads though its number is the higher one.
     {
@@ -316,7 +314,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void askedForBeforeAnythingIsRead() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->true_pose = bench.placePose(0);
     bench.controller.take();
     QCOMPARE(bench.controller.status().take, TakeState::kCollecting);
@@ -325,7 +323,7 @@ class SeveralSensorsTest : public QObject {
   }
 
   void aLostTrackerFailsTheTakeOfAll() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     bench.tracker->setDownAt(bench.placePose(0));
     bench.controller.take();
     bench.tracker->stand(0.2);
@@ -341,10 +339,10 @@ class SeveralSensorsTest : public QObject {
   }
 
   void anExportedTableComesBackAsItWas() {
-    TwoSensors bench(newPath());
+    TwoSensors bench(folder_.newPath());
     for (int place = 0; place < 4; ++place) bench.takeHere();
     bench.readTables();
-    const QString path = newPath();
+    const QString path = folder_.newPath();
     FT_VERIFY_OK(makeSession(path, bench.table, bench.samples, "two.nodes.csv"));
     const auto store = SessionStore::open(path);
     const CalibrationTable back = store->nodeTable().value();
