@@ -17,6 +17,7 @@
 #include "calib/calibration/corrector.h"
 #include "calib/core/file_io.h"
 #include "calib/core/setup.h"
+#include "calib/core/statistics.h"
 #include "calib/core/trimmed.h"
 #include "calib/core/units.h"
 #include "calib/recording/unit_slip.h"
@@ -61,8 +62,14 @@ struct Columns {
 /// A row waiting for its batch.
 struct PendingRow {
   std::string text;
-  std::optional<std::size_t> pose;  ///< Index into the batch's poses; none for a row that the tracker marked as lost.
+  std::optional<std::size_t> pose;  ///< Index into the batch's poses; none for a row that holds no reading.
   SetupMatch setup = SetupMatch::kUnknown;
+};
+
+/// What a row holds.
+struct Reading {
+  Pose pose;
+  bool is_turned = false;  ///< Its orientation is known.
 };
 
 /// The number of a sensor as a table writes it; none where it is something else.
@@ -155,8 +162,9 @@ class TableCorrector {
   /// Rows of a sensor that has no correction of its own, where each has one.
   std::size_t n_other_sensor() const { return n_other_sensor_; }
   const std::string& setupDifference() const { return setup_.difference(); }
-  /// The correction takes orientation and the table has none.
-  bool isPositionOnly() const { return corrector_.takesOrientation() && columns_ && !columns_->orientation; }
+  /// Rows with a position and no orientation.
+  std::size_t n_unturned() const { return n_unturned_; }
+  bool hasOrientations() const { return columns_ && columns_->orientation; }
 
  private:
   static std::vector<Eigen::Vector3d> trackedPositions(const calibration::Corrector& corrector) {
@@ -229,24 +237,33 @@ class TableCorrector {
     return bad(", column " + names_[column] + ": '" + std::string(text) + "' is not a finite number");
   }
 
-  Result<Pose> pose(const std::vector<std::string_view>& fields) const {
-    Pose pose;
+  bool isBlank(const std::vector<std::string_view>& fields, std::size_t column) const {
+    return trimmed(fields[column], kBlankOrQuote).empty();
+  }
+
+  /// @return none where the tracker put its mark for a missing reading
+  Result<std::optional<Reading>> reading(const std::vector<std::string_view>& fields) const {
+    Reading reading;
+    bool is_missing = false;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto value = number(fields, columns_->position[axis]);
-      if (!value) return tl::unexpected(value.error());
-      pose.position_m[static_cast<Eigen::Index>(axis)] = *value;
+      FT_TRY(const double value_m, number(fields, columns_->position[axis]));
+      reading.pose.position_m[static_cast<Eigen::Index>(axis)] = value_m;
+      is_missing = is_missing || isMissingMark(value_m);
     }
-    if (!columns_->orientation) return pose;
-    std::array<double, 4> q{};
-    for (std::size_t i = 0; i < 4; ++i) {
-      const auto value = number(fields, (*columns_->orientation)[i]);
-      if (!value) return tl::unexpected(value.error());
-      q[i] = *value;
+    const auto& q = columns_->orientation;
+    reading.is_turned =
+        q && !std::all_of(q->begin(), q->end(), [&](std::size_t column) { return isBlank(fields, column); });
+    if (reading.is_turned) {
+      std::array<double, 4> parts{};
+      for (std::size_t i = 0; i < 4; ++i) {
+        FT_TRY(parts[i], number(fields, (*q)[i]));
+        is_missing = is_missing || isMissingMark(parts[i]);
+      }
+      const Eigen::Quaterniond orientation(parts[0], parts[1], parts[2], parts[3]);
+      if (!(orientation.norm() > 1e-6)) return bad(", columns qw to qz: the quaternion is zero");
+      reading.pose.orientation = orientation.normalized();
     }
-    const Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
-    if (!(orientation.norm() > 1e-6)) return bad(", columns qw to qz: the quaternion is zero");
-    pose.orientation = orientation.normalized();
-    return pose;
+    return is_missing ? std::nullopt : std::optional(reading);
   }
 
   Result<void> takeRow() {
@@ -256,16 +273,18 @@ class TableCorrector {
                  std::to_string(columns_->count) + "; is the file cut off?");
     }
     const bool marked = columns_->status && !trimmed(fields[*columns_->status], kBlankOrQuote).empty();
-    const auto read = pose(fields);
+    const auto read = reading(fields);
     // A reading the tracker itself marked may hold anything; it is kept, and corrected only when it is a pose.
     if (!read && !marked) return tl::unexpected(read.error());
     const std::string_view sensor =
         columns_->sensor ? trimmed(fields[*columns_->sensor], kBlankOrQuote) : std::string_view();
     PendingRow row{line_, std::nullopt, setup_.ofRow(sensor)};
-    if (read) {
+    if (read && *read) {
       row.pose = poses_.size();
-      if (!marked) units_.add(read->position_m);
-      poses_.push_back(*read);
+      if (!marked) units_.add((*read)->pose.position_m);
+      poses_.push_back((*read)->pose);
+      turned_.push_back((*read)->is_turned);
+      if (!turned_.back()) ++n_unturned_;
       sensors_.push_back(sensorNumber(sensor));
       const auto& apart = corrector_.parts().by_sensor;
       if (!apart.empty() && !(sensors_.back() && apart.contains(*sensors_.back()))) ++n_other_sensor_;
@@ -277,13 +296,13 @@ class TableCorrector {
   void flush(std::ostream& out) {
     std::vector<Pose> corrected(poses_.size());
     corrector_.correct(poses_, corrected, sensors_);
-    if (isPositionOnly())
-      for (std::size_t i = 0; i < poses_.size(); ++i)
+    for (std::size_t i = 0; i < poses_.size(); ++i)
+      if (!turned_[i] && corrector_.takesOrientation())
         corrected[i].position_m = corrector_.correctPosition_m(poses_[i].position_m, sensors_[i]);
     for (const PendingRow& row : rows_) {
       out << row.text;
       if (row.pose) {
-        writeCorrected(out, poses_[*row.pose], corrected[*row.pose], sensors_[*row.pose]);
+        writeCorrected(out, {poses_[*row.pose], turned_[*row.pose]}, corrected[*row.pose], sensors_[*row.pose]);
       } else {
         out << ",,,,,,,,,0,";
         ++n_lost_;
@@ -294,25 +313,27 @@ class TableCorrector {
     n_rows_ += rows_.size();
     rows_.clear();
     poses_.clear();
+    turned_.clear();
     sensors_.clear();
   }
 
-  void writeCorrected(std::ostream& out, const Pose& tracked, const Pose& corrected, std::optional<int> sensor) {
+  void writeCorrected(std::ostream& out, const Reading& reading, const Pose& corrected, std::optional<int> sensor) {
+    const auto& [tracked, is_turned] = reading;
     for (const double value : corrected.position_m) out << ',' << formatNumber(value);
-    if (columns_->orientation) {
+    if (is_turned) {
       const Eigen::Quaterniond q = canonical(corrected.orientation);
       for (const double value : {q.w(), q.x(), q.y(), q.z()}) out << ',' << formatNumber(value);
     } else {
       out << ",,,,";
     }
     out << ',';
-    const auto uncertainty_m = columns_->orientation ? corrector_.uncertaintyAt_m(tracked, sensor)
-                                                     : corrector_.uncertainty_m(tracked.position_m, sensor);
+    const auto uncertainty_m =
+        is_turned ? corrector_.uncertaintyAt_m(tracked, sensor) : corrector_.uncertainty_m(tracked.position_m, sensor);
     if (uncertainty_m) out << formatNumber(*uncertainty_m);
     const bool covered = corrector_.covers(tracked.position_m, sensor);
     if (!covered) ++n_outside_;
     out << ',' << (covered ? 1 : 0) << ',';
-    if (columns_->orientation && !orientations_seen_.empty()) out << formatNumber(nearestOrientation_deg(tracked));
+    if (is_turned && !orientations_seen_.empty()) out << formatNumber(nearestOrientation_deg(tracked));
   }
 
   double nearestOrientation_deg(const Pose& tracked) const {
@@ -332,13 +353,28 @@ class TableCorrector {
   std::vector<std::string> names_;
   std::vector<PendingRow> rows_;
   std::vector<Pose> poses_;
+  std::vector<bool> turned_;                 ///< Whether each pose has an orientation.
   std::vector<std::optional<int>> sensors_;  ///< Of each pose.
   std::size_t n_rows_ = 0;
   std::size_t n_outside_ = 0;
   std::size_t n_lost_ = 0;
+  std::size_t n_unturned_ = 0;
   std::size_t n_other_setup_ = 0;
   std::size_t n_other_sensor_ = 0;
 };
+
+/// What rows without an orientation get; empty where nothing is to be said.
+std::string remarkOnUnturned(const TableCorrector& table, const calibration::Corrector& corrector,
+                             const std::string& name) {
+  if (table.n_unturned() == 0 || (!table.hasOrientations() && !corrector.takesOrientation())) return {};
+  std::string text = table.hasOrientations()
+                         ? std::to_string(table.n_unturned()) + " of " + std::to_string(table.n_rows()) + " rows of " +
+                               name + " have no orientation"
+                         : name + " has no orientations (qw, qx, qy, qz)";
+  if (!corrector.takesOrientation()) return text + ": their positions alone are corrected";
+  return text + ", on which this correction depends: positions are corrected as for the mean of the " +
+         std::to_string(corrector.orientationsSeen().size()) + " orientations it was fitted on";
+}
 
 struct ApplyOptions {
   std::string calibration;
@@ -382,10 +418,8 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
   answer.text = std::to_string(table.n_rows()) + " rows written to " + options.out + "; " +
                 std::to_string(table.n_outside()) + " outside the calibrated region (covered = 0), " +
                 std::to_string(table.n_lost()) + " without a pose\n";
-  if (table.isPositionOnly())
-    answer.remarks.push_back(options.in + " has no orientations (qw, qx, qy, qz), on which this correction depends: " +
-                             "positions are corrected as for the mean of the " +
-                             std::to_string(corrector->orientationsSeen().size()) + " orientations it was fitted on");
+  if (const std::string remark = remarkOnUnturned(table, *corrector, options.in); !remark.empty())
+    answer.remarks.push_back(remark);
   if (table.n_other_sensor() > 0)
     answer.remarks.push_back(std::to_string(table.n_other_sensor()) + " of " + std::to_string(table.n_rows()) +
                              " rows of " + options.in + " name none of the sensors that have a correction each (" +

@@ -6,6 +6,7 @@
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/coincident_places.h"
 #include "calib/calibration/mirrored_sensors.h"
+#include "calib/calibration/missing_orientations.h"
 #include "calib/calibration/placed_sensors.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/baked/baked_position.h"
@@ -58,15 +59,6 @@ FitReport reportOf(std::span<const Node> nodes, const Corrector& corrector) {
   if (n_orientations > 0)
     report.orientation_rms_rad = std::sqrt(angle_squares_rad2 / static_cast<double>(n_orientations));
   return report;
-}
-
-/// That orientations are in vain where some rows have none; empty otherwise.
-std::string orientationNote(std::span<const Node> nodes) {
-  const auto n_without =
-      std::count_if(nodes.begin(), nodes.end(), [](const Node& node) { return !node.has_orientation; });
-  if (n_without == 0 || static_cast<std::size_t>(n_without) == nodes.size()) return {};
-  return std::to_string(n_without) + " of " + std::to_string(nodes.size()) +
-         " rows have no orientation, so that no orientation is used: complete these rows, or leave them out.";
 }
 
 /// That axes are wrong, which the correction would hide; empty where they are not.
@@ -153,7 +145,7 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   }
   std::vector<Node> rows(nodes.begin(), nodes.end());
   std::vector<std::string> notes{mirroredNote(nodes), joinCoincidentPlaces(rows), placed.note(),
-                                 orientationNote(nodes)};
+                                 missingOrientationsNote(nodes)};
   const PartsFit fit{*position_method, *orientation_method, metadata, choice, control, parts.alignment, notes};
   const std::vector<int> sensors = sensorsOf(rows);
   const Wanted apart{choice.separate_position && sensors.size() > 1, choice.separate_orientation && sensors.size() > 1};

@@ -6,6 +6,7 @@
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/coincident_places.h"
+#include "calib/calibration/missing_orientations.h"
 #include "calib/calibration/placed_sensors.h"
 #include "calib/evaluation/held_out.h"
 
@@ -35,7 +36,8 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
   job.align = options.align.value_or(calibration::defaultAlignMode(table.metadata));
   calibration::PlacedSensors placed = calibration::placedSensors(job.nodes, job.align);
   job.nodes = std::move(placed.nodes);
-  for (std::string& note : std::array{calibration::joinCoincidentPlaces(job.nodes), placed.note()})
+  for (std::string& note : std::array{calibration::joinCoincidentPlaces(job.nodes), placed.note(),
+                                      calibration::missingOrientationsNote(job.nodes)})
     if (!note.empty()) job.notes.push_back(std::move(note));
   auto candidates = candidatesOf(options);
   if (!candidates) return tl::unexpected(candidates.error());

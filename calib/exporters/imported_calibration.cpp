@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/core/file_io.h"
 #include "calib/core/number_text.h"
 #include "calib/correctors/baked/imported_lattice.h"
 #include "calib/exporters/registry.h"
@@ -103,6 +104,13 @@ Result<void> check(const LatticeField& field, const std::string& name) {
   return {};
 }
 
+/// Whether a file says that it takes true positions to measured ones: by the words that every export of ours carries,
+/// or by 3D Slicer's key for fields that resample.
+bool saysTrueToMeasured(const std::string& content) {
+  return content.find(directionText(Direction::kTrueToMeasured)) != std::string::npos ||
+         content.substr(0, content.find("\n\n")).find("displacement field type:=resampling") != std::string::npos;
+}
+
 }  // namespace
 
 std::span<const CalibrationFormat> calibrationFormats() {
@@ -141,6 +149,11 @@ Result<Corrector> importCalibration(const CalibrationFormat& format, const std::
   FT_TRY(const Exporter* exporter, readerFor(format, path));
   FT_TRY(LatticeField field, exporter->read(path));
   FT_TRY_VOID(check(field, name));
+  FT_TRY(const std::string content, readFile(path));
+  if (saysTrueToMeasured(content))
+    return fail(ErrorCode::kBadInput, name + " says that it takes true positions to measured ones, and a calibration " +
+                                          "takes measured ones to true: write it in that direction (in 3D Slicer " +
+                                          "invert the transform; here export --direction measured-to-true)");
   LatticeVectors displacements = latticeOf(field.points), turns = displacements;
   double squares_m2 = 0.0;
   for (std::size_t i = 0; i < field.displacement_m.size(); ++i) {

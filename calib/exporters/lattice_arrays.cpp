@@ -5,7 +5,8 @@
 namespace fieldtrue::exporters {
 namespace {
 
-constexpr double kEven = 1e-6;  ///< Of a step.
+constexpr double kEven = 1e-6;       ///< Of a step.
+constexpr double kLeastNorm = 1e-6;  ///< Of a quaternion.
 
 }  // namespace
 
@@ -46,11 +47,20 @@ Result<LatticeField> LatticeArrays::lattice() const {
     return fail(ErrorCode::kBadInput, std::to_string(corrected_m.size()) + " points do not fill a lattice of " +
                                           std::to_string(field.points.size()));
   field.displacement_m.resize(corrected_m.size());
+  const bool is_turned = q.size() == corrected_m.size();
+  if (is_turned) field.rotation.resize(q.size());
+  for (std::size_t i = 0; is_turned && i < q.size(); ++i)
+    if (!(q[i].norm() > kLeastNorm) || !q[i].coeffs().allFinite())
+      return fail(ErrorCode::kBadInput, "the turn of point " + std::to_string(i) + " is no quaternion");
   std::size_t next = 0;
   for (int i = 0; i < field.points.counts[0]; ++i)
     for (int j = 0; j < field.points.counts[1]; ++j)
-      for (int k = 0; k < field.points.counts[2]; ++k)
-        field.displacement_m[field.points.at(i, j, k)] = corrected_m[next++] - field.points.point_m(i, j, k);
+      for (int k = 0; k < field.points.counts[2]; ++k) {
+        const std::size_t at = field.points.at(i, j, k);
+        field.displacement_m[at] = corrected_m[next] - field.points.point_m(i, j, k);
+        if (is_turned) field.rotation[at] = q[next].normalized();
+        ++next;
+      }
   return field;
 }
 

@@ -48,7 +48,7 @@ Result<LatticeField> readCsv(const std::filesystem::path& path) {
   LatticeArrays arrays;
   std::vector<Eigen::Vector3d> raw_m;
   while (at < content.size()) {
-    std::array<double, 6> numbers{};
+    std::array<double, 10> numbers{};
     for (double& number : numbers) {
       const auto read = std::from_chars(content.data() + at, content.data() + content.size(), number);
       if (read.ec != std::errc()) return isNot("row " + std::to_string(raw_m.size() + 1) + " is no list of numbers");
@@ -56,6 +56,7 @@ Result<LatticeField> readCsv(const std::filesystem::path& path) {
     }
     raw_m.emplace_back(numbers[0], numbers[1], numbers[2]);
     arrays.corrected_m.emplace_back(numbers[3], numbers[4], numbers[5]);
+    arrays.q.emplace_back(numbers[6], numbers[7], numbers[8], numbers[9]);
     at = std::min(content.find('\n', at), content.size() - 1) + 1;
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {

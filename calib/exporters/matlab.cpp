@@ -101,7 +101,7 @@ Result<LatticeField> readMat(const std::filesystem::path& path) {
   LatticeArrays arrays;
   for (std::size_t axis = 0; axis < 3; ++axis)
     arrays.axes_m[axis] = numbersOf(file, (std::string(1, "xyz"[axis]) + "_m").c_str());
-  const std::vector<double> corrected = numbersOf(file, "corrected_m");
+  const std::vector<double> corrected = numbersOf(file, "corrected_m"), turned = numbersOf(file, "q_wxyz");
   Mat_Close(file);
   const std::size_t nx = arrays.axes_m[0].size(), ny = arrays.axes_m[1].size(), nz = arrays.axes_m[2].size();
   const std::size_t n = nx * ny * nz;
@@ -112,6 +112,8 @@ Result<LatticeField> readMat(const std::filesystem::path& path) {
       for (std::size_t k = 0; k < nz; ++k) {
         const std::size_t at = i + nx * (j + ny * k);
         arrays.corrected_m.emplace_back(corrected[at], corrected[n + at], corrected[2 * n + at]);
+        if (turned.size() == 4 * n)
+          arrays.q.emplace_back(turned[at], turned[n + at], turned[2 * n + at], turned[3 * n + at]);
       }
   auto field = arrays.lattice();
   if (!field) return isNot(field.error().message);

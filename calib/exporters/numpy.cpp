@@ -89,6 +89,9 @@ Result<LatticeField> readNpz(const std::filesystem::path& path) {
     arrays.axes_m[axis] = numbersOf((*members)[std::string(1, "xyz"[axis]) + "_m.npy"]);
   const std::vector<double> corrected = numbersOf((*members)["corrected_m.npy"]);
   for (std::size_t at = 0; at + 3 <= corrected.size(); at += 3) arrays.corrected_m.emplace_back(&corrected[at]);
+  const std::vector<double> turned = numbersOf((*members)["q_wxyz.npy"]);
+  for (std::size_t at = 0; at + 4 <= turned.size(); at += 4)
+    arrays.q.emplace_back(turned[at], turned[at + 1], turned[at + 2], turned[at + 3]);
   auto field = arrays.lattice();
   if (!field) return isNot(field.error().message);
   return field;

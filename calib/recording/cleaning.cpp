@@ -25,6 +25,8 @@ constexpr double kStepsApart = 4.0;
 constexpr double kCoarse_m = 5e-4;
 /// Share of a reading's variance above which rounding is felt.
 constexpr double kFeltShare = 0.1;
+/// One row without an orientation is left out for so many rows in all.
+constexpr std::size_t kRowsForOneWithout = 10;
 
 bool isFinite(const Node& node) {
   const auto good = [](const Pose& pose) {
@@ -215,6 +217,19 @@ void nameLattice(const TableMetadata& metadata, Cleaned& cleaned) {
   cleaned.findings.push_back({"quantization", text, {}});
 }
 
+/// Few rows without an orientation are left out, for the orientations of all others would be in vain.
+void settleOrientations(Cleaned& cleaned) {
+  const std::vector<bool> is_without = marks(cleaned.nodes, [](const Node& node) { return !node.has_orientation; });
+  const auto n_without = static_cast<std::size_t>(std::count(is_without.begin(), is_without.end(), true));
+  if (n_without == 0 || n_without == cleaned.nodes.size()) return;
+  if (kRowsForOneWithout * n_without <= cleaned.nodes.size())
+    return leaveOut(cleaned, is_without, "", "without an orientation left out, so that those of the others count");
+  cleaned.findings.push_back({"",
+                              std::to_string(n_without) + " of " + std::to_string(cleaned.nodes.size()) +
+                                  " rows have no orientation, so that no orientation is used.",
+                              {}});
+}
+
 }  // namespace
 
 Cleaned cleanRows(const CalibrationTable& table) {
@@ -225,6 +240,7 @@ Cleaned cleanRows(const CalibrationTable& table) {
            "marked as skipped were left out");
   leaveOut(cleaned, marks(cleaned.nodes, [](const Node& node) { return !isFinite(node); }), "",
            "hold no usable number and were left out");
+  settleOrientations(cleaned);
   leaveOutCopies(cleaned);
   leaveOutStuck(cleaned, readingStep_m(table));
   nameSharedPlaces(cleaned);

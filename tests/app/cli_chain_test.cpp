@@ -358,6 +358,34 @@ class CliChainTest : public QObject {
     QCOMPARE(rows.at(2).at(7), QByteArray());  // no orientation in, none out
   }
 
+  void applyTakesWhatARowHolds() {
+    FT_VERIFY_STATUS(runCli({"fit", "--nodes", at("a.nodes.csv"), "--position", "rigid", "--orientation", "rigid",
+                             "--align", "none", "--out", at("rigid.ftcal.json")}),
+                     0);
+    // A whole row, the mark of a missing reading in the position, in the orientation, an orientation left blank, and a
+    // number that no tracker reads.
+    QVERIFY(writeWhole(at("in.csv"),
+                       "x_m,y_m,z_m,qw,qx,qy,qz\n0.5,0.2,0.1,1,0,0,0\n-3.7e28,-3.7e28,-3.7e28,1,0,0,0\n"
+                       "0.5,0.2,0.1,-3.7e28,0,0,0\n0.5,0.2,0.1,,,,\n1e100,0,0,1,0,0,0\n"));
+    const CliRun run =
+        runCli({"apply", "--calibration", at("rigid.ftcal.json"), "--in", at("in.csv"), "--out", at("out.csv")});
+    FT_VERIFY_STATUS(run, 0);
+    FT_VERIFY_MATCH(holdsAll(run.out.toStdString(), {"5 rows written", "3 without a pose"}));
+    FT_VERIFY_MATCH(holdsAll(run.err.toStdString(), {"1 of 5 rows", "have no orientation"}));
+    const auto rows = csvRows(readWhole(at("out.csv")));
+    const auto corrected = [&](qsizetype row) { return rows.at(row).mid(7, 7); };
+    QVERIFY(!corrected(1).contains(QByteArray()));
+    for (const qsizetype row : {2, 3, 5}) QCOMPARE(corrected(row), QByteArrayList(7, QByteArray()));
+    QCOMPARE(corrected(4).first(3), corrected(1).first(3));
+    QCOMPARE(corrected(4).mid(3), QByteArrayList(4, QByteArray()));
+    // Three of four numbers are a mistake, as before.
+    QVERIFY(writeWhole(at("in.csv"), "x_m,y_m,z_m,qw,qx,qy,qz\n0.5,0.2,0.1,1,0,,0\n"));
+    const CliRun refused =
+        runCli({"apply", "--calibration", at("rigid.ftcal.json"), "--in", at("in.csv"), "--out", at("out.csv")});
+    QCOMPARE(refused.status, 1);
+    FT_VERIFY_MATCH(holdsAll(refused.err.toStdString(), {"line 2", "qy"}));
+  }
+
   void applyCorrectsWholeTables_data() {
     QTest::addColumn<QString>("in");
     QTest::newRow("nodes") << "a.nodes.csv";

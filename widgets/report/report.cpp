@@ -4,6 +4,7 @@
 #include <set>
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/missing_orientations.h"
 #include "calib/core/file_io.h"
 #include "calib/core/number_text.h"
 #include "calib/correctors/method_label.h"
@@ -76,7 +77,8 @@ void writeVerdict(HtmlWriter& html, const ReportInput& input) {
   html.close();
 }
 
-void writeMethods(HtmlWriter& html, const evaluation::Comparison& comparison) {
+void writeMethods(HtmlWriter& html, const ReportInput& input) {
+  const evaluation::Comparison& comparison = input.comparison;
   html.element("h2", "Methods");
   html.element("h3", "Position");
   writePositionTable(html, comparison);
@@ -84,7 +86,8 @@ void writeMethods(HtmlWriter& html, const evaluation::Comparison& comparison) {
   if (comparison.before_orientation_deg) {
     writeOrientationTable(html, comparison);
   } else {
-    html.element("p", "The tracker reported no orientation.");
+    const std::string some = calibration::missingOrientationsNote(input.table.nodes);
+    html.element("p", some.empty() ? "The tracker reported no orientation." : some);
   }
 }
 
@@ -172,7 +175,7 @@ std::string htmlReport(const ReportInput& input) {
   writeVerdict(html, input);
   html.element("h2", "Error field");
   writePictures(html, reportPictures(input, places), input.draw);
-  writeMethods(html, input.comparison);
+  writeMethods(html, input);
   writeLearningCurves(html, input.learning_curves);
   writeRegion(html, input.comparison);
   if (input.gap) writeGapSection(html, *input.gap, input.draw, &input.table);

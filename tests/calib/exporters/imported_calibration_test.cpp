@@ -113,7 +113,41 @@ class ImportedCalibrationTest : public QObject {
     QVERIFY2(n_inside > 1000, std::to_string(n_inside).c_str());
     // What writing told, and that between points straight lines stand.
     QVERIFY2(worst_m < 1.2 * written->deviation->worst_m + 20e-6, std::to_string(1e6 * worst_m).c_str());
+    QVERIFY(format != "lattice" || imported->choice().orientation_id == "imported");
     if (imported->choice().orientation_id == "imported") QVERIFY2(worst_rad < 2e-3, std::to_string(worst_rad).c_str());
+  }
+
+  void theOtherDirectionIsRefused() {
+    const calibration::Corrector room = fittedRoom();
+    ExportOptions options;
+    options.direction = Direction::kTrueToMeasured;
+    int n_tried = 0;
+    for (const CalibrationFormat& format : calibrationFormats())
+      for (const std::string& id : format.exporter_ids) {
+        const Exporter& row = *findExporter(id).value();
+        if (!row.may_be_inverse) continue;
+        ++n_tried;
+        QTemporaryDir folder;
+        const std::filesystem::path file = folder.path().toStdString() + "/back" + row.extension;
+        FT_VERIFY_OK(exportCalibration(row, room, options, file, {}));
+        QVERIFY(recogniseCalibration(file) == &format);
+        const auto imported = importCalibration(format, file);
+        QVERIFY2(!imported, id.c_str());
+        FT_VERIFY_MATCH(holdsAll(imported.error().message, {"back", "true positions to measured", "--direction"}));
+      }
+    QCOMPARE(n_tried, 8);
+  }
+
+  void aTurnThatIsNoneIsRefused() {
+    QTemporaryDir folder;
+    const std::string file = folder.path().toStdString() + "/field.lattice.csv";
+    std::ofstream out(file);
+    out << "x_m,y_m,z_m,x_corrected_m,y_corrected_m,z_corrected_m,qw,qx,qy,qz,uncertainty_m,inside\n";
+    for (int point = 0; point < 8; ++point)
+      out << point / 4 << ',' << point / 2 % 2 << ',' << point % 2 << ",0,0,0," << (point == 5 ? 0 : 1)
+          << ",0,0,0,,1\n";
+    out.close();
+    FT_VERIFY_MATCH(holdsAll(importCalibration(formatOf("lattice"), file).error().message, {"point 5", "quaternion"}));
   }
 
   void itCannotBeFitted() {

@@ -237,6 +237,21 @@ class CleaningTest : public QObject {
     QCOMPARE(findingAbout(cleaned, "no usable number")->nodes.size(), std::size_t(2));
   }
 
+  void fewRowsWithoutOrientationAreLeftOut() {
+    CalibrationTable table = syntheticTable(grid({4, 4, 4}), noise());
+    for (const std::size_t row : {5U, 17U}) table.nodes[row].has_orientation = false;
+    const Cleaned cleaned = cleanRows(table);
+    QCOMPARE(cleaned.nodes.size(), std::size_t(62));
+    QCOMPARE(findingAbout(cleaned, "without an orientation")->nodes, (std::vector<int>{5, 17}));
+    // Where many have none, all stay.
+    for (std::size_t row = 0; row < 20; ++row) table.nodes[row].has_orientation = false;
+    const Cleaned whole = cleanRows(table);
+    QCOMPARE(whole.nodes.size(), std::size_t(64));
+    QVERIFY(findingAbout(whole, "20 of 64 rows have no orientation") != nullptr);
+    for (Node& node : table.nodes) node.has_orientation = false;
+    QVERIFY(cleanRows(table).findings.empty());
+  }
+
   void singleReadingsOnALatticeAreNamed_data() {
     QTest::addColumn<double>("quantum_m");
     QTest::addColumn<int>("n_used");

@@ -338,6 +338,16 @@ class ReportTest : public QObject {
     QVERIFY(page->text.contains("reported no orientation"));
   }
 
+  void tablesWithFewOrientationsSayIt() {
+    SyntheticOptions options;
+    options.smooth_distortion_m = 0.02;
+    CalibrationTable table = syntheticTable(options);
+    table.nodes[3].has_orientation = false;
+    const auto page = parsed(reportOf(table, fewMethods()));
+    QVERIFY(!page->text.contains("reported no orientation"));
+    QVERIFY(page->text.contains("1 of " + QString::number(table.nodes.size()) + " rows have no orientation"));
+  }
+
   void theSameInputGivesTheSamePage() { QCOMPARE(htmlReport(input_), htmlReport(input_)); }
 
   void writesTheFileOrSaysWhyNot() {
