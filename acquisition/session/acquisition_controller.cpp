@@ -98,8 +98,10 @@ void AcquisitionController::take() {
 }
 
 void AcquisitionController::cancelTake() {
+  const bool has_something_to_stop = impl_->take.runs() || !impl_->take.failure.isEmpty();
   impl_->take.forgetFailure();
   impl_->stopTake();
+  if (!has_something_to_stop && impl_->places.isRetake()) impl_->setCurrent(impl_->places.next());
   impl_->views.tellSoon();
 }
 

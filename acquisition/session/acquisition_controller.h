@@ -136,7 +136,7 @@ class AcquisitionController : public QObject {
   /// Starts collecting at the current place (space bar, Page Down). Where the takes done tell that the sensor stands
   /// elsewhere, it is refused once; asked for again within a few seconds it is taken, and marked.
   void take();
-  void cancelTake();
+  void cancelTake();  ///< Where none runs, a place that was to be retaken is left as it is.
   void keepTake();    ///< Of a take that is held: what it has is stored, and marked.
   void waitLonger();  ///< The same: it goes on, for as long again.
   void takeAgain();   ///< The same: it begins anew.
@@ -187,6 +187,7 @@ class AcquisitionController : public QObject {
   void metadataChanged(const fieldtrue::TableMetadata& metadata);
   void sessionOpened(const QString& path, const QString& page, const QString& plan_json);
   void fitOpened(const QString& ftcal_text);  ///< The newest calibration of the session just opened, if it has one.
+  void gapOpened(const QString& text);        ///< What was kept of its diagnosis as state "gap", likewise.
   /// What the user should know of the session and of what records it; no failure.
   void remarked(const QString& message, fieldtrue::acquisition::RemarkKind kind);
   void failed(const QString& message);  ///< One sentence for the message line.

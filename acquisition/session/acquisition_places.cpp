@@ -24,15 +24,17 @@ Result<KnownPlaces::Content> KnownPlaces::read(const SessionStore& store) {
   const auto states = store.states();
   const auto table = store.nodeTable();
   const auto page = store.state("page");
+  const auto gap = store.state("gap");
   const auto fits = store.fits();
   const auto can_undo = store.canUndo(), can_redo = store.canRedo();
   if (!states) return tl::unexpected(states.error());
   if (!table) return tl::unexpected(table.error());
   if (!page) return tl::unexpected(page.error());
+  if (!gap) return tl::unexpected(gap.error());
   if (!fits) return tl::unexpected(fits.error());
   if (!can_undo) return tl::unexpected(can_undo.error());
   if (!can_redo) return tl::unexpected(can_redo.error());
-  Content content{*states, {}, *can_undo, *can_redo, *page, fits->empty() ? std::string() : fits->front().second};
+  Content content{*states, {}, *can_undo, *can_redo, *page, fits->empty() ? std::string() : fits->front().second, *gap};
   content.rows.resize(states->size());
   std::map<std::pair<int, int>, std::size_t> index;
   for (std::size_t place = 0; place < states->size(); ++place) {

@@ -20,6 +20,7 @@ struct KnownPlaces {
     bool can_undo = false, can_redo = false;
     std::string page;
     std::string newest_fit;  ///< Empty when there is none.
+    std::string gap;         ///< What the Gap page kept; empty when it kept nothing.
   };
   static Result<Content> read(const SessionStore& store);
   void fill(const Content& content);
@@ -37,6 +38,8 @@ struct KnownPlaces {
   /// The sensors that took the places, the leading one first; empty before the first take.
   std::vector<int> sensors() const;
   std::optional<std::size_t> next() const;
+  /// The current place has been taken, or skipped, before.
+  bool isRetake() const { return current && states[*current] != PlaceState::kPlanned; }
   const PlannedPlace& here() const { return store->places()[*current]; }  ///< Only where one is current.
 
   /// Takes that count, nearest to a place first, its own among them.

@@ -58,6 +58,7 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   setCurrent(places.next());
   tellOpened(content->page);
   if (!content->newest_fit.empty()) emit owner->fitOpened(QString::fromStdString(content->newest_fit));
+  if (!content->gap.empty()) emit owner->gapOpened(QString::fromStdString(content->gap));
   for (const std::string& text : store->remarks()) remark(text);
   remarkOnTracker();
   remarkOnLeftOut();

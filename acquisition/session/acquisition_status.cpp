@@ -50,7 +50,7 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.session = views.session(store);
   result.recorded = views.recorded(places);
   result.current = places.current;
-  result.current_is_retake = places.current && places.states[*places.current] != PlaceState::kPlanned;
+  result.current_is_retake = places.isRetake();
   result.take = take.failure.isEmpty() ? take.sampler.state() : TakeState::kFailed;
   result.collected = take.sampler.collected();
   result.wanted = take.sampler.wanted();

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "calib/core/quantum.h"
 #include "calib/core/statistics.h"
@@ -217,6 +218,16 @@ void nameLattice(const TableMetadata& metadata, Cleaned& cleaned) {
   cleaned.findings.push_back({"quantization", text, {}});
 }
 
+/// Rows as they were recorded, so that what is found does not depend on how a file has them in order.
+void putInOrder(std::vector<Node>& nodes) {
+  const bool has_times =
+      std::all_of(nodes.begin(), nodes.end(), [](const Node& node) { return node.t_start_s.has_value(); });
+  const auto key = [has_times](const Node& node) {
+    return std::tuple(has_times ? *node.t_start_s : 0.0, node.node, node.visit, node.sensor);
+  };
+  std::stable_sort(nodes.begin(), nodes.end(), [&](const Node& a, const Node& b) { return key(a) < key(b); });
+}
+
 /// Few rows without an orientation are left out, for the orientations of all others would be in vain.
 void settleOrientations(Cleaned& cleaned) {
   const std::vector<bool> is_without = marks(cleaned.nodes, [](const Node& node) { return !node.has_orientation; });
@@ -235,6 +246,7 @@ void settleOrientations(Cleaned& cleaned) {
 Cleaned cleanRows(const CalibrationTable& table) {
   Cleaned cleaned;
   cleaned.nodes = table.nodes;
+  putInOrder(cleaned.nodes);
   cleaned.names = PlaceNames(table.nodes);
   leaveOut(cleaned, marks(cleaned.nodes, [](const Node& node) { return node.role == NodeRole::kSkipped; }), "",
            "marked as skipped were left out");

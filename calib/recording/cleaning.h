@@ -17,7 +17,7 @@ struct Cleaned {
 
 /// Leaves out rows that say nothing (skipped, not finite, copied, stuck), and and few without an orientation where the
 /// others have one; mirrors back those reported in the other hemisphere. Whatever is changed is a finding; a gap,
-/// however large and sudden, is none and stays.
+/// however large and sudden, is none and stays. Rows come in the order of their times or, without, of their numbers.
 Cleaned cleanRows(const CalibrationTable& table);
 
 }  // namespace fieldtrue::recording

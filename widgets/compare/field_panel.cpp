@@ -171,7 +171,14 @@ void FieldPanel::setComparison(const CalibrationTable& table, const std::optiona
   volume_bar_->setLattice(comparison ? latticeAround(table) : VolumeField{});
   volume_bar_->setWaysHeld(waysHeld(table));
   fillChoosers();
-  if (!comparison_) return;
+  if (!comparison_) {
+    // What another session left must not pass for this one's.
+    for (FieldView* view : {left_, right_}) {
+      view->setField({});
+      view->setVolume({});
+    }
+    return;
+  }
   setLeft(positionRow(*comparison_, left));
   setRight(positionRow(*comparison_, right));
   draw();

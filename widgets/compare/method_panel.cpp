@@ -18,7 +18,7 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kRowHeight = 26;
-constexpr int kMethodWidth = 168;
+constexpr int kMethodWidth = 152;
 constexpr int kFormHeight = 132;
 
 }  // namespace

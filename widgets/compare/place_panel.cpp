@@ -19,6 +19,7 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kPlaceRowHeight = 24;
+constexpr int kNarrowestColumn = 64;  ///< What Qt deems enough for "mm" cuts it.
 
 QTableWidgetItem* cell(const QString& text, Qt::Alignment alignment) {
   auto* item = new QTableWidgetItem(text);
@@ -70,6 +71,9 @@ QTableWidget* PlacePanel::makeTable(const QString& name, const QString& title, c
   table->setHorizontalHeaderLabels({title, unit});
   table->horizontalHeaderItem(0)->setTextAlignment(Qt::AlignLeft | Qt::AlignVCenter);
   table->horizontalHeaderItem(1)->setTextAlignment(Qt::AlignRight | Qt::AlignVCenter);
+  // A selected row would make its headings bold, and wider than their columns.
+  table->horizontalHeader()->setHighlightSections(false);
+  table->horizontalHeader()->setMinimumSectionSize(kNarrowestColumn);
   table->horizontalHeader()->setSectionResizeMode(0, QHeaderView::Stretch);
   table->horizontalHeader()->setSectionResizeMode(1, QHeaderView::ResizeToContents);
   table->verticalHeader()->hide();

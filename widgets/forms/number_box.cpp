@@ -2,6 +2,8 @@
 
 #include <QLocale>
 #include <QRegularExpression>
+#include <algorithm>
+#include <cmath>
 
 namespace fieldtrue::widgets {
 namespace {
@@ -18,29 +20,35 @@ bool mayBecomeNumber(const QString& text) {
   return digits_and_marks.match(text).hasMatch();
 }
 
+/// The number in a field's text.
+QString bare(QString text, const QString& prefix, const QString& suffix) {
+  if (!prefix.isEmpty() && text.startsWith(prefix)) text.remove(0, prefix.size());
+  if (!suffix.isEmpty() && text.endsWith(suffix)) text.chop(suffix.size());
+  return text.trimmed().replace(QLatin1Char(','), QLatin1Char('.'));
+}
+
 }  // namespace
 
 NumberBox::NumberBox(QWidget* parent) : QDoubleSpinBox(parent) { setLocale(plainLocale()); }
 
-QString NumberBox::bare(const QString& text) const {
-  QString number = text;
-  if (!prefix().isEmpty() && number.startsWith(prefix())) number.remove(0, prefix().size());
-  if (!suffix().isEmpty() && number.endsWith(suffix())) number.chop(suffix().size());
-  return number.trimmed().replace(QLatin1Char(','), QLatin1Char('.'));
-}
-
 QValidator::State NumberBox::validate(QString& text, int&) const {
   if (!specialValueText().isEmpty() && text == specialValueText()) return QValidator::Acceptable;
-  const QString number = bare(text);
+  const QString number = bare(text, prefix(), suffix());
   bool is_number = false;
   const double value = QLocale::c().toDouble(number, &is_number);
   if (is_number && value >= minimum() && value <= maximum()) return QValidator::Acceptable;
   return is_number || mayBecomeNumber(number) ? QValidator::Intermediate : QValidator::Invalid;
 }
 
+void NumberBox::fixup(QString& text) const {
+  bool is_number = false;
+  const double value = QLocale::c().toDouble(bare(text, prefix(), suffix()), &is_number);
+  if (is_number) text = prefix() + textFromValue(std::clamp(value, minimum(), maximum())) + suffix();
+}
+
 double NumberBox::valueFromText(const QString& text) const {
   if (!specialValueText().isEmpty() && text == specialValueText()) return minimum();
-  return QLocale::c().toDouble(bare(text));
+  return QLocale::c().toDouble(bare(text, prefix(), suffix()));
 }
 
 CountBox::CountBox(QWidget* parent) : QSpinBox(parent) { setLocale(plainLocale()); }
@@ -48,7 +56,19 @@ CountBox::CountBox(QWidget* parent) : QSpinBox(parent) { setLocale(plainLocale()
 QValidator::State CountBox::validate(QString& text, int& pos) const {
   // Qt would read 3,5 as 35 with a mark between its groups of digits.
   const bool has_mark = text.contains(QLatin1Char(',')) || text.contains(QLatin1Char('.'));
-  return has_mark && mayBecomeNumber(text) ? QValidator::Intermediate : QSpinBox::validate(text, pos);
+  if (has_mark && mayBecomeNumber(text)) return QValidator::Intermediate;
+  // Of a number that is too large Qt would take the digits that fit, 10 of 100.
+  const QValidator::State state = QSpinBox::validate(text, pos);
+  return state == QValidator::Invalid && mayBecomeNumber(bare(text, prefix(), suffix())) ? QValidator::Intermediate
+                                                                                         : state;
+}
+
+void CountBox::fixup(QString& text) const {
+  bool is_number = false;
+  const double value = QLocale::c().toDouble(bare(text, prefix(), suffix()), &is_number);
+  const bool is_whole = is_number && value == std::floor(value);
+  if (is_whole)
+    text = prefix() + textFromValue(static_cast<int>(std::clamp<double>(value, minimum(), maximum()))) + suffix();
 }
 
 }  // namespace fieldtrue::widgets

@@ -36,6 +36,7 @@ constexpr int kSmallestReason = 12;                ///< Pixels; of a place's nam
 // How much of the way to a new guess of the transmitter's place is gone with each status, some thirty a second.
 constexpr double kEase = 0.15;
 constexpr int kInspectorWidth = 320;
+constexpr int kNarrowestColumn = 42;   ///< Of the list of places: what Qt deems enough cuts "Out".
 constexpr std::size_t kMostLines = 4;  ///< Of sensors; more stand side by side.
 // Nearer than this the tracker's own error decides what it says of the distance, and the marks on the floor know
 // better.
@@ -158,6 +159,7 @@ QWidget* AcquirePage::makeBanner() {
     label->setSizePolicy(QSizePolicy::Ignored, label == reason_ ? QSizePolicy::Fixed : QSizePolicy::Preferred);
     texts->addWidget(label);
   }
+  place_->installEventFilter(this);
   held_ = new HeldTake(workbench_, banner_);
   texts->addWidget(held_);
   layout->addLayout(texts, 1);
@@ -264,6 +266,8 @@ QWidget* AcquirePage::makeInspector() {
   list_->setSelectionMode(QAbstractItemView::SingleSelection);
   list_->setShowGrid(false);
   list_->verticalHeader()->hide();
+  list_->horizontalHeader()->setHighlightSections(false);
+  list_->horizontalHeader()->setMinimumSectionSize(kNarrowestColumn);
   list_->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   list_->horizontalHeader()->setSectionResizeMode(0, QHeaderView::Stretch);
   connect(list_, &QTableView::doubleClicked, this, [this](const QModelIndex& row) { workbench_.goTo(row.row()); });
@@ -324,6 +328,7 @@ void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
     const QString plain = QString::fromStdString(placeName(place));
     name = status.current_is_retake ? tr("Retake %1").arg(plain) : plain;
     detail = positionText(place.reference_from_sensor.position_m);
+    if (status.current_is_retake && !takes(status)) detail = tr("%1   Esc keeps it as it is").arg(detail);
   }
   if (status.reconnecting || status.just_returned) {
     detail = status.current ? tr("next: %1").arg(name) : name;
@@ -420,6 +425,15 @@ void AcquirePage::showButtons(const acquisition::AcquisitionStatus& status) {
   redo_->setEnabled(status.recorded->can_redo);
   automatic_->setChecked(status.automatic);
   automatic_->setText(status.automatic ? tr("Takes by itself when still: on") : tr("Take by itself when still"));
+}
+
+bool AcquirePage::eventFilter(QObject* watched, QEvent* event) {
+  // A page that was hidden gets its width when it is shown, and its letters follow.
+  if (event->type() == QEvent::Resize) {
+    const auto* resized = static_cast<QResizeEvent*>(event);
+    if (resized->size().width() != resized->oldSize().width()) fitText();
+  }
+  return QWidget::eventFilter(watched, event);
 }
 
 void AcquirePage::resizeEvent(QResizeEvent* event) {

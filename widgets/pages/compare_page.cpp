@@ -144,6 +144,7 @@ QWidget* ComparePage::makeControls(QWidget* header) {
   progress_->setAccessibleName(tr("Comparison"));
   progress_text_ = new QLabel(controls);
   progress_text_->setProperty("role", "muted");
+  progress_text_->setWordWrap(true);
   auto* row = new QHBoxLayout;
   row->addWidget(new SensorChoice(workbench_, QStringLiteral("compareSensor"), controls));
   row->addWidget(validation_);
@@ -346,11 +347,15 @@ void ComparePage::showChoice() {
   const QString why = whyNotFit();
   const QString choice = tr("%1 for position, %2 for orientation.").arg(position_->label(), rotation_->label());
   fit_->setText(workbench_.isFitting() ? tr("Fitting...") : tr("Fit these methods"));
-  fit_->setEnabled(!workbench_.isFitting() && why.isEmpty());
+  // Not while it fits: the focus would go to the steps, and the next key with it.
+  fit_->setEnabled(why.isEmpty());
   fit_->setToolTip(why.isEmpty() ? choice : why);
   const std::optional<calibration::Corrector>& corrector = workbench_.corrector();
   if (!why.isEmpty()) return fitted_->setText(why);
   if (!corrector) return fitted_->setText(choice);
+  if (!workbench_.correctorIsCurrent())
+    return fitted_->setText(
+        tr("%1 The places have changed since the calibration that is kept was fitted: fit again.").arg(choice));
   fitted_->setText(tr("Fitted on %1 rows; what is left on those same rows (no verdict): RMS %2. Kept in the session, "
                       "ready to export.")
                        .arg(corrector->report().n_nodes)

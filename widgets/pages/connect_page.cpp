@@ -325,7 +325,11 @@ QString ConnectPage::deviceText() const {
   // Settings follow an address behind a comma; the simulated tracker has none.
   const bool simulated = kind_->currentIndex() == 0;
   QString text = QString::fromStdString(kind.id);
-  if (!simulated) text += QLatin1Char(':') + address_->currentText().trimmed();
+  if (!simulated) {
+    // The whole of what the command line takes may stand there too.
+    const QString address = address_->currentText().trimmed(), prefix = text + QLatin1Char(':');
+    text = address.startsWith(prefix) ? address : prefix + address;
+  }
   if (!settings.isEmpty()) text += QLatin1Char(simulated ? ':' : ',') + settings;
   return text;
 }
@@ -362,7 +366,7 @@ void ConnectPage::onStatus(const acquisition::AcquisitionStatus& status) {
   save_->setEnabled(status.has_trace);
   state_->setText(status.device == acquisition::DeviceState::kClosed ? tr("Not connected") : status.device_text);
   if (running && status.live) {
-    numbers_->setText(tr("%1 Hz    SD now %2    %3")
+    numbers_->setText(tr("%1 Hz    SD now %2    from the transmitter: %3")
                           .arg(status.rate_hz, 0, 'f', 0)
                           .arg(millimetreText(status.sd_m), positionText(status.live->tracker_from_sensor.position_m)));
   } else {

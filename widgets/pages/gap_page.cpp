@@ -27,6 +27,7 @@
 #include "widgets/forms/empty_page.h"
 #include "widgets/forms/sensor_choice.h"
 #include "widgets/pages/gap_inspector.h"
+#include "widgets/pages/kept_gap.h"
 #include "widgets/report/gap_section.h"
 #include "widgets/style/theme.h"
 #include "widgets/views/draw_picture.h"
@@ -80,6 +81,13 @@ GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
       const std::optional<int> sensor = workbench_.chosenSensor();
       return sensor ? rowsOfSensor(workbench_.samples(), *sensor) : workbench_.samples();
     });
+    restore();
+  });
+  connect(&workbench_, &Workbench::sessionChanged, this, [this] {
+    scene_.reset();
+    earlier_.clear();
+    setRecording({}, {});
+    is_restored_ = has_changed_ = false;
   });
   connect(&workbench_, &Workbench::closing, this, [this] { jobs_.stop(); });
   setRecording(workbench_.table(), {});
@@ -166,6 +174,7 @@ QWidget* GapPage::makeFieldSide() {
 }
 
 void GapPage::setRecording(const CalibrationTable& table, std::function<SampleTable()> samples) {
+  has_changed_ = has_changed_ || report_ || isDiagnosing();
   jobs_.stop();
   table_ = table;
   samples_ = std::move(samples);
@@ -213,6 +222,14 @@ void GapPage::chooseEarlier() {
 }
 
 void GapPage::diagnoseSince(const QString& path) {
+  if (workbench_.sessionIsOpen() && QFileInfo(path) == QFileInfo(workbench_.sessionPath())) {
+    workbench_.showMessage({tr("%1 is the session that is open; choose an earlier recording of this room.")
+                                .arg(QFileInfo(path).fileName()),
+                            Severity::kAttention,
+                            {},
+                            {}});
+    return;
+  }
   auto earlier = acquisition::recordedTable(path);
   if (!earlier) {
     workbench_.showMessage({QString::fromStdString(earlier.error().message), Severity::kAttention, {}, {}});
@@ -241,6 +258,7 @@ void GapPage::run(const gap::DiagnosisOptions& options) {
       }))
     return showReport();
   against_ = options.against;
+  has_changed_ = false;
   progress_->setValue(0);
   provisional_.reset();
   const bool is_first = !report_ && !options.against && options.replicates == 0;
@@ -279,6 +297,7 @@ void GapPage::onResult(Result<gap::GapReport> result) {
   provisional_.reset();
   if (result) {
     report_ = std::move(*result);
+    keep();
   } else {
     report_.reset();
     if (result.error().code != ErrorCode::kCancelled)
@@ -287,12 +306,20 @@ void GapPage::onResult(Result<gap::GapReport> result) {
   showReport();
 }
 
+/// Whether a cause was found that a scene can hold; what ails the signal alone is none.
+bool GapPage::canAdd() const {
+  return report_ && !report_->against &&
+         std::any_of(report_->selected.begin(), report_->selected.end(),
+                     [](const gap::SelectedEffect& effect) { return effect.scene_parameters.is_object(); });
+}
+
 void GapPage::addToSimulation() {
-  if (!report_ || report_->selected.empty()) return;
+  if (!canAdd()) return;
   simulation::Scene updated = gap::updatedScene(scene_.value_or(simulation::Scene{}), *report_);
   earlier_.push_back({std::move(scene_), std::move(report_)});
   scene_ = std::move(updated);
   report_.reset();
+  keep();
   run();
 }
 
@@ -304,6 +331,31 @@ void GapPage::undo() {
   provisional_.reset();
   earlier_.pop_back();
   against_.reset();
+  keep();
+  showReport();
+}
+
+/// What the session opens with again; a comparison with an earlier recording is of the day.
+void GapPage::keep() {
+  if (against_) return;
+  KeptGap kept{scene_, {}, report_};
+  for (const Earlier& earlier : earlier_) kept.earlier.push_back(earlier.scene);
+  workbench_.keepGap(QString::fromStdString(toText(kept, table_)));
+}
+
+void GapPage::restore() {
+  if (is_restored_ || table_.nodes.empty()) return;
+  is_restored_ = true;
+  if (workbench_.keptGap().isEmpty()) return;
+  auto kept = readKeptGap(workbench_.keptGap().toStdString(), table_, workbench_.sessionPath().toStdString());
+  if (!kept) {
+    workbench_.showMessage({QString::fromStdString(kept.error().message), Severity::kAttention, {}, {}});
+    return;
+  }
+  scene_ = std::move(kept->scene);
+  earlier_.clear();
+  for (auto& scene : kept->earlier) earlier_.push_back({std::move(scene), std::nullopt});
+  report_ = std::move(kept->report);
   showReport();
 }
 
@@ -317,6 +369,7 @@ void GapPage::chooseScene() {
     return;
   }
   setScene(*scene);
+  keep();
 }
 
 void GapPage::chooseReportFile() {
@@ -379,10 +432,10 @@ void GapPage::showWords() {
     if (!next.isEmpty()) next = tr("Next measurement: %1").arg(next);
   } else {
     headline_->setText(isDiagnosing() ? tr("Diagnosing...") : tr("Not diagnosed yet"));
-    sentence_->setText(isDiagnosing() ? tr("Trying every known cause on places it has not seen.")
-                       : !workbench_.refusal().isEmpty()
-                           ? workbench_.refusal()
-                           : tr("Press Diagnose to see where simulation and recording differ, and why."));
+    sentence_->setText(isDiagnosing()                    ? tr("Trying every known cause on places it has not seen.")
+                       : !workbench_.refusal().isEmpty() ? workbench_.refusal()
+                       : has_changed_ ? tr("The places have changed since the last diagnosis. Press Diagnose.")
+                                      : tr("Press Diagnose to see where simulation and recording differ, and why."));
   }
   next_->setText(next);
   next_->setVisible(!next.isEmpty());
@@ -403,7 +456,7 @@ void GapPage::showField() {
 void GapPage::showButtons() {
   run_->setText(isDiagnosing() ? tr("&Stop") : report_ ? tr("&Diagnose again") : tr("&Diagnose"));
   setStyled(*run_, "primary", !report_);
-  const bool can_add = !isDiagnosing() && report_ && !report_->selected.empty() && !report_->against;
+  const bool can_add = !isDiagnosing() && canAdd();
   setStyled(*add_, "primary", can_add);
   add_->setEnabled(can_add);
   undo_->setEnabled(!earlier_.empty());

@@ -71,7 +71,10 @@ class GapPage : public QWidget {
   void diagnoseIn(double to, const CalibrationTable& table, SampleTable samples, const gap::DiagnosisOptions& options,
                   std::function<void(Result<gap::GapReport>)> done);
   void onResult(Result<gap::GapReport> result);
+  void keep();
+  void restore();
   void runOrStop();
+  bool canAdd() const;
   void addToSimulation();
   void undo();
   void chooseScene();
@@ -93,6 +96,8 @@ class GapPage : public QWidget {
   std::optional<gap::GapReport> provisional_;        ///< Of some of the places, until there is a report of all.
   std::shared_ptr<const CalibrationTable> against_;  ///< Of the last diagnosis.
   QString against_name_;
+  bool is_restored_ = false;  ///< What the open session keeps was looked at.
+  bool has_changed_ = false;  ///< The places, since the last diagnosis.
   BackgroundJobs jobs_{this};
 
   QStackedWidget* stack_;

@@ -194,6 +194,12 @@ QWidget* PlanPage::makeForm() {
   });
   layout->addWidget(use_grid_);
   layout->addStretch();
+  // In the order in which they stand, not in that in which they were made.
+  QWidget* const in_order[] = {unit_,     counts_[0],      counts_[1],    counts_[2], pitch_[0],  pitch_[1],
+                               pitch_[2], default_origin_, origin_[0],    origin_[1], origin_[2], pipe_foot_,
+                               order_,    seed_,           orientations_, reseat_,    samples_,   amount_,
+                               until_,    at_time_limit_,  create_,       load,       use_grid_};
+  for (std::size_t i = 1; i < std::size(in_order); ++i) setTabOrder(in_order[i - 1], in_order[i]);
   return panel;
 }
 

@@ -72,7 +72,7 @@ void DeviceStrip::setStatus(const acquisition::AcquisitionStatus& status) {
   rate_->setText(tr("%1 Hz").arg(status.rate_hz, 0, 'f', 0));
   noise_->setText(tr("SD now %1").arg(millimetreText(status.sd_m)));
   const Eigen::Vector3d p_reference_m = status.reference_from_tracker * status.live->tracker_from_sensor.position_m;
-  pose_->setText(positionText(p_reference_m));
+  pose_->setText(tr("rig: %1").arg(positionText(p_reference_m)));
 }
 
 }  // namespace fieldtrue::widgets

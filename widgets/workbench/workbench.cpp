@@ -95,6 +95,8 @@ void Workbench::wireController() {
   });
   connect(controller_, &acquisition::AcquisitionController::sessionOpened, this, &Workbench::onSessionOpened);
   connect(controller_, &acquisition::AcquisitionController::fitOpened, this, &Workbench::onFitOpened);
+  connect(controller_, &acquisition::AcquisitionController::gapOpened, this,
+          [this](const QString& text) { kept_gap_ = text; });
   connect(controller_, &acquisition::AcquisitionController::nodesStored, this,
           [this](int place, const std::vector<Node>&, const QString& suspicious) { onNodesStored(place, suspicious); });
   connect(controller_, &acquisition::AcquisitionController::takeFailed, this, &Workbench::onTakeFailed);
@@ -323,6 +325,7 @@ void Workbench::onSessionOpened(const QString& path, const QString& page, const 
   refusal_.clear();
   comparison_.reset();
   corrector_.reset();
+  kept_gap_.clear();
   spoken_of_.clear();
   endCondition(QStringLiteral("session"));
   const auto plan = parseJson(plan_json.toStdString(), path.toStdString()).and_then([&](const nlohmann::json& json) {
@@ -368,9 +371,11 @@ bool Workbench::correctorCorrects() const {
 
 void Workbench::rememberSession(const QString& path) {
   QSettings settings;
+  // Another folder may be the current one next time.
+  const QString whole = QFileInfo(path).absoluteFilePath();
   QStringList recent = settings.value(QStringLiteral("recent")).toStringList();
-  recent.removeAll(path);
-  recent.prepend(path);
+  recent.removeAll(whole);
+  recent.prepend(whole);
   settings.setValue(QStringLiteral("recent"), QStringList(recent.mid(0, kRecentSessions)));
 }
 
@@ -520,6 +525,12 @@ void Workbench::compareWith(const QString& calibration) {
 void Workbench::setGapReport(std::optional<gap::GapReport> report) {
   gap_report_ = std::move(report);
   emit gapReportChanged();
+}
+
+void Workbench::keepGap(const QString& text) {
+  if (!sessionIsOpen() || text == kept_gap_) return;
+  kept_gap_ = text;
+  post(&acquisition::AcquisitionController::setSessionState, QStringLiteral("gap"), text);
 }
 
 void Workbench::showMessage(const Message& message) { emit messageShown(message); }

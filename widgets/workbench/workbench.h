@@ -71,6 +71,9 @@ class Workbench : public QObject {
   /// Of the rows the session has now.
   const std::optional<gap::GapReport>& gapReport() const { return gap_report_; }
   void setGapReport(std::optional<gap::GapReport> report);
+  /// What the session keeps of its diagnosis, as text of the Gap page's own; empty when nothing.
+  const QString& keptGap() const { return kept_gap_; }
+  void keepGap(const QString& text);
   bool isComparing() const { return comparison_jobs_.busy(); }
   /// How many of the methods asked for the comparison tells; fewer than wanted while slow ones run or after a stop.
   struct MethodCount {
@@ -193,6 +196,7 @@ class Workbench : public QObject {
   std::optional<evaluation::Comparison> comparison_;
   std::optional<calibration::Corrector> corrector_;
   std::optional<gap::GapReport> gap_report_;
+  QString kept_gap_;
   BackgroundJobs comparison_jobs_{this};
   MethodCount compared_;
   int rows_version_ = 0;  ///< Counts the tables that arrived.

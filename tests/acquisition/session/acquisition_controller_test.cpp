@@ -218,6 +218,31 @@ class AcquisitionControllerTest : public QObject {
              "the device hears of every change of place");
   }
 
+  void aRetakeCanBeLeft() {
+    Bench bench(folder_.newPath());
+    for (int i = 0; i < 2; ++i) bench.takeHere();
+    bench.controller.goTo(0);
+    QVERIFY(bench.controller.status().current_is_retake);
+    bench.controller.cancelTake();
+    auto status = bench.controller.status();
+    QVERIFY(status.current == 2u && !status.current_is_retake);
+    QVERIFY(status.recorded->states[0] == PlaceState::kDone);
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
+    // A place that waits for its first take stays where it is; so does one whose take is stopped.
+    bench.controller.goTo(5);
+    bench.controller.cancelTake();
+    QVERIFY(bench.controller.status().current == 5u);
+    bench.controller.goTo(1);
+    bench.tracker->setDownAt(bench.placePose(1));
+    bench.controller.take();
+    bench.tracker->stand(0.1);
+    QVERIFY(bench.controller.status().take == TakeState::kCollecting);
+    bench.controller.cancelTake();
+    QVERIFY(bench.controller.status().current == 1u);
+    bench.controller.cancelTake();
+    QVERIFY(bench.controller.status().current == 2u);
+  }
+
   void goToAndBack() {
     Bench bench(folder_.newPath());
     bench.takeHere();

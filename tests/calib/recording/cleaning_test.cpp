@@ -1,6 +1,7 @@
 #include "calib/recording/cleaning.h"
 
 #include <QTest>
+#include <algorithm>
 #include <limits>
 #include <random>
 
@@ -235,6 +236,26 @@ class CleaningTest : public QObject {
     QCOMPARE(cleaned.nodes.size(), std::size_t(61));
     QVERIFY(findingAbout(cleaned, "skipped") != nullptr);
     QCOMPARE(findingAbout(cleaned, "no usable number")->nodes.size(), std::size_t(2));
+  }
+
+  void theOrderOfTheFileDoesNotCount() {
+    CalibrationTable table = syntheticTable(grid({4, 4, 4}), noise());
+    for (std::size_t i = 0; i < table.nodes.size(); ++i) table.nodes[i].t_start_s = 10.0 * static_cast<double>(i % 7);
+    const auto numbersOf = [](const CalibrationTable& rows) {
+      std::vector<int> numbers;
+      for (const Node& node : cleanRows(rows).nodes) numbers.push_back(node.node);
+      return numbers;
+    };
+    const std::vector<int> as_written = numbersOf(table);
+    CalibrationTable shuffled = table;
+    std::shuffle(shuffled.nodes.begin(), shuffled.nodes.end(), std::mt19937_64(3));
+    QCOMPARE(numbersOf(shuffled), as_written);
+    QCOMPARE(as_written[0], 0);
+    QCOMPARE(as_written[1], 7);
+    // Without times the numbers decide.
+    for (Node& node : shuffled.nodes) node.t_start_s.reset();
+    const std::vector<int> numbered = numbersOf(shuffled);
+    QVERIFY(std::is_sorted(numbered.begin(), numbered.end()));
   }
 
   void fewRowsWithoutOrientationAreLeftOut() {

@@ -22,6 +22,7 @@
 #include "widgets/shell/main_window.h"
 #include "widgets/shell/message_line.h"
 #include "widgets/style/theme.h"
+#include "widgets/views/field/field_view.h"
 
 using namespace fieldtrue;
 using namespace fieldtrue::widgets;
@@ -120,6 +121,19 @@ class RefusedTablesTest : public testing::WindowDriver {
     open("mm.fieldtrue");
     click("step_compare");
     QTRY_VERIFY_WITH_TIMEOUT(message().contains("1000, millimetres for metres"), kWaitMs);
+  }
+
+  void noFieldOfAnotherSessionStaysInSight() {
+    open("good.fieldtrue");
+    click("step_compare");
+    auto* left = find<FieldView>("fieldLeft");
+    QTRY_VERIFY_WITH_TIMEOUT(workbench().comparison() && !workbench().isComparing(), kWaitMs);
+    QVERIFY(left->field().arrows.size() == 18);
+    open("mm.fieldtrue");
+    click("step_compare");
+    QTRY_VERIFY_WITH_TIMEOUT(message().contains("1000, millimetres for metres"), kWaitMs);
+    QVERIFY(left->field().arrows.empty());
+    QVERIFY(find<FieldView>("fieldRight")->field().arrows.empty());
   }
 
   void millimetresAreNotFitted() {

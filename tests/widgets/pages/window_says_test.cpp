@@ -233,6 +233,12 @@ void WindowSaysTest::numbersAreTakenWithPointOrComma() {
   type("count_x", QStringLiteral("3,5"));
   QTest::keyClick(count, Qt::Key_Tab);
   QCOMPARE(count->value(), 3);
+  // Nor is a number that is too large the part of it that fits.
+  for (const auto& [typed, expected] : {std::pair("1000", count->maximum()), {"0", count->minimum()}, {"7", 7}}) {
+    type("count_x", QString::fromLatin1(typed));
+    QTest::keyClick(count, Qt::Key_Tab);
+    QCOMPARE(count->value(), expected);
+  }
   // A room of 30 m is no pitch of a grid.
   type("pitch_x", QStringLiteral("25"));
   QVERIFY2(text("planProblem").contains(QStringLiteral("no tracker reaches farther than 30 m")),
