@@ -44,7 +44,8 @@ std::string gapLine(const gap::GapReport& report) {
   }
   const auto flagged =
       std::count_if(report.nodes.begin(), report.nodes.end(), [](const gap::GapNode& node) { return node.is_flagged; });
-  if (flagged > 0) text += "; " + std::to_string(flagged) + " rows stand out of it";
+  if (flagged > 0)
+    text += "; " + std::to_string(flagged) + (flagged == 1 ? " row stands out of it" : " rows stand out of it");
   return text + ".\n";
 }
 
@@ -63,7 +64,9 @@ std::string placeText(const gap::GapCandidate& candidate) {
 }
 
 std::string candidatesText(const gap::GapReport& report) {
-  std::vector<Row> rows{{"cause", "probability", "BIC gain", "gap left", "shrinks by", "at", "looks like here"}};
+  std::vector<Row> rows{{"cause", "probability", "BIC gain", "gap left",
+                         report.remaining.is_of_rotation ? "rotation shrinks by" : "shrinks by", "at",
+                         "looks like here"}};
   for (const gap::GapCandidate& candidate : report.candidates) {
     if (rows.size() > kMostCandidates || candidate.probability < kSmallestProbability) break;
     const bool is_none = candidate.effect == "none";
@@ -89,7 +92,9 @@ std::string sequenceText(const gap::GapReport& report) {
 std::string remainingText(const gap::GapReport& report) {
   if (report.selected.empty() && report.verdict == gap::GapVerdict::kNoGap) return "";
   std::string text = "What remains on places not seen: " + millimetres(report.remaining.position_rms_mm) +
-                     " RMS; of the " + "square above the floor " + percent(report.remaining.fraction) + " of the start";
+                     " RMS; of the square above the floor " +
+                     (report.remaining.is_of_rotation ? "(of rotation, which tells more here) " : "") +
+                     percent(report.remaining.fraction) + " of the start";
   if (!report.remaining.where.empty()) {
     std::vector<int> named = report.remaining.where;
     named.resize(std::min<std::size_t>(named.size(), 8));

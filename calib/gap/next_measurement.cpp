@@ -226,15 +226,20 @@ class Removal {
   std::vector<identify::Vector6d> left_;
 };
 
-/// What taking away each selected body, plane or loop would change at the worst places, the rig aligned anew; as sure
-/// as the fit and the noise let it be.
-void predictRemoval(const identify::GapSearch& search, const identify::EffectSelection& selection, GapReport& report) {
-  std::vector<std::size_t> order(report.nodes.size());
+/// Rows of which the causes take away most.
+std::vector<std::size_t> mostTakenAway(const std::vector<GapNode>& nodes) {
+  const auto taken_m2 = [&](std::size_t i) { return nodes[i].before_m.squaredNorm() - nodes[i].after_m.squaredNorm(); };
+  std::vector<std::size_t> order(nodes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return report.nodes[a].before_m.squaredNorm() > report.nodes[b].before_m.squaredNorm();
-  });
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return taken_m2(a) > taken_m2(b); });
   order.resize(std::min<std::size_t>(3, order.size()));
+  return order;
+}
+
+/// What taking away each selected body, plane or loop would change at the places of which the causes take most, the rig
+/// aligned anew; as sure as the fit and the noise let it be. What would not fall by more than that is no prediction.
+void predictRemoval(const identify::GapSearch& search, const identify::EffectSelection& selection, GapReport& report) {
+  const std::vector<std::size_t> order = mostTakenAway(report.nodes);
   for (std::size_t t = 0; t < selection.ways.size(); ++t) {
     if (selection.model.model.terms[t].effect->body == nullptr) continue;
     const Removal removal(search, selection.model, t);
@@ -246,7 +251,7 @@ void predictRemoval(const identify::GapSearch& search, const identify::EffectSel
       prediction.now_mm = 1e3 * report.nodes[i].before_m.norm();
       prediction.then_mm = 1e3 * then.size_m;
       prediction.then_sd_mm = 1e3 * then.sd_m;
-      report.predictions.push_back(prediction);
+      if (prediction.now_mm - prediction.then_mm > prediction.then_sd_mm) report.predictions.push_back(prediction);
     }
   }
 }

@@ -25,7 +25,7 @@ std::string causesText(const GapReport& report) {
   for (const SelectedEffect& effect : report.selected) {
     std::string name = effects::labelOf(effect.effect);
     for (const std::string& other : effect.equivalents)
-      if (other != effect.effect) name += " or " + effects::labelOf(other) + " (this grid cannot tell)";
+      if (other != effect.effect) name += " or " + effects::labelOf(other) + " (these readings cannot tell)";
     text += (text.empty() ? "" : ", and ") + name;
   }
   return text;

@@ -28,6 +28,13 @@ std::string noteOf(const gap::GapCandidate& candidate) {
   return note;
 }
 
+/// Whether a cause is named, and another one before it.
+bool isNamedBeside(const gap::GapReport& report, const std::string& effect) {
+  const auto named = std::find_if(report.selected.begin(), report.selected.end(),
+                                  [&](const gap::SelectedEffect& one) { return one.effect == effect; });
+  return named != report.selected.end() && named != report.selected.begin();
+}
+
 GapBarChart binChart(const char* id, const std::string& title, const std::vector<gap::GapBin>& bins, const char* unit) {
   GapBarChart chart{id, title, {}};
   for (const gap::GapBin& bin : bins) {
@@ -84,7 +91,8 @@ GapBarChart probabilityChart(const gap::GapReport& report, std::size_t most) {
     GapBar bar;
     bar.name = effectLabel(candidate.effect);
     bar.value = candidate.probability;
-    bar.text = percent(candidate.probability);
+    // A cause that is added to the first need not be probable by itself.
+    bar.text = isNamedBeside(report, candidate.effect) ? "beside the first" : percent(candidate.probability);
     bar.note = noteOf(candidate);
     bar.muted = !candidate.is_plausible;
     chart.bars.push_back(std::move(bar));
@@ -93,7 +101,11 @@ GapBarChart probabilityChart(const gap::GapReport& report, std::size_t most) {
 }
 
 GapBarChart shrinkageChart(const gap::GapReport& report, std::size_t most) {
-  GapBarChart chart{"shrinkage", "How much of the gap it takes away (places the fit did not see)", {}};
+  GapBarChart chart{"shrinkage",
+                    report.remaining.is_of_rotation
+                        ? "How much of the gap of rotation it takes away (places the fit did not see)"
+                        : "How much of the gap it takes away (places the fit did not see)",
+                    {}};
   const std::size_t shown = std::min(most, report.candidates.size());
   for (std::size_t i = 0; i < shown; ++i) {
     const gap::GapCandidate& candidate = report.candidates[i];

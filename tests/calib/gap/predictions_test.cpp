@@ -71,6 +71,7 @@ class PredictionsTest : public QObject {
         QVERIFY2(std::abs(then_mm - prediction.then_mm) < 3.0 * prediction.then_sd_mm, seen.c_str());
       }
       QVERIFY(prediction.then_sd_mm < 0.3 * prediction.now_mm);
+      QVERIFY(prediction.now_mm - prediction.then_mm > prediction.then_sd_mm);
     }
     QVERIFY2(told > 0, report->text.c_str());
   }

@@ -87,6 +87,25 @@ class GapHtmlTest : public QObject {
     QVERIFY(lowest_note < bars[1]->attributes.value(QStringLiteral("y")).toDouble());
   }
 
+  void aCauseBesideTheFirstNeedNotBeProbableByItself() {
+    gap::GapReport report = writtenReport();
+    QVERIFY(report.candidates.size() >= 2 && report.selected.size() == 1);
+    gap::SelectedEffect second;
+    second.effect = report.candidates[1].effect;
+    report.selected.push_back(second);
+    report.candidates[1].probability = 1e-210;
+    const GapBarChart chart = probabilityChart(report);
+    QVERIFY(chart.bars[0].text.ends_with("%"));
+    QCOMPARE(chart.bars[1].text, std::string("beside the first"));
+  }
+
+  void sharesOfRotationAreCalledSo() {
+    gap::GapReport report = writtenReport();
+    QVERIFY(shrinkageChart(report).title.find("rotation") == std::string::npos);
+    report.remaining.is_of_rotation = true;
+    QVERIFY(shrinkageChart(report).title.find("gap of rotation") != std::string::npos);
+  }
+
   void wordsOfAReportCannotBreakThePage() {
     gap::GapReport report = writtenReport();
     report.text = "a < b & \"c\" </p><script>x</script>";
