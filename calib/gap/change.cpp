@@ -103,17 +103,27 @@ double jointLogOdds(double of_positions, const std::optional<double>& of_rotatio
          std::log((std::exp(of_positions - most) + std::exp(*of_rotations - most) + std::exp(both - most)) / 3.0);
 }
 
-/// The middle of where the change is at least half its largest, weighed by its square.
+/// The middle of what changed by half of the largest and more, weighed by its square, around where that is: two far
+/// edges that changed alike have no middle.
 Eigen::Vector3d hottest(const std::vector<Eigen::Vector3d>& change, const std::vector<field::SensorSetting>& settings,
                         const std::vector<char>& known) {
-  double most = 0.0;
+  constexpr double kAround = 0.25;  // Of the way to the farthest.
+  const auto at_m = [&](std::size_t i) { return settings[i].tracker_from_sensor.position_m; };
+  std::size_t top = 0;
+  double most = -1.0;
+  for (std::size_t i = 0; i < change.size(); ++i) {
+    if (known[i] == 0 || change[i].norm() <= most) continue;
+    top = i;
+    most = change[i].norm();
+  }
+  double farthest_m = 0.0;
   for (std::size_t i = 0; i < change.size(); ++i)
-    if (known[i] != 0) most = std::max(most, change[i].norm());
+    if (known[i] != 0) farthest_m = std::max(farthest_m, (at_m(i) - at_m(top)).norm());
   Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
   double weights = 0.0;
   for (std::size_t i = 0; i < change.size(); ++i) {
-    if (known[i] == 0 || change[i].norm() < 0.5 * most) continue;
-    sum_m += change[i].squaredNorm() * settings[i].tracker_from_sensor.position_m;
+    if (known[i] == 0 || change[i].norm() < 0.5 * most || (at_m(i) - at_m(top)).norm() > kAround * farthest_m) continue;
+    sum_m += change[i].squaredNorm() * at_m(i);
     weights += change[i].squaredNorm();
   }
   return sum_m / weights;

@@ -11,9 +11,12 @@ namespace {
 
 std::string percent(double share) { return std::to_string(std::lround(100.0 * share)) + " %"; }
 
-std::string millimetres(double value, const std::optional<double>& low, const std::optional<double>& high) {
-  std::string text = shortNumber(value) + " mm";
-  if (low && high) text += " (" + shortNumber(*low) + " to " + shortNumber(*high) + ")";
+/// What is below the noise, as half of what is nothing else must be, is nothing.
+std::string aboveNoise(double value_mm, const std::optional<double>& low_mm, const std::optional<double>& high_mm) {
+  if (value_mm <= 0.0)
+    return high_mm && *high_mm > 0.0 ? "nothing (at most " + shortNumber(*high_mm) + " mm)" : "nothing";
+  std::string text = shortNumber(value_mm) + " mm";
+  if (low_mm && high_mm) text += " (" + shortNumber(std::max(0.0, *low_mm)) + " to " + shortNumber(*high_mm) + ")";
   return text;
 }
 
@@ -72,7 +75,7 @@ GapBarChart waterfallChart(const gap::GapReport& report) {
     bar.value = std::max(0.0, step.excess_mm);
     bar.low90 = step.low90_mm;
     bar.high90 = step.high90_mm;
-    bar.text = millimetres(step.excess_mm, step.low90_mm, step.high90_mm);
+    bar.text = aboveNoise(step.excess_mm, step.low90_mm, step.high90_mm);
     chart.bars.push_back(std::move(bar));
   }
   if (chart.bars.empty()) return chart;
