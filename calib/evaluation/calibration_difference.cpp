@@ -108,6 +108,7 @@ void measureOrientation(const Corrector& first, const Corrector& second, const s
   for (const Eigen::Quaterniond& turn : turns) angles_deg.push_back(kDegPerRad * angleBetween_rad(turn, shared));
   to.angle_rms_deg = rootMeanSquare(angles_deg);
   to.angle_max_deg = largest(angles_deg);
+  to.angle_shared_deg = kDegPerRad * angleBetween_rad(shared, Eigen::Quaterniond::Identity());
 }
 
 PlaceErrors placeErrors(std::vector<double> errors_mm, bool is_tuned) {
@@ -365,7 +366,10 @@ nlohmann::json toJson(const CalibrationDifference& difference) {
         {"max_at_m", jsonOf(worst.reference_m)},
         {"max_change_mm", jsonOf(Eigen::Vector3d(kMmPerM * worst.change_m))},
         {"expected_mm", orNull(difference.expected_mm)}}},
-      {"orientation", {{"rms_deg", orNull(difference.angle_rms_deg)}, {"max_deg", orNull(difference.angle_max_deg)}}},
+      {"orientation",
+       {{"rms_deg", orNull(difference.angle_rms_deg)},
+        {"max_deg", orNull(difference.angle_max_deg)},
+        {"shared_deg", orNull(difference.angle_shared_deg)}}},
       {"first_held_out", toJson(difference.first_own)},
       {"second_held_out", toJson(difference.second_own)},
       {"first_at_second", toJson(difference.first_at_second)},

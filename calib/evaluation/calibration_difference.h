@@ -44,6 +44,8 @@ struct CalibrationDifference {
   std::optional<double> expected_mm;    ///< RMS from what both state of their uncertainty; none where one states none.
   std::optional<double> angle_rms_deg;  ///< Of corrected orientations; none where neither corrects any.
   std::optional<double> angle_max_deg;
+  /// The turn that all orientations share, which is taken out of both: the mounting's and the rig's.
+  std::optional<double> angle_shared_deg;
   std::vector<ChangeAt> points;
 
   PlaceErrors first_own;  ///< Each at places of its own that its fits did not see.

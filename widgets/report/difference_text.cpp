@@ -36,8 +36,9 @@ std::vector<DifferenceFact> differenceFacts(const evaluation::CalibrationDiffere
       {"Second, held out", heldOut(difference.second_own)},
       {"First at the second's places", heldOut(difference.first_at_second)}};
   if (difference.angle_rms_deg)
-    facts.push_back({"Orientations differ by",
-                     deg(*difference.angle_rms_deg) + " RMS, " + deg(*difference.angle_max_deg) + " at most"});
+    facts.push_back({"Orientations differ by", deg(*difference.angle_rms_deg) + " RMS, " +
+                                                   deg(*difference.angle_max_deg) + " at most, beside " +
+                                                   deg(difference.angle_shared_deg.value_or(0.0)) + " that all share"});
   return facts;
 }
 

@@ -28,12 +28,16 @@ CalibrationTable exactTable() {
   return table;
 }
 
-calibration::Corrector fitted(const CalibrationTable& table, const char* method) {
+calibration::Corrector fittedBoth(const CalibrationTable& table, const char* method, const char* orientation) {
   auto corrector = calibration::Corrector::fit(table.nodes, table.metadata,
-                                               calibration::parseCorrectorChoice(method, "none").value(),
+                                               calibration::parseCorrectorChoice(method, orientation).value(),
                                                calibration::defaultAlignMode(table.metadata));
   if (!corrector) qFatal("%s", corrector.error().message.c_str());
   return *corrector;
+}
+
+calibration::Corrector fitted(const CalibrationTable& table, const char* method) {
+  return fittedBoth(table, method, "none");
 }
 
 /// Independent Gaussian placing errors, 1 mm SD an axis.
@@ -84,6 +88,13 @@ class CalibrationDifferenceTest : public QObject {
     FT_VERIFY_MATCH(near(difference->moved_mm, 1000.0 * std::sqrt(0.14), 0.5));
     FT_VERIFY_MATCH(near(difference->turned_deg, 0.2 * 180.0 / 3.14159265358979, 1e-6));
     FT_VERIFY_MATCH(near(difference->first_at_second.rms_mm, 0.0, 1e-6));
+    // Corrected orientations turn with the rig: that is told, and is no difference between them.
+    QVERIFY(!difference->angle_shared_deg);
+    const auto turned =
+        compareCalibrations(fittedBoth(exactTable(), "none", "rigid"), fittedBoth(moved, "none", "rigid"));
+    FT_VERIFY_OK(turned);
+    FT_VERIFY_MATCH(near(turned->angle_rms_deg.value(), 0.0, 1e-6));
+    FT_VERIFY_MATCH(near(turned->angle_shared_deg.value(), 0.2 * 180.0 / 3.14159265358979, 1e-5));
   }
 
   void placingErrorsAloneAreNoChange() {
