@@ -21,6 +21,15 @@ Scene sceneOf(const Setup& setup) {
   return scene;
 }
 
+Span spanOf(const Setup& setup) {
+  Span span;
+  for (const Row& row : setup.rows) {
+    span.low_m = span.low_m.cwiseMin(row.place_m);
+    span.high_m = span.high_m.cwiseMax(row.place_m);
+  }
+  return span;
+}
+
 double extent_m(const Scene& scene, const Vector3d& toward) {
   double farthest_m = 0;
   for (const SolvedPose& pose : scene.poses)

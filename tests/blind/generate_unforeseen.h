@@ -18,6 +18,17 @@ struct Scene {
 };
 Scene sceneOf(const Setup& setup);
 
+/// Where the places lie in the jig frame.
+struct Span {
+  Vector3d low_m = Vector3d::Constant(1e9);
+  Vector3d high_m = Vector3d::Constant(-1e9);
+
+  Vector3d middle_m() const { return 0.5 * (low_m + high_m); }
+  Vector3d length_m() const { return high_m - low_m; }
+  int longSide() const { return length_m().x() > length_m().y() ? 0 : 1; }
+};
+Span spanOf(const Setup& setup);
+
 /// How far the places reach from their middle along a direction [m].
 double extent_m(const Scene& scene, const Vector3d& toward);
 /// A point outside of the hull of the places, and at least half a metre from the transmitter.

@@ -6,24 +6,6 @@
 namespace blind::unforeseen {
 namespace {
 
-/// Where the places lie in the jig frame.
-struct Span {
-  Vector3d low_m = Vector3d::Constant(1e9);
-  Vector3d high_m = Vector3d::Constant(-1e9);
-
-  Vector3d middle_m() const { return 0.5 * (low_m + high_m); }
-  double length_m(int axis) const { return high_m(axis) - low_m(axis); }
-};
-
-Span spanOf(const Setup& setup) {
-  Span span;
-  for (const Row& row : setup.rows) {
-    span.low_m = span.low_m.cwiseMin(row.place_m);
-    span.high_m = span.high_m.cwiseMax(row.place_m);
-  }
-  return span;
-}
-
 /// Length of the way from one place to the next, over the session.
 std::vector<double> moves_m(const Course& course) {
   std::vector<double> list_m;
@@ -62,8 +44,8 @@ Vector3d shiftPerLength(const std::vector<Vector3d>& nails_m, const Vector3d& pl
 /// From the moment the sun reaches it, the board's upper face dries and the board cups, the posts on it leaning apart.
 Drawn drawCuppedBoard(const Setup& setup, Random& random) {
   const Span span = spanOf(setup);
-  const int axis = span.length_m(0) > span.length_m(1) ? 0 : 1;
-  const double ridge_m = span.middle_m()(axis) + uniform(random, -0.3, 0.3) * span.length_m(axis);
+  const int axis = span.longSide();
+  const double ridge_m = span.middle_m()(axis) + uniform(random, -0.3, 0.3) * span.length_m()(axis);
   const double board_m = span.low_m.z() - uniform(random, 0.0, 0.2);
   const double duration_s = sceneOf(setup).duration_s;
   const double sun_s = duration_s * uniform(random, 0.1, 0.6), constant_s = duration_s * uniform(random, 0.1, 0.5);
@@ -114,10 +96,10 @@ Drawn drawScrews(const Setup& setup, Random& random) {
 /// Each hole was marked with dividers from the one before, so that errors add up along the row.
 Drawn drawChainedHoles(const Setup& setup, Random& random) {
   const Span span = spanOf(setup);
-  const int axis = span.length_m(0) > span.length_m(1) ? 0 : 1;
+  const int axis = span.longSide();
   const double mean = uniform(random, -0.5, 0.5), sideways = uniform(random, 0.3, 1.0);
   std::vector<Vector3d> offsets = {Vector3d::Zero()};
-  for (double at_m = -setup.pitch_m; at_m < span.length_m(axis) + setup.pitch_m; at_m += setup.pitch_m) {
+  for (double at_m = -setup.pitch_m; at_m < span.length_m()(axis) + setup.pitch_m; at_m += setup.pitch_m) {
     Vector3d step = Vector3d::Zero();
     step(axis) = mean + normal(random);
     step(1 - axis) = sideways * normal(random);
@@ -143,8 +125,8 @@ Drawn drawBentHook(const Setup& setup, Random& random) {
     const double angle_rad = first_rad + kPi / 2 * (n + uniform(random, -0.3, 0.3));
     const double out_m = uniform(random, 0.2, 0.5);
     Vector3d nail_m = span.middle_m();
-    nail_m.x() += (0.5 * span.length_m(0) + out_m) * std::cos(angle_rad);
-    nail_m.y() += (0.5 * span.length_m(1) + out_m) * std::sin(angle_rad);
+    nail_m.x() += (0.5 * span.length_m()(0) + out_m) * std::cos(angle_rad);
+    nail_m.y() += (0.5 * span.length_m()(1) + out_m) * std::sin(angle_rad);
     nail_m.z() = n < 3 ? low_m : span.high_m.z() + out_m;
     nails_m.push_back(nail_m);
   }
@@ -202,7 +184,7 @@ Drawn drawShortCountdown(const Setup& setup, Random& random) {
 Drawn drawWedgedSpacers(const Setup& setup, Random& random) {
   const Span span = spanOf(setup);
   const int layers = setup.counts.z();
-  const double spacing_m = layers > 1 ? span.length_m(2) / (layers - 1) : 1.0;
+  const double spacing_m = layers > 1 ? span.length_m()(2) / (layers - 1) : 1.0;
   const double wedge_per_m = uniform(random, 0.5, 3.0);
   std::vector<double> raised = {0};
   std::vector<Vector3d> tilts = {Vector3d::Zero()};

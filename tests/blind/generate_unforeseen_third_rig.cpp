@@ -6,25 +6,6 @@
 namespace blind::unforeseen {
 namespace {
 
-/// What the places take up in the jig frame.
-struct Extents {
-  Vector3d low_m = Vector3d::Constant(1e9);
-  Vector3d high_m = Vector3d::Constant(-1e9);
-
-  Vector3d middle_m() const { return 0.5 * (low_m + high_m); }
-  Vector3d length_m() const { return high_m - low_m; }
-  int longSide() const { return length_m().x() > length_m().y() ? 0 : 1; }
-};
-
-Extents extentsOf(const Setup& setup) {
-  Extents extents;
-  for (const Row& row : setup.rows) {
-    extents.low_m = extents.low_m.cwiseMin(row.place_m);
-    extents.high_m = extents.high_m.cwiseMax(row.place_m);
-  }
-  return extents;
-}
-
 std::vector<Row> inOrder(const Setup& setup) {
   std::vector<Row> rows = setup.rows;
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.start_s < b.start_s; });
@@ -116,15 +97,15 @@ Drawn drawDentedCork(const Setup& setup, Random& random) {
 /// The carriage is moved by counted turns of a handwheel; a turn is lost or gained now and then as it moves, until it
 /// is back at its stop.
 Drawn drawLostTurns(const Setup& setup, Random& random) {
-  const Extents extents = extentsOf(setup);
+  const Span span = spanOf(setup);
   const std::vector<Row> rows = inOrder(setup);
-  const int axis = extents.longSide();
-  const double at_stop_m = extents.low_m(axis) + 0.3 * setup.pitch_m;
+  const int axis = span.longSide();
+  const double at_stop_m = span.low_m(axis) + 0.3 * setup.pitch_m;
   const double miscounted = uniform(random, 0.15, 0.35), more_often_lost = uniform(random, 0.4, 0.8);
   std::vector<int> turns;
   do {  // Until one at least is miscounted.
     turns = {0};
-    double last_m = extents.low_m(axis);
+    double last_m = span.low_m(axis);
     for (const Row& row : rows) {
       const int error = uniform(random, 0, 1) < more_often_lost ? -1 : 1;
       const bool wrong = uniform(random, 0, 1) < miscounted;
@@ -179,12 +160,12 @@ Drawn drawResin(const Setup& setup, Random& random) {
 
 /// Heights were taken with a level whose sight slopes, each from the nearer of its two stands: the farther, the higher.
 Drawn drawSlopingSight(const Setup& setup, Random& random) {
-  const Extents extents = extentsOf(setup);
-  const double radius_m = 0.5 * extents.length_m().head<2>().norm();
+  const Span span = spanOf(setup);
+  const double radius_m = 0.5 * span.length_m().head<2>().norm();
   const Vector3d side = level(random, Vector3d::UnitZ());
   const Vector3d other = (uniform(random, -1, 1) * Vector3d::UnitZ().cross(side) - side).normalized();
-  const Vector3d first_m = extents.middle_m() + (radius_m * uniform(random, 0.6, 1.2) + 0.2) * side;
-  const Vector3d second_m = extents.middle_m() + (radius_m * uniform(random, 0.6, 1.2) + 0.2) * other;
+  const Vector3d first_m = span.middle_m() + (radius_m * uniform(random, 0.6, 1.2) + 0.2) * side;
+  const Vector3d second_m = span.middle_m() + (radius_m * uniform(random, 0.6, 1.2) + 0.2) * other;
   const double first_mark_m = uniform(random, 0, 2) * radius_m, second_mark_m = uniform(random, 0, 2) * radius_m;
   const auto apply = [=](World& world, double size) {
     world.rig.push_back([=](const Row& row, Vector3d& place_m, Quaterniond&) {
@@ -236,7 +217,7 @@ Drawn drawTiredArm(const Setup& setup, Random& random) {
 
 /// The castors of the table are not locked, so each push of the block into its hole rolls and turns it a little.
 Drawn drawCastors(const Setup& setup, Random& random) {
-  const Vector3d middle_m = extentsOf(setup).middle_m();
+  const Vector3d middle_m = spanOf(setup).middle_m();
   const std::vector<Row> rows = inOrder(setup);
   const std::vector<double> put_back_s = instants(random, sceneOf(setup), uniformInt(random, 0, 3));
   const Vector3d facing = level(random, Vector3d::UnitZ());
