@@ -15,7 +15,7 @@ struct Cleaned {
   PlaceNames names;  ///< Of every place of the table.
 };
 
-/// Leaves out rows that say nothing (skipped, not finite, copied, stuck), and and few without an orientation where the
+/// Leaves out rows that say nothing (skipped, not finite, copied, stuck), and few without an orientation where the
 /// others have one; mirrors back those reported in the other hemisphere. Whatever is changed is a finding; a gap,
 /// however large and sudden, is none and stays. Rows come in the order of their times or, without, of their numbers.
 Cleaned cleanRows(const CalibrationTable& table);

@@ -11,7 +11,7 @@ namespace {
 
 std::string percent(double share) { return std::to_string(std::lround(100.0 * share)) + " %"; }
 
-/// What is below the noise, as half of what is nothing else must be, is nothing.
+/// A figure below 0, as noise alone gives half of the time, is nothing.
 std::string aboveNoise(double value_mm, const std::optional<double>& low_mm, const std::optional<double>& high_mm) {
   if (value_mm <= 0.0)
     return high_mm && *high_mm > 0.0 ? "nothing (at most " + shortNumber(*high_mm) + " mm)" : "nothing";

@@ -347,7 +347,7 @@ void ComparePage::showChoice() {
   const QString why = whyNotFit();
   const QString choice = tr("%1 for position, %2 for orientation.").arg(position_->label(), rotation_->label());
   fit_->setText(workbench_.isFitting() ? tr("Fitting...") : tr("Fit these methods"));
-  // Not while it fits: the focus would go to the steps, and the next key with it.
+  // While it fits too: the focus of a button that is off goes to the steps, and the next key with it.
   fit_->setEnabled(why.isEmpty());
   fit_->setToolTip(why.isEmpty() ? choice : why);
   const std::optional<calibration::Corrector>& corrector = workbench_.corrector();
