@@ -38,10 +38,8 @@ class GapKeptTest : public QObject {
     {
       Workbench workbench;
       const auto page = opened(workbench, "room");
-      find<QPushButton>(*page, "diagnose")->click();
-      QTRY_VERIFY_WITH_TIMEOUT(page->report() && !page->isDiagnosing(), kWaitMs);
-      find<QPushButton>(*page, "addToSimulation")->click();
-      QTRY_VERIFY_WITH_TIMEOUT(page->report() && !page->isDiagnosing(), kWaitMs);
+      press(*page, "diagnose");
+      press(*page, "addToSimulation");
     }
     Workbench workbench;
     const auto page = opened(workbench, "room");
@@ -60,10 +58,8 @@ class GapKeptTest : public QObject {
   void anotherSessionKnowsNothingOfIt() {
     Workbench workbench;
     const auto page = opened(workbench, "other");
-    find<QPushButton>(*page, "diagnose")->click();
-    QTRY_VERIFY_WITH_TIMEOUT(page->report() && !page->isDiagnosing(), kWaitMs);
-    find<QPushButton>(*page, "addToSimulation")->click();
-    QTRY_VERIFY_WITH_TIMEOUT(page->report() && !page->isDiagnosing(), kWaitMs);
+    press(*page, "diagnose");
+    press(*page, "addToSimulation");
     QVERIFY(page->scene().has_value());
     workbench.openSession(path("room"));
     QTRY_VERIFY_WITH_TIMEOUT(workbench.sessionPath() == path("room") && !workbench.table().nodes.empty(), kWaitMs);
@@ -75,8 +71,7 @@ class GapKeptTest : public QObject {
   void changedPlacesAreTold() {
     Workbench workbench;
     const auto page = opened(workbench, "room");
-    find<QPushButton>(*page, "diagnose")->click();
-    QTRY_VERIFY_WITH_TIMEOUT(page->report() && !page->isDiagnosing(), kWaitMs);
+    press(*page, "diagnose");
     CalibrationTable fewer = room_.table;
     fewer.nodes.pop_back();
     page->setRecording(fewer, {});
@@ -120,6 +115,12 @@ class GapKeptTest : public QObject {
     [&] { QTRY_VERIFY_WITH_TIMEOUT(is_told, kWaitMs); }();
     disconnect(told);
     return page;
+  }
+
+  /// Presses a button that diagnoses, and waits for the report.
+  static void press(GapPage& page, const char* button) {
+    find<QPushButton>(page, button)->click();
+    QTRY_VERIFY_WITH_TIMEOUT(page.report() && !page.isDiagnosing(), kWaitMs);
   }
 
   QTemporaryDir folder_;
