@@ -39,10 +39,14 @@ std::string checkWord(const std::string& key, const std::string& value) {
   return {};
 }
 
+/// Of metres, radians and hertz alike: what is beyond was never measured, and its square may not be told.
+constexpr double kLargest = 1e9;
+
 /// @return what is wrong with the value, empty when nothing
 std::string storeIn(std::optional<double>& member, const std::string& value) {
   const std::optional<double> number = parseFinite(value);
   if (!number || *number < 0.0) return "'" + value + "' is not a number of 0 or more";
+  if (*number > kLargest) return "'" + value + "' is too large to be measured";
   member = *number;
   return {};
 }

@@ -76,6 +76,9 @@ bool takes(const acquisition::AcquisitionStatus& status) {
   return status.take == acquisition::TakeState::kCollecting || status.take == acquisition::TakeState::kHeld;
 }
 
+/// Nothing is left to take, and something was taken: the methods can be compared.
+bool isDone(const acquisition::AcquisitionStatus& status) { return !status.current && status.recorded->n_done > 0; }
+
 /// More sensors than there is room for below each other.
 bool standSideBySide(const acquisition::AcquisitionStatus& status) { return status.sensors.size() > kMostLines; }
 
@@ -223,11 +226,11 @@ QWidget* AcquirePage::makeInspector() {
   sensors_->hide();
   layout->addWidget(sensors_);
 
-  take_ = new QPushButton(icon(QStringLiteral("take"), theme().on_accent), tr("Take  (Space or Page Down)"), inspector);
+  take_ = new QPushButton(icon(QStringLiteral("take"), theme().on_accent), QString(), inspector);
   take_->setObjectName(QStringLiteral("take"));
   take_->setProperty("primary", true);
   take_->setFocusPolicy(Qt::TabFocus);
-  connect(take_, &QPushButton::clicked, this, [this] { workbench_.take(); });
+  connect(take_, &QPushButton::clicked, this, &AcquirePage::takeOrGoOn);
   layout->addWidget(take_);
 
   undo_ = addAction(QStringLiteral("undo"), tr("Undo"), QStringLiteral("undo"), QStringLiteral("U"),
@@ -281,7 +284,14 @@ QWidget* AcquirePage::makeInspector() {
 }
 
 void AcquirePage::onTakeKey() {
-  if (!held_->takeKey()) workbench_.take();
+  if (!held_->takeKey()) takeOrGoOn();
+}
+
+void AcquirePage::takeOrGoOn() {
+  if (isDone(workbench_.status()))
+    workbench_.goToPage(QStringLiteral("compare"));
+  else
+    workbench_.take();
 }
 
 void AcquirePage::onSession() {
@@ -342,9 +352,10 @@ void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
   position_->setText(detail);
   showDistance(status);
   fitPlace();
-  if (reason_->text() != status.reason) {
-    reason_->setText(status.reason);
-    reason_->setToolTip(status.reason);
+  const QString reason = isDone(status) && !status.attention ? tr("Next: compare the methods") : status.reason;
+  if (reason_->text() != reason) {
+    reason_->setText(reason);
+    reason_->setToolTip(reason);
     fitReason();
   }
   const QString state = bannerState(status);
@@ -419,7 +430,9 @@ void AcquirePage::showButtons(const acquisition::AcquisitionStatus& status) {
           .arg(total)
           .arg(status.recorded->n_skipped > 0 ? tr(", %1 skipped").arg(status.recorded->n_skipped) : QString()));
   const bool running = status.device == acquisition::DeviceState::kRunning;
-  take_->setEnabled(running && status.current && !takes(status));
+  const bool is_done = isDone(status);
+  take_->setText(is_done ? tr("Compare  (Space or Page Down)") : tr("Take  (Space or Page Down)"));
+  take_->setEnabled(is_done || (running && status.current && !takes(status)));
   skip_->setEnabled(status.current.has_value());
   undo_->setEnabled(status.recorded->can_undo);
   redo_->setEnabled(status.recorded->can_redo);

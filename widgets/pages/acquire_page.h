@@ -38,6 +38,8 @@ class AcquirePage : public QWidget {
                          const std::function<void()>& action);
   void addShortcut(const QKeySequence& keys, const std::function<void()>& action);
   void onTakeKey();
+  /// What the large button and its keys do: take the place, or go on to the comparison when all are done.
+  void takeOrGoOn();
   void onSession();
   void onStatus(const acquisition::AcquisitionStatus& status);
   void showPlace(const acquisition::AcquisitionStatus& status);

@@ -319,11 +319,25 @@ std::vector<ExportPage::File> ExportPage::files() const {
     return files;
   }
   const ExportTarget* target = several.empty() ? chosen() : several.front();
-  if (!target || path_->text().isEmpty()) return {};
+  if (!target) return {};
   return {{path_->text(), target}};
 }
 
+/// What is amiss with the place to write to; empty when nothing is.
+QString ExportPage::pathProblem() const {
+  const QString path = path_->text().trimmed();
+  if (wanted().size() > 1) return path.isEmpty() ? tr("Name the folder to write into.") : QString();
+  if (path.isEmpty()) return tr("Name the file to write.");
+  const bool is_folder = QFileInfo(path).isDir() || path.endsWith(QLatin1Char('/'));
+  return is_folder ? tr("%1 is a folder; name a file in it.").arg(QDir::toNativeSeparators(path)) : QString();
+}
+
 void ExportPage::write() {
+  if (const QString problem = pathProblem(); !problem.isEmpty()) {
+    workbench_.showMessage({problem, Severity::kAttention, {}, {}});
+    path_->setFocus();
+    return;
+  }
   const std::vector<File> wanted_files = files();
   QStringList present;
   for (const File& file : wanted_files) {

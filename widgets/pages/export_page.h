@@ -47,6 +47,7 @@ class ExportPage : public QWidget {
   QString verdictOnCalibration() const;
   QString setupOfCalibration() const;
   void browse();
+  QString pathProblem() const;
   void write();
   void askToReplace(const QStringList& present);
   static std::vector<Writing> writeAll(std::vector<Writing> writings, const RunControl& control);

@@ -294,9 +294,9 @@ QString PlanPage::summary(const acquisition::Plan& now, const std::vector<Planne
   for (const PlannedPlace& place : planned)
     levels_m.insert(std::round(place.reference_from_sensor.position_m.z() * 1000.0) / 1000.0);
   const double minutes = static_cast<double>(planned.size()) * (kSecondsPerPlacement + secondsOf(takeLength())) / 60.0;
-  QString text = tr("%1 placements on %2 levels, about %3 minutes for a practised operator.")
-                     .arg(planned.size())
-                     .arg(levels_m.size())
+  QString text = tr("%1 on %2, about %3 min for a practised operator.")
+                     .arg(planned.size() == 1 ? tr("1 placement") : tr("%1 placements").arg(planned.size()))
+                     .arg(levels_m.size() == 1 ? tr("1 level") : tr("%1 levels").arg(levels_m.size()))
                      .arg(std::ceil(minutes), 0, 'f', 0);
   QStringList pipes;
   for (const double length_m : acquisition::pipeLengths_m(now)) pipes << coordinateText(length_m);

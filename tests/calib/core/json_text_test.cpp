@@ -60,6 +60,9 @@ class JsonTextTest : public QObject {
     const auto broken = parseJson("{\n\"a\": 1,\n\"b\" 2}", "a.json");
     QVERIFY(!broken);
     FT_VERIFY_MATCH(holdsAll(broken.error().message, {"a.json, line 3", "not valid JSON"}));
+    const auto table = parseJson("\n  node,x_true_m,y_true_m\n0,0,0\n", "a.csv");
+    QVERIFY(!table);
+    FT_VERIFY_MATCH(holdsAll(table.error().message, {"a.csv, line 2", "another kind", "\"node,x_true_m,y_true_m\""}));
     const auto huge = parseJson("[1e999]", "a.json");
     QVERIFY(!huge);
     FT_VERIFY_MATCH(holdsAll(huge.error().message, {"a.json", "too large"}));

@@ -158,6 +158,8 @@ class TableErrorsTest : public QObject {
                           << QByteArray("line 2, metadata rate_hz: 'fast' is not a number of 0 or more");
     QTest::newRow("tolerance") << "# jig_tolerance_m: -1\n" + head + row
                                << QByteArray("'-1' is not a number of 0 or more");
+    QTest::newRow("huge tolerance") << "# jig_tolerance_m: 1e300\n" + head + row
+                                    << QByteArray("'1e300' is too large to be measured");
     QTest::newRow("metadata twice") << "# frame: jig\n# frame: room\n" + head + row
                                     << QByteArray("line 2, metadata frame: it is given twice");
   }

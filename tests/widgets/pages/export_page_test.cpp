@@ -61,6 +61,20 @@ class ExportPageTest : public WindowDriver {
     QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("exportWrite")->isEnabled(), kWaitMs);
   }
 
+  void aPlaceThatIsNoFileIsSaid() {
+    tick({});
+    find<QLineEdit>("exportPath")->clear();
+    click("exportWrite");
+    QVERIFY(isSaid("Name the file"));
+    type("exportPath", folder_.path());
+    click("exportWrite");
+    QVERIFY(isSaid("is a folder"));
+    tick({"(.nrrd)", "(.npz)"});
+    find<QLineEdit>("exportPath")->clear();
+    click("exportWrite");
+    QVERIFY(isSaid("Name the folder"));
+  }
+
   /// One that cannot be does not keep the others.
   void whatCannotBeWrittenIsNamed() {
     tick({"(.npz)", "olynomial"});

@@ -196,7 +196,10 @@ void GuidedSessionTest::undoSkipAndRetake() {
 }
 
 void GuidedSessionTest::comparesTheMethods() {
-  click("step_compare");
+  QTRY_COMPARE(find<QLabel>("bannerReason")->text(), QStringLiteral("Next: compare the methods"));
+  QVERIFY(find<QPushButton>("take")->text().startsWith(QStringLiteral("Compare")));
+  picture(QStringLiteral("4-acquire-done"));
+  QTest::keyClick(window_.get(), Qt::Key_Space);
   QVERIFY(onPage("page_compare"));
   QTRY_VERIFY_WITH_TIMEOUT(window_->workbench().comparison().has_value() && !window_->workbench().isComparing(),
                            400000);
