@@ -50,8 +50,8 @@ Result<Tetrahedra> delaunayOf(const FitData& data, const std::string& method) {
   FT_TRY_VOID(checkVolume(data, method));
   Tetrahedra tetrahedra;
   tetrahedra.places = mergePlaces(data);
-  FT_TRY(auto cells, delaunayTetrahedra(tetrahedra.places.p_tracked_m, method));
-  tetrahedra.mesh = TetrahedralMesh(tetrahedra.places.p_tracked_m, cells);
+  FT_TRY(const auto delaunay, Delaunay::of(tetrahedra.places.p_tracked_m, method));
+  tetrahedra.mesh = TetrahedralMesh(tetrahedra.places.p_tracked_m, delaunay.tetrahedra());
   return tetrahedra;
 }
 
@@ -88,8 +88,12 @@ std::vector<std::size_t> invertedTetrahedra(const Tetrahedra& tetrahedra) {
   return inverted;
 }
 
+bool isByDelaunay(const FitData& data, const std::string& split) {
+  return split == "delaunay" || (split == "auto" && data.index.empty());
+}
+
 Result<Tetrahedra> tetrahedraOf(const FitData& data, const std::string& split, const std::string& method) {
-  const bool by_delaunay = split == "delaunay" || (split == "auto" && data.index.empty());
+  const bool by_delaunay = isByDelaunay(data, split);
   auto tetrahedra = by_delaunay ? delaunayOf(data, method) : gridTetrahedra(data, split == "6", method);
   const bool has_no_cells = !tetrahedra && (tetrahedra.error().code == ErrorCode::kUnsupported ||
                                             tetrahedra.error().code == ErrorCode::kTooFewNodes);

@@ -19,6 +19,9 @@ struct Tetrahedra {
   std::string note;
 };
 
+/// Whether scattered places are asked for, or all that there is.
+bool isByDelaunay(const FitData& data, const std::string& split);
+
 /// Joins the places to tetrahedra. Five a cell mirror from cell to cell, six all lie alike: either way the faces of
 /// neighbours match. Next to missing places the boxes of PlaceGrid are cut the same way, and faces there may not match.
 /// @param split as in splitSetting

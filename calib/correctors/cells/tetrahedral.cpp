@@ -1,9 +1,12 @@
+#include "calib/correctors/base/fit_rows.h"
+#include "calib/correctors/base/hold_out_rows.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
 #include "calib/correctors/cells/cell_json.h"
 #include "calib/correctors/cells/local_interpolation.h"
 #include "calib/correctors/cells/tetrahedra.h"
+#include "calib/correctors/numerics/delaunay.h"
 
 namespace fieldtrue::correctors {
 namespace {
@@ -54,13 +57,52 @@ class TetrahedralPosition : public PositionModel {
   std::string note_;
 };
 
+constexpr const char* kName = "Tetrahedral interpolation";
+
 Result<std::unique_ptr<PositionModel>> fitTetrahedral(const FitData& data, const Settings& settings,
                                                       const RunControl&) {
-  return tetrahedraOf(data, choiceSetting(settings, "split"), "Tetrahedral interpolation")
+  return tetrahedraOf(data, choiceSetting(settings, "split"), kName)
       .map([](Tetrahedra tetrahedra) -> std::unique_ptr<PositionModel> {
         return std::make_unique<TetrahedralPosition>(std::move(tetrahedra.mesh), errorVectors_m(tetrahedra.places),
                                                      std::move(tetrahedra.note));
       });
+}
+
+/// Leaves one place out at a time by filling the hole that it leaves between the tetrahedra of all.
+class TetrahedralHoldOut : public HoldOutFits<PositionModel> {
+ public:
+  TetrahedralHoldOut(const FitData& data, Settings settings, Places places, Delaunay delaunay)
+      : data_(data), settings_(std::move(settings)), places_(std::move(places)), delaunay_(std::move(delaunay)) {}
+
+  Result<std::unique_ptr<PositionModel>> without(std::span<const std::size_t> rows,
+                                                 const Pose& fold_from_data) const override {
+    FitData rest = rowsOfFitData(data_, rowsWithout(data_.size(), rows));
+    for (Eigen::Vector3d& p_m : rest.p_true_m) p_m = fold_from_data * p_m;
+    FT_TRY_VOID(checkVolume(rest, kName));
+    const auto out = placesOfRows(places_, rows);
+    const auto cells = out && out->size() == 1 ? delaunay_.without(static_cast<int>(out->front())) : std::nullopt;
+    TetrahedralMesh mesh = cells ? TetrahedralMesh(places_.p_tracked_m, *cells) : TetrahedralMesh();
+    if (mesh.size() == 0) return fitTetrahedral(rest, settings_, {});
+    Places moved = places_;
+    for (Eigen::Vector3d& p_m : moved.p_true_m) p_m = fold_from_data * p_m;
+    return std::make_unique<TetrahedralPosition>(std::move(mesh), errorVectors_m(moved), std::string());
+  }
+
+ private:
+  FitData data_;
+  Settings settings_;
+  Places places_;
+  Delaunay delaunay_;
+};
+
+Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutTetrahedral(const FitData& data, const Settings& settings,
+                                                                       const RunControl&) {
+  if (!isByDelaunay(data, choiceSetting(settings, "split")))
+    return fail(ErrorCode::kUnsupported, std::string(kName) + " of a grid has no closed form");
+  FT_TRY_VOID(checkVolume(data, kName));
+  Places places = mergePlaces(data);
+  FT_TRY(auto delaunay, Delaunay::of(places.p_tracked_m, kName));
+  return std::make_unique<TetrahedralHoldOut>(data, settings, std::move(places), std::move(delaunay));
 }
 
 }  // namespace
@@ -78,6 +120,7 @@ PositionMethod tetrahedralPosition() {
           .settings = {splitSetting()},
           .fit = fitTetrahedral,
           .read = readTetrahedralPosition,
+          .hold_out = holdOutTetrahedral,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -1,6 +1,9 @@
 #include "calib/correctors/numerics/delaunay.h"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
+#include <iterator>
 #include <random>
 
 extern "C" {
@@ -25,13 +28,13 @@ std::vector<double> shakenCoordinates(std::span<const Eigen::Vector3d> points_m)
   return coordinates;
 }
 
-std::vector<std::array<int, 4>> tetrahedraOf(const QhullRun& run) {
-  std::vector<std::array<int, 4>> cells;
+std::vector<Delaunay::Corners> tetrahedraOf(const QhullRun& run) {
+  std::vector<Delaunay::Corners> cells;
   qhT* qh = run.get();
   facetT* facet = nullptr;
   FORALLfacets {
     if (facet->upperdelaunay || qh_setsize(qh, facet->vertices) != 4) continue;
-    std::array<int, 4> cell{};
+    Delaunay::Corners cell{};
     std::size_t c = 0;
     vertexT* vertex = nullptr;
     vertexT** vertexp = nullptr;
@@ -43,20 +46,73 @@ std::vector<std::array<int, 4>> tetrahedraOf(const QhullRun& run) {
   return cells;
 }
 
+/// @param coordinates as QhullRun takes them
+std::optional<std::vector<Delaunay::Corners>> triangulated(std::vector<double> coordinates) {
+  if (coordinates.size() == 12) return {{{0, 1, 2, 3}}};
+  const QhullRun run(coordinates, "qhull d Qbb Qt Pp");
+  if (!run.succeeded()) return std::nullopt;
+  return tetrahedraOf(run);
+}
+
+/// Whether the origin lies in the ball through four points.
+bool ballHoldsOrigin(const std::array<Eigen::Vector3d, 4>& x) {
+  Eigen::Matrix4d lifted;
+  for (std::size_t c = 0; c < 4; ++c) lifted.row(static_cast<Eigen::Index>(c)) << x[c].transpose(), x[c].squaredNorm();
+  const double turn = (x[1] - x[0]).dot((x[2] - x[0]).cross(x[3] - x[0]));
+  return lifted.determinant() * turn < 0.0;
+}
+
 }  // namespace
 
-Result<std::vector<std::array<int, 4>>> delaunayTetrahedra(std::span<const Eigen::Vector3d> points_m,
-                                                           const std::string& name) {
+Result<Delaunay> Delaunay::of(std::span<const Eigen::Vector3d> points_m, const std::string& name) {
   if (points_m.size() < 4)
     return fail(ErrorCode::kTooFewNodes, name + " needs at least 4 places, got " + std::to_string(points_m.size()));
-  std::vector<double> coordinates = shakenCoordinates(points_m);
-  if (!coordinates.empty()) {
-    const QhullRun run(coordinates, "qhull d Qbb Qt Pp");
-    if (run.succeeded()) return tetrahedraOf(run);
+  Delaunay delaunay;
+  delaunay.coordinates_ = shakenCoordinates(points_m);
+  if (!delaunay.coordinates_.empty()) {
+    if (auto tetrahedra = triangulated(delaunay.coordinates_)) {
+      delaunay.tetrahedra_ = *std::move(tetrahedra);
+      return delaunay;
+    }
   }
   return fail(ErrorCode::kDegenerate, name +
                                           " needs places that enclose a volume, and Qhull finds none between these " +
                                           std::to_string(points_m.size()));
+}
+
+Eigen::Vector3d Delaunay::at(int point) const {
+  return Eigen::Map<const Eigen::Vector3d>(coordinates_.data() + 3 * static_cast<std::ptrdiff_t>(point));
+}
+
+std::optional<std::vector<Delaunay::Corners>> Delaunay::without(int point) const {
+  std::vector<Corners> left;
+  std::vector<int> around;
+  for (const Corners& cell : tetrahedra_) {
+    if (std::find(cell.begin(), cell.end(), point) == cell.end())
+      left.push_back(cell);
+    else
+      std::copy_if(cell.begin(), cell.end(), std::back_inserter(around), [&](int c) { return c != point; });
+  }
+  std::sort(around.begin(), around.end());
+  around.erase(std::unique(around.begin(), around.end()), around.end());
+  if (around.size() < 4) return left;
+  std::vector<double> coordinates;
+  for (const int c : around)
+    for (const double x : at(c)) coordinates.push_back(x);
+  const auto new_cells = triangulated(std::move(coordinates));
+  if (!new_cells) return std::nullopt;
+  // Of those between the points around, the ones in the hole are those that the point was in the way of.
+  for (const Corners& cell : *new_cells) {
+    Corners numbers{};
+    std::array<Eigen::Vector3d, 4> from_point;
+    for (std::size_t c = 0; c < 4; ++c) {
+      numbers[c] = around[static_cast<std::size_t>(cell[c])];
+      from_point[c] = at(numbers[c]) - at(point);
+    }
+    if (ballHoldsOrigin(from_point)) left.push_back(numbers);
+  }
+  std::sort(left.begin(), left.end());
+  return left;
 }
 
 }  // namespace fieldtrue::correctors

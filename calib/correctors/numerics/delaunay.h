@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,12 +10,30 @@
 
 namespace fieldtrue::correctors {
 
-/// The Delaunay tetrahedra of points, as numbers of their corners, in a fixed order. Points on a regular grid have no
-/// unique answer; one is chosen, and flat tetrahedra may be among it.
-/// @param name stands in messages
-/// @error kDegenerate when the points enclose no volume
+/// Points joined to Delaunay tetrahedra. Points on a regular grid have no unique answer; one is chosen, and flat
+/// tetrahedra may be among it.
 /// @source Barber, Dobkin, Huhdanpaa 1996, The Quickhull algorithm for convex hulls
-Result<std::vector<std::array<int, 4>>> delaunayTetrahedra(std::span<const Eigen::Vector3d> points_m,
-                                                           const std::string& name);
+class Delaunay {
+ public:
+  using Corners = std::array<int, 4>;  ///< Numbers of points, ascending.
+
+  /// @param name stands in messages
+  /// @error kTooFewNodes below 4 points; kDegenerate when they enclose no volume
+  static Result<Delaunay> of(std::span<const Eigen::Vector3d> points_m, const std::string& name);
+
+  /// In a fixed order.
+  const std::vector<Corners>& tetrahedra() const { return tetrahedra_; }
+
+  /// The tetrahedra of all points but one, by the numbers of all: away from the point they stay, and the hole at it is
+  /// filled from the points around it. None where Qhull finds nothing between those.
+  /// @source Devillers 1999, On deletion in Delaunay triangulations
+  std::optional<std::vector<Corners>> without(int point) const;
+
+ private:
+  Eigen::Vector3d at(int point) const;
+
+  std::vector<double> coordinates_;  ///< x y z of one point after the other, scaled and shaken.
+  std::vector<Corners> tetrahedra_;
+};
 
 }  // namespace fieldtrue::correctors

@@ -17,6 +17,7 @@ namespace {
 /// every automatic number is given here, or by explicitValue where a method is not listed.
 const std::map<std::string, std::map<std::string, std::string>> kGiven = {
     {"polynomial", {{"degree", "3"}}},
+    {"tetrahedral", {{"split", "delaunay"}}},
 };
 
 /// What a method may differ by that takes more from all rows than a setting can give: a tenth of the noise, while a

@@ -48,6 +48,7 @@ MethodText withNumbers(const correctors::PositionMethod& method) {
   for (const Setting& setting : method.settings)
     if (setting.type == SettingType::kAutoNumber && numbers.contains(setting.key))
       text.given[setting.key] = numbers.at(setting.key);
+  if (method.id == "tetrahedral") text.given["split"] = "delaunay";  // Cells of a grid are joined anew in every fold.
   return text;
 }
 
