@@ -126,7 +126,7 @@ std::vector<FitParameter> polarizabilityParameters(BodyShape shape) {
 void respondAsBody(BodyShape shape, const Eigen::Vector3d& center_m, const Eigen::Matrix3d& field_of_transmitter,
                    const Eigen::Vector3d& p_sensor_m, std::span<field::EffectResponse> responses) {
   const Eigen::Matrix3d from_body = field::dipoleField(p_sensor_m - center_m, 1.0);
-  for (field::EffectResponse& response : responses) response = {};
+  for (field::EffectResponse& response : responses) response.shift_m = response.turn_rad = Eigen::Vector3d::Zero();
   if (shape == BodyShape::kSphere) {
     responses[0].field_per_m3 = from_body * field_of_transmitter;
     return;

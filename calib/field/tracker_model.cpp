@@ -1,6 +1,5 @@
 #include "calib/field/tracker_model.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -58,19 +57,26 @@ std::optional<Pose> reportedPose(const SensorSetting& setting, const EffectRespo
   return solution->tracker_from_sensor;
 }
 
+/// In a frame along p the six columns of B are three orthogonal pairs, so that the least squares is written down. For a
+/// small change H of the field, u = p/r and v the axial vector of H - H^T:
+///   dp    = r^4/3 (2 H^T u - H u + (tr H/6 - 3/2 u.Hu) u)
+///   dturn = r^3 (3/2 (u.v) u - v)
 Eigen::Matrix<double, 6, 9> poseByField(const Eigen::Vector3d& p_m) {
-  const Eigen::Matrix3d G = dipoleField(p_m, 1.0);
-  Eigen::Matrix<double, 9, 6> B;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
-    const Eigen::Matrix3d slope = dipoleFieldSlope(p_m, 1.0, axis);
-    Eigen::Matrix3d turned;
-    for (int column = 0; column < 3; ++column) turned.col(column) = -e.cross(Eigen::Vector3d(G.col(column)));
-    B.col(axis) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(slope.data());
-    B.col(3 + axis) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(turned.data());
+  const double r_m = p_m.norm();
+  const Eigen::Vector3d u = p_m / r_m;
+  const double turn = r_m * r_m * r_m;
+  const double shift = turn * r_m / 3.0;
+  Eigen::Matrix<double, 6, 9> by_field;
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) {
+      Eigen::Vector3d shifted = ((i == j ? 1.0 / 6.0 : 0.0) - 1.5 * u[i] * u[j]) * u;
+      shifted[j] += 2.0 * u[i];
+      shifted[i] -= u[j];
+      const Eigen::Vector3d axial = Eigen::Vector3d::Unit(j).cross(Eigen::Vector3d::Unit(i));
+      by_field.col(3 * j + i) << shift * shifted, turn * (1.5 * axial.dot(u) * u - axial);
+    }
   }
-  const Eigen::Matrix<double, 6, 6> normal = B.transpose() * B;
-  return normal.ldlt().solve(B.transpose());
+  return by_field;
 }
 
 Eigen::Vector3d solvedPosition_m(const Eigen::Matrix3d& field, const Eigen::Vector3d& near_m) {

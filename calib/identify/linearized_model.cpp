@@ -9,6 +9,7 @@
 
 #include "calib/core/statistics.h"
 #include "calib/field/tracker_model.h"
+#include "calib/identify/whitened_fields.h"
 
 namespace fieldtrue::identify {
 namespace {
@@ -317,28 +318,30 @@ void Linearized::addTerms(const GapModel& state) {
   }
 }
 
-Eigen::Matrix<double, 6, 1> Linearized::whitenedChange(std::size_t k, const field::EffectResponse& response) const {
-  Eigen::Matrix<double, 6, 1> change = white_by_field_[k].col(0) * response.field_per_m3(0);
-  for (Eigen::Index i = 1; i < 9; ++i) change += white_by_field_[k].col(i) * response.field_per_m3(i);
-  if (response.shift_m.isZero(0.0) && response.turn_rad.isZero(0.0)) return change;
-  if (!white_by_placing_.empty()) {
-    change += white_by_placing_[k].leftCols<3>() * response.shift_m;
-    change += white_by_placing_[k].rightCols<3>() * response.turn_rad;
-    return change;
-  }
-  change.head<3>() += white_position_[k] * response.shift_m;
-  change.tail<3>() += white_rotation_[k] * response.turn_rad;
+/// What moves the sensor adds to the whitened change of a row.
+Eigen::Matrix<double, 6, 1> Linearized::whitenedPlacing(std::size_t k, const field::EffectResponse& response) const {
+  if (!white_by_placing_.empty())
+    return white_by_placing_[k].leftCols<3>() * response.shift_m +
+           white_by_placing_[k].rightCols<3>() * response.turn_rad;
+  Eigen::Matrix<double, 6, 1> change;
+  change << white_position_[k] * response.shift_m, white_rotation_[k] * response.turn_rad;
   return change;
 }
 
 Eigen::MatrixXd Linearized::columnsOf(std::span<const field::EffectResponse> responses, Eigen::Index parameters) const {
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(size(), parameters);
-  for (std::size_t k = 0; k < order_.size(); ++k) {
-    for (Eigen::Index j = 0; j < parameters; ++j) {
-      const auto at = k * static_cast<std::size_t>(parameters) + static_cast<std::size_t>(j);
-      columns.col(j).segment(static_cast<Eigen::Index>(k) * channels_, channels_) =
-          whitenedChange(k, responses[at]).head(channels_);
-    }
+  static_assert(sizeof(field::EffectResponse) % sizeof(double) == 0);
+  Eigen::MatrixXd columns(size(), parameters);
+  columns.bottomRows(n_prior_).setZero();
+  const auto m = static_cast<std::size_t>(parameters);
+  if (order_.empty() || m == 0) return columns;
+  whitenFields({white_by_field_.front().data(), responses.front().field_per_m3.data(),
+                sizeof(field::EffectResponse) / sizeof(double), order_.size(), m, static_cast<std::size_t>(channels_)},
+               columns.data(), static_cast<std::size_t>(size()));
+  for (std::size_t i = 0; i < order_.size() * m; ++i) {
+    const field::EffectResponse& response = responses[i];
+    if (response.shift_m.isZero(0.0) && response.turn_rad.isZero(0.0)) continue;
+    columns.col(static_cast<Eigen::Index>(i % m)).segment(static_cast<Eigen::Index>(i / m) * channels_, channels_) +=
+        whitenedPlacing(i / m, response).head(channels_);
   }
   return columns;
 }

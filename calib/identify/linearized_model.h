@@ -83,7 +83,7 @@ class Linearized {
   void bend(const GapPhysics& physics, const GapModel& state, std::span<const Pose> reported);
   template <int kColumns>
   Eigen::Matrix<double, 6, kColumns> whiteOf(std::size_t k, const Eigen::Matrix<double, 6, kColumns>& change) const;
-  Eigen::Matrix<double, 6, 1> whitenedChange(std::size_t k, const field::EffectResponse& response) const;
+  Eigen::Matrix<double, 6, 1> whitenedPlacing(std::size_t k, const field::EffectResponse& response) const;
 
   int channels_ = 6;
   int n_alignment_ = 0;

@@ -176,6 +176,14 @@ LocalFit refineLocally(const Linearized& at, const effects::EffectFit& fit, cons
 
 namespace {
 
+/// J^T W J.
+Eigen::MatrixXd normalOf(const Eigen::MatrixXd& J, const Eigen::VectorXd& w) {
+  const Eigen::MatrixXd weighted = w.cwiseSqrt().asDiagonal() * J;
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(J.cols(), J.cols());
+  normal.selfadjointView<Eigen::Lower>().rankUpdate(weighted.transpose());
+  return normal.selfadjointView<Eigen::Lower>();
+}
+
 /// One attempt to fit a model jointly; the state of its iteration.
 class JointFit {
  public:
@@ -235,7 +243,7 @@ class JointFit {
     const Eigen::VectorXd w = weights(at);
     Eigen::MatrixXd J = at.nuisance();
     if (options_.frozen) J.col(*options_.frozen).setZero();
-    system.normal = J.transpose() * w.asDiagonal() * J;
+    system.normal = normalOf(J, w);
     system.right = J.transpose() * (w.asDiagonal() * at.residual());
     addPriors(state.model, at.nAlignment(), system.normal, system.right);
     system.scale = system.normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
@@ -365,7 +373,7 @@ class JointFit {
   RefinedModel finished(State state, double cost) const {
     const Linearized at = linearizedAt(state);
     const Eigen::MatrixXd& J = at.nuisance();
-    Eigen::MatrixXd normal = J.transpose() * weights(at).asDiagonal() * J;
+    Eigen::MatrixXd normal = normalOf(J, weights(at));
     Eigen::VectorXd unused = Eigen::VectorXd::Zero(J.cols());
     addPriors(state.model, at.nAlignment(), normal, unused);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();

@@ -1,5 +1,6 @@
 #include "calib/field/tracker_model.h"
 
+#include <Eigen/QR>
 #include <QTest>
 
 #include "calib/field/dipole_field.h"
@@ -94,6 +95,21 @@ class TrackerModelTest : public QObject {
                            1e-6 * told.head<3>().norm()));
       const Eigen::Vector3d turn_rad = 0.5 * rotationVector_rad(high.orientation * low.orientation.conjugate());
       FT_VERIFY_MATCH(near(turn_rad, Eigen::Vector3d(told.tail<3>()), 1e-4 * told.tail<3>().norm()));
+    }
+  }
+
+  void poseByFieldIsTheLeastSquares() {
+    for (const Eigen::Vector3d& p_m : kPlaces_m) {
+      const Eigen::Matrix3d G = dipoleField(p_m, 1.0);
+      Eigen::Matrix<double, 9, 6> B;
+      for (int axis = 0; axis < 3; ++axis) {
+        const Eigen::Matrix3d moved = dipoleFieldSlope(p_m, 1.0, axis);
+        Eigen::Matrix3d turned;
+        for (int c = 0; c < 3; ++c) turned.col(c) = G.col(c).cross(Eigen::Vector3d::Unit(axis));
+        B.col(axis) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(moved.data());
+        B.col(3 + axis) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(turned.data());
+      }
+      QVERIFY(poseByField(p_m).isApprox(Eigen::MatrixXd(B).completeOrthogonalDecomposition().pseudoInverse(), 1e-12));
     }
   }
 
