@@ -2,6 +2,7 @@
 """How often the 90 % intervals of `compare` hold the truth they are about.
 
 interval_coverage.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 30,60,120,567] [--rooms a,b] [--processes N]
+                     [--keep FOLDER]
 
 Of every room thousands of places are recorded without noise, scattered evenly over its box. Tables are drawn from
 them; each stated position is then moved as a hand misplaces a jig, calm (Gaussian of 2 mm an axis) or with gross
@@ -23,6 +24,7 @@ import random
 import subprocess
 import sys
 import tempfile
+import typing
 
 EXTENT_M = (2.44, 2.44, 1.83)  # Of the rooms' grid.
 POOL = 9000
@@ -31,6 +33,7 @@ FEWEST_FRESH = 3000
 SLIP_SD_M = 0.002
 UNTUNED = ("none", "affine", "polynomial:degree=2", "hmq", "tetrahedral")
 TUNED = ("none", "rbf", "gaussian_process")
+COLUMNS = ("node", *(f"{axis}{kind}_m" for kind in ("_true", "") for axis in "xyz"))  # Positions are what is judged.
 
 
 class Misplacing:
@@ -59,6 +62,15 @@ def rows_of(path):
         lines = text.read().splitlines()
     return [line for line in lines if line.startswith("#")], list(
         csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+def columns_of(path, names):
+    """[[number of each named column]] of the rows of a table."""
+    with open(path, encoding="utf-8") as text:
+        rows = csv.reader(line for line in text if not line.startswith("#"))
+        head = next(rows)
+        at = [head.index(name) for name in names]
+        return [[float(row[column]) for column in at] for row in rows]
 
 
 def write(path, head, rows):
@@ -100,38 +112,80 @@ def fresh_mean_square_m2(cli, table, method, fresh, folder):
     calibration, corrected = os.path.join(folder, "a.ftcal.json"), os.path.join(folder, "corrected.csv")
     run(cli, "fit", "--nodes", table, "--position", method, "--out", calibration)
     run(cli, "apply", "--calibration", calibration, "--in", fresh, "--out", corrected, "--force")
-    rows = rows_of(corrected)[1]
-    return sum((float(row[f"{axis}_corrected_m"]) - float(row[f"{axis}_true_m"]))**2
-               for row in rows for axis in "xyz") / len(rows)
+    columns = [f"{axis}_{kind}_m" for kind in ("corrected", "true") for axis in "xyz"]
+    square_m2 = [math.dist(row[:3], row[3:])**2 for row in columns_of(corrected, columns)]
+    return math.fsum(square_m2) / len(square_m2)
 
 
-def cell(job):
-    """{(figure, method): [whether each table's interval held the truth]} of one room, noise and size."""
-    cli, rooms, room, heavy, n_places, n_tables, tuned = job
+def judged_table(cli, table, methods, fresh, folder, misplaced_m2):
+    """What `compare` says of a table, and the truths that its intervals should hold."""
+    judged = json.loads(run(cli, "compare", "--nodes", table, "--methods", ",".join(methods), "--json"))
+    assert judged["validate"] == ("kfold:10" if methods is TUNED else "loo")
+    scores = {}
+    for method, score in zip(methods, judged["position"]):
+        if score["skipped"]:
+            continue
+        square_m2 = fresh_mean_square_m2(cli, table, method, fresh, folder) + misplaced_m2
+        scores[method] = {"truth": 1000 * math.sqrt(square_m2), "is_best": score["method"] == judged["best"]["position"],
+                          **{end: score["position_mm"][f"rms_{end}90"] for end in ("low", "high")},
+                          "place_mm": score["place_mm"]}
+    return {"scores": scores, "gain": {end: judged["verdict"][f"gain_{end}90"] for end in ("low", "high")}}
+
+
+class Cell(typing.NamedTuple):
+    """Tables of one room, placing and size."""
+
+    cli: str
+    rooms: str
+    room: str
+    heavy: bool
+    n_places: int
+    n_tables: int
+    tuned: bool
+    keep: str
+
+    def placing(self):
+        return "gross slips" if self.heavy else "calm"
+
+    def name(self):
+        return f"{self.n_places} {self.room} {self.placing()}{' tuned' if self.tuned else ''}".replace(" ", "_")
+
+
+def tables_of(cell):
+    """[what judged_table returned], from what is kept as far as that goes."""
+    path = os.path.join(cell.keep, f"{cell.name()}.jsonl")
+    kept = []
+    if os.path.exists(path):
+        with open(path, encoding="utf-8") as text:
+            kept = [line for line in text if line.endswith("\n")][:cell.n_tables]
+    if len(kept) < cell.n_tables:
+        with tempfile.TemporaryDirectory() as folder, open(path, "w", encoding="utf-8") as out:
+            out.writelines(kept)
+            head, rows = record(cell.cli, cell.rooms, cell.room, folder, max(FEWEST_FRESH, FRESH_A_PLACE * cell.n_places))
+            rows = [{name: text for name, text in row.items() if name in COLUMNS} for row in rows]
+            fresh, table = os.path.join(folder, "fresh.csv"), os.path.join(folder, "table.nodes.csv")
+            write(fresh, head, rows[POOL:])
+            misplacing = Misplacing(cell.heavy)
+            for number in range(len(kept), cell.n_tables):
+                write(table, head, drawn_table(rows, cell.n_places, random.Random(f"{cell.name()} {number}"), misplacing))
+                kept.append(json.dumps(judged_table(cell.cli, table, TUNED if cell.tuned else UNTUNED, fresh, folder,
+                                                    misplacing.mean_square_m2())) + "\n")
+                out.write(kept[-1])
+                out.flush()
+    return cell, [json.loads(line) for line in kept]
+
+
+def holding(tables):
+    """{(figure, method): [whether each table's interval held the truth]}"""
     held = {}
-    with tempfile.TemporaryDirectory() as folder:
-        head, rows = record(cli, rooms, room, folder, max(FEWEST_FRESH, FRESH_A_PLACE * n_places))
-        fresh, table = os.path.join(folder, "fresh.csv"), os.path.join(folder, "table.nodes.csv")
-        write(fresh, head, rows[POOL:])
-        draw, misplacing = random.Random(f"{room} {heavy} {n_places} {tuned}"), Misplacing(heavy)
-        for _ in range(n_tables):
-            write(table, head, drawn_table(rows, n_places, draw, misplacing))
-            methods = TUNED if tuned else UNTUNED
-            judged = json.loads(run(cli, "compare", "--nodes", table, "--methods", ",".join(methods), "--json"))
-            assert judged["validate"] == ("kfold:10" if tuned else "loo")
-            truth_mm = {}
-            for method, score in zip(methods, judged["position"]):
-                if score["skipped"]:
-                    continue
-                square_m2 = fresh_mean_square_m2(cli, table, method, fresh, folder) + misplacing.mean_square_m2()
-                truth_mm[method] = 1000 * math.sqrt(square_m2)
-                low, high = (score["position_mm"][end] for end in ("rms_low90", "rms_high90"))
-                held.setdefault(("RMS", method), []).append(low <= truth_mm[method] <= high)
-                if score["method"] == judged["best"]["position"]:
-                    gain = 1 - truth_mm[method] / truth_mm["none"]
-                    low, high = (judged["verdict"][f"gain_{end}90"] for end in ("low", "high"))
-                    held.setdefault(("gain", "best"), []).append(low <= gain <= high)
-    return job, held
+    for table in tables:
+        truth_mm = {method: score["truth"] for method, score in table["scores"].items()}
+        for method, score in table["scores"].items():
+            held.setdefault(("RMS", method), []).append(score["low"] <= truth_mm[method] <= score["high"])
+            if score["is_best"]:
+                gain = 1 - truth_mm[method] / truth_mm["none"]
+                held.setdefault(("gain", "best"), []).append(table["gain"]["low"] <= gain <= table["gain"]["high"])
+    return held
 
 
 def main():
@@ -142,19 +196,22 @@ def main():
     parser.add_argument("--places", default="30,60,120,567")
     parser.add_argument("--rooms", default="steel_floor,mixed")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument("--keep", help="folder of a line a table; a run that was ended goes on from there")
     given = parser.parse_args()
-    jobs = [(given.cli, given.rooms_folder, room, heavy, n_places, given.tables, tuned)
-            for n_places in map(int, given.places.split(",")) for room in given.rooms.split(",")
-            for heavy in (False, True) for tuned in ((False, True) if n_places == 60 else (False,))]
-    shares = {}
-    print("| places | room | placing | figure | tables | intervals that hold the truth |\n|---|---|---|---|---|---|")
-    with multiprocessing.Pool(given.processes) as pool:
-        for (_, _, room, heavy, n_places, _, _), held in pool.imap(cell, jobs):
-            for (figure, method), hits in held.items():
+    with tempfile.TemporaryDirectory() as unkept, multiprocessing.Pool(given.processes) as pool:
+        keep = given.keep or unkept
+        os.makedirs(keep, exist_ok=True)
+        cells = [Cell(given.cli, given.rooms_folder, room, heavy, n_places, given.tables, tuned, keep)
+                 for n_places in map(int, given.places.split(",")) for tuned in ((False, True) if n_places == 60 else (False,))
+                 for room in given.rooms.split(",") for heavy in (False, True)]
+        shares = {}
+        print("| places | room | placing | figure | tables | intervals that hold the truth |\n|---|---|---|---|---|---|")
+        for cell, tables in pool.imap(tables_of, cells):
+            for (figure, method), hits in holding(tables).items():
                 share = sum(hits) / len(hits)
                 shares.setdefault(figure, []).append(share)
-                print(f"| {n_places} | {room} | {'gross slips' if heavy else 'calm'} | {figure} of {method} | {len(hits)} | "
-                      f"{share:.3f} |", flush=True)
+                print(f"| {cell.n_places} | {cell.room} | {cell.placing()} | {figure} of {method} | {len(hits)} | {share:.3f} |",
+                      flush=True)
     for figure, values in shares.items():
         inside = sum(0.85 <= value <= 0.95 for value in values)
         print(f"\n{figure}: mean {sum(values) / len(values):.3f}, least {min(values):.2f}, largest {max(values):.2f}; "
