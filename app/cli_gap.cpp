@@ -130,7 +130,8 @@ Outcome runDiagnose(const DiagnoseOptions& options, const CommonOptions& common)
     answer.text += "Page written to " + options.html + "\n";
   }
   if (!options.updated_scene.empty()) {
-    const simulation::Scene updated = gap::updatedScene(input->scene.value_or(simulation::Scene{}), *report);
+    const simulation::Scene updated =
+        gap::updatedScene(input->scene.value_or(simulation::Scene{}), input->table.metadata, *report);
     if (const auto written = writeScene(options.updated_scene, updated); !written) return notPossible(written.error());
     answer.text +=
         "Scene with " + std::to_string(updated.effects.size()) + " effects written to " + options.updated_scene + "\n";

@@ -269,8 +269,15 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
   return diagnoseRows(std::move(cleaned), table.metadata, samples, scene, options, {}, control);
 }
 
-simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report) {
+simulation::Scene updatedScene(const simulation::Scene& scene, const TableMetadata& recording,
+                               const GapReport& report) {
   simulation::Scene updated = scene;
+  constexpr double kMostOfScene = 1.0;  // Metre or radian.
+  const auto takeOver = [](std::optional<double> stated, double& tolerance) {
+    if (stated && *stated <= kMostOfScene) tolerance = *stated;
+  };
+  takeOver(recording.jig_tolerance_m, updated.rig.tolerance_m);
+  takeOver(recording.jig_tolerance_rad, updated.rig.tolerance_rad);
   updated.reference_from_tracker = inverse(report.tracker_from_reference);
   updated.mount_from_sensor = inverse(report.sensor_from_mount);
   for (const SelectedEffect& effect : report.selected)

@@ -33,7 +33,8 @@ struct DiagnosisOptions {
 Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
                            const DiagnosisOptions& options = {}, const RunControl& control = {});
 
-/// The scene with the selected effects of a report added; the transmitter's pose and signal effects are taken over too.
-simulation::Scene updatedScene(const simulation::Scene& scene, const GapReport& report);
+/// The scene with the selected effects of a report added; the transmitter's pose and signal effects are taken over too,
+/// and the rig's tolerances where the recording states some that a scene can hold.
+simulation::Scene updatedScene(const simulation::Scene& scene, const TableMetadata& recording, const GapReport& report);
 
 }  // namespace fieldtrue::gap

@@ -38,7 +38,8 @@ class CliGapTest : public QObject {
 
   void metalIsFoundAddedAndGone() {
     FT_VERIFY_STATUS(simulated("metal.scene.json", "metal", 1), 0);
-    const CliRun first = diagnosed("metal", "clean.scene.json",
+    QVERIFY(writeWhole(at("ideal.scene.json"), R"({"schema": "fieldtrue.scene/1"})"));
+    const CliRun first = diagnosed("metal", "ideal.scene.json",
                                    {"--updated-scene", at("updated.scene.json"), "--html", at("metal.html")});
     FT_VERIFY_STATUS(first, 0);
     const json report = json::parse(readWhole(at("metal.gap.json")).toStdString());
@@ -72,6 +73,8 @@ class CliGapTest : public QObject {
     const auto updated = simulation::readScene(at("updated.scene.json").toStdString());
     FT_VERIFY_OK(updated);
     QCOMPARE(updated->effects.size(), std::size_t(1));
+    QCOMPARE(updated->rig.tolerance_m, 0.0005);  // As the recording states.
+    QCOMPARE(updated->rig.tolerance_rad, 0.001);
     FT_VERIFY_STATUS(simulated("updated.scene.json", "again", 2), 0);
     FT_VERIFY_STATUS(diagnosed("again", "updated.scene.json", {}), 0);
     const json again = json::parse(readWhole(at("again.gap.json")).toStdString());

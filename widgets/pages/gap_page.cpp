@@ -315,7 +315,7 @@ bool GapPage::canAdd() const {
 
 void GapPage::addToSimulation() {
   if (!canAdd()) return;
-  simulation::Scene updated = gap::updatedScene(scene_.value_or(simulation::Scene{}), *report_);
+  simulation::Scene updated = gap::updatedScene(scene_.value_or(simulation::Scene{}), table_.metadata, *report_);
   earlier_.push_back({std::move(scene_), std::move(report_)});
   scene_ = std::move(updated);
   report_.reset();

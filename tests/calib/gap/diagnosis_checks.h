@@ -43,7 +43,7 @@ inline Match names(const gap::GapReport& report, const std::string& effect) {
 
 /// The scene with what was found added makes recordings in which it finds no gap.
 inline Match isSettled(const gap::GapReport& report, const Withheld& made) {
-  const simulation::Scene updated = gap::updatedScene(made.believed, report);
+  const simulation::Scene updated = gap::updatedScene(made.believed, {}, report);
   const auto again = gap::diagnose(recordedIn(updated, made.plan, 7), nullptr, &updated);
   if (!again) return {false, QByteArray::fromStdString(again.error().message)};
   return {again->verdict == gap::GapVerdict::kNoGap, QByteArray::fromStdString(again->text)};
