@@ -23,17 +23,18 @@ std::size_t lineOf(const std::string& text, std::size_t byte) {
 }
 
 /// The beginning of a text that no bracket opens, as far as it can be printed: a file of another kind. Else empty.
-std::string otherBeginning(const std::string& text) {
+std::string otherBeginning(const std::string& text, JsonComments comments) {
   constexpr std::size_t kShown = 24;
+  const std::string of_json = comments == JsonComments::kSkipped ? "{[\"/" : "{[\"";
   const std::size_t first = text.find_first_not_of(" \t\r\n");
-  if (first == std::string::npos || text[first] == '{' || text[first] == '[') return {};
+  if (first == std::string::npos || of_json.find(text[first]) != std::string::npos) return {};
   const auto begin = text.begin() + static_cast<std::ptrdiff_t>(first);
   const auto end = begin + static_cast<std::ptrdiff_t>(std::min(kShown, text.size() - first));
   return {begin, std::find_if(begin, end, [](char c) { return c < ' ' || c > '~'; })};
 }
 
-std::string notJson(const std::string& text) {
-  const std::string beginning = otherBeginning(text);
+std::string notJson(const std::string& text, JsonComments comments) {
+  const std::string beginning = otherBeginning(text, comments);
   if (!beginning.empty())
     return "this is not valid JSON but a file of another kind: it begins with \"" + beginning + "\"";
   return "this is not valid JSON; look for a missing comma, quote or bracket there or just before, or for a file that "
@@ -50,7 +51,8 @@ Result<nlohmann::json> parseJson(const std::string& text, const std::string& nam
                                           " deep; no file of Fieldtrue is, so this is not one or it is damaged");
   } catch (const nlohmann::json::parse_error& e) {
     const std::size_t byte = e.byte == 0 ? 0 : e.byte - 1;
-    return fail(ErrorCode::kBadInput, name + ", line " + std::to_string(lineOf(text, byte)) + ": " + notJson(text));
+    return fail(ErrorCode::kBadInput,
+                name + ", line " + std::to_string(lineOf(text, byte)) + ": " + notJson(text, comments));
   } catch (const nlohmann::json::exception&) {
     return fail(ErrorCode::kBadInput, name + ": a number in it is too large to be read");
   }

@@ -39,7 +39,7 @@ std::string checkWord(const std::string& key, const std::string& value) {
   return {};
 }
 
-/// Of metres, radians and hertz alike: what is beyond was never measured, and its square may not be told.
+/// Of metres, radians and hertz alike: what is beyond was never measured, and its square may overflow.
 constexpr double kLargest = 1e9;
 
 /// @return what is wrong with the value, empty when nothing

@@ -226,7 +226,7 @@ QWidget* AcquirePage::makeInspector() {
   sensors_->hide();
   layout->addWidget(sensors_);
 
-  take_ = new QPushButton(icon(QStringLiteral("take"), theme().on_accent), QString(), inspector);
+  take_ = new QPushButton(icon(QStringLiteral("take"), theme().on_accent), tr("Take  (Space or Page Down)"), inspector);
   take_->setObjectName(QStringLiteral("take"));
   take_->setProperty("primary", true);
   take_->setFocusPolicy(Qt::TabFocus);
@@ -288,7 +288,8 @@ void AcquirePage::onTakeKey() {
 }
 
 void AcquirePage::takeOrGoOn() {
-  if (isDone(workbench_.status()))
+  const acquisition::AcquisitionStatus& status = workbench_.status();
+  if (isDone(status) && status.session->path == workbench_.sessionPath())
     workbench_.goToPage(QStringLiteral("compare"));
   else
     workbench_.take();

@@ -315,12 +315,12 @@ std::vector<ExportPage::File> ExportPage::files() const {
   if (several.size() > 1) {
     std::vector<File> files;
     for (const ExportTarget* target : several)
-      files.push_back({path_->text() + QLatin1Char('/') + suggestedName(*target), target});
+      files.push_back({path_->text().trimmed() + QLatin1Char('/') + suggestedName(*target), target});
     return files;
   }
   const ExportTarget* target = several.empty() ? chosen() : several.front();
   if (!target) return {};
-  return {{path_->text(), target}};
+  return {{path_->text().trimmed(), target}};
 }
 
 /// What is amiss with the place to write to; empty when nothing is.

@@ -63,6 +63,12 @@ class JsonTextTest : public QObject {
     const auto table = parseJson("\n  node,x_true_m,y_true_m\n0,0,0\n", "a.csv");
     QVERIFY(!table);
     FT_VERIFY_MATCH(holdsAll(table.error().message, {"a.csv, line 2", "another kind", "\"node,x_true_m,y_true_m\""}));
+    const auto remarked = parseJson("// Lab 2\n{\"a\": 1\n\"b\": 2}", "a.json", JsonComments::kSkipped);
+    QVERIFY(!remarked);
+    FT_VERIFY_MATCH(holdsAll(remarked.error().message, {"a.json, line 3", "missing comma"}));
+    const auto unopened = parseJson("\"a\": 1}", "a.json");
+    QVERIFY(!unopened);
+    FT_VERIFY_MATCH(holdsAll(unopened.error().message, {"a.json, line 1", "bracket"}));
     const auto huge = parseJson("[1e999]", "a.json");
     QVERIFY(!huge);
     FT_VERIFY_MATCH(holdsAll(huge.error().message, {"a.json", "too large"}));
