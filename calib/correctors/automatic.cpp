@@ -45,6 +45,7 @@ class AutomaticModel : public PositionModel {
     return model_->uncertainty_m(p_tracked_m);
   }
   bool covers(const Eigen::Vector3d& p_tracked_m) const override { return model_->covers(p_tracked_m); }
+  int coefficients() const override { return model_->coefficients(); }
   std::string note() const override {
     const std::string own = model_->note();
     return note_ + (own.empty() ? "" : " " + own);

@@ -76,8 +76,9 @@ using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const s
 
 /// How a candidate's models without some rows are made: downdated from one fit, or fitted anew where a fit is tuned.
 Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData& data, const RunControl& control) {
-  if (candidate.method->holdsOutExactly(candidate.settings)) {
-    FT_TRY(auto fits, candidate.method->hold_out(data, candidate.settings, control));
+  const PositionMethod& method = *candidate.method;
+  if (method.holdsOutExactly(candidate.settings) && method.canHoldOut(data, candidate.settings)) {
+    FT_TRY(auto fits, method.hold_out(data, candidate.settings, control));
     return [shared = std::shared_ptr<const HoldOutFits<PositionModel>>(std::move(fits))](
                const std::vector<std::size_t>& held_out) { return shared->without(held_out, Pose{}); };
   }

@@ -16,8 +16,8 @@
 
 namespace fieldtrue::correctors {
 
-/// Fits that leave rows out, from one factorisation of the fit to all rows. The methods that can are linear in their
-/// true values; settings chosen from the data stay as all rows chose them.
+/// Fits that leave rows out, taken off the fit to all rows instead of made anew. The methods that can are linear in
+/// their true values; settings chosen from the data stay as all rows chose them.
 template <class Model>
 class HoldOutFits {
  public:
@@ -76,6 +76,8 @@ struct CorrectionMethod {
   std::unique_ptr<Model> (*read)(const JsonReader& parameters) = nullptr;
   /// Fits with rows left out, without fitting anew; null where the method has no closed form.
   Result<std::unique_ptr<HoldOutFits<Model>>> (*hold_out)(const FitData&, const Settings&, const RunControl&) = nullptr;
+  /// Whether hold_out has a form for such data; null = for any.
+  bool (*holds_out)(const FitData&, const Settings&) = nullptr;
   /// The fits of hold_out keep lengths and weights that all rows gave, even with every setting told: only near to fits
   /// anew, so they stand where what all rows chose is kept anyway.
   bool keeps_scales = false;
@@ -91,6 +93,10 @@ struct CorrectionMethod {
 
   /// Whether hold_out gives what fits anew would.
   bool holdsOutExactly(const Settings& given) const { return hold_out != nullptr && !keeps_scales && !tunes(given); }
+
+  bool canHoldOut(const FitData& data, const Settings& given) const {
+    return hold_out != nullptr && (holds_out == nullptr || holds_out(data, given));
+  }
 
   bool isCostly() const { return cost != FitCost::kLight; }
 

@@ -23,6 +23,8 @@ class OrientationModel {
   virtual bool takesOrientation() const { return false; }
 
   virtual bool covers(const Eigen::Vector3d&) const { return true; }
+  /// As PositionModel::coefficients.
+  virtual int coefficients() const { return 0; }
   virtual std::string note() const { return {}; }
   virtual nlohmann::json parameters() const = 0;
 };

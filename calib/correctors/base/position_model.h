@@ -66,6 +66,9 @@ class PositionModel {
   /// can.
   virtual bool covers(const Eigen::Vector3d&) const { return true; }
 
+  /// Coefficients an axis that least squares took from the places; 0 where the fit is no such sum of terms.
+  virtual int coefficients() const { return 0; }
+
   /// What the user should know about this fit ("nodes lie in one plane: fitted in the plane"); empty when nothing.
   virtual std::string note() const { return {}; }
 

@@ -68,7 +68,7 @@ Result<std::unique_ptr<PositionModel>> fitTetrahedral(const FitData& data, const
       });
 }
 
-/// Leaves one place out at a time by filling the hole that it leaves between the tetrahedra of all.
+/// Leaves places out by filling the holes that they leave between the tetrahedra of all.
 class TetrahedralHoldOut : public HoldOutFits<PositionModel> {
  public:
   TetrahedralHoldOut(const FitData& data, Settings settings, Places places, Delaunay delaunay)
@@ -80,7 +80,7 @@ class TetrahedralHoldOut : public HoldOutFits<PositionModel> {
     for (Eigen::Vector3d& p_m : rest.p_true_m) p_m = fold_from_data * p_m;
     FT_TRY_VOID(checkVolume(rest, kName));
     const auto out = placesOfRows(places_, rows);
-    const auto cells = out && out->size() == 1 ? delaunay_.without(static_cast<int>(out->front())) : std::nullopt;
+    const auto cells = out ? delaunay_.without(*out) : std::nullopt;
     TetrahedralMesh mesh = cells ? TetrahedralMesh(places_.p_tracked_m, *cells) : TetrahedralMesh();
     if (mesh.size() == 0) return fitTetrahedral(rest, settings_, {});
     Places moved = places_;
@@ -95,10 +95,13 @@ class TetrahedralHoldOut : public HoldOutFits<PositionModel> {
   Delaunay delaunay_;
 };
 
+/// Cells of a grid are joined anew around what is missing.
+bool holdsOutTetrahedral(const FitData& data, const Settings& settings) {
+  return isByDelaunay(data, choiceSetting(settings, "split"));
+}
+
 Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutTetrahedral(const FitData& data, const Settings& settings,
                                                                        const RunControl&) {
-  if (!isByDelaunay(data, choiceSetting(settings, "split")))
-    return fail(ErrorCode::kUnsupported, std::string(kName) + " of a grid has no closed form");
   FT_TRY_VOID(checkVolume(data, kName));
   Places places = mergePlaces(data);
   FT_TRY(auto delaunay, Delaunay::of(places.p_tracked_m, kName));
@@ -121,6 +124,7 @@ PositionMethod tetrahedralPosition() {
           .fit = fitTetrahedral,
           .read = readTetrahedralPosition,
           .hold_out = holdOutTetrahedral,
+          .holds_out = holdsOutTetrahedral,
           .origin = MethodOrigin::kSurvey,
           .tries = {{"", simplicity::kInterpolating}}};
 }

@@ -84,35 +84,43 @@ Eigen::Vector3d Delaunay::at(int point) const {
   return Eigen::Map<const Eigen::Vector3d>(coordinates_.data() + 3 * static_cast<std::ptrdiff_t>(point));
 }
 
-std::optional<std::vector<Delaunay::Corners>> Delaunay::without(int point) const {
-  std::vector<Corners> left;
+/// @return false where the hole cannot be filled
+bool Delaunay::takeOut(int point, std::vector<Corners>& cells) const {
   std::vector<int> around;
-  for (const Corners& cell : tetrahedra_) {
-    if (std::find(cell.begin(), cell.end(), point) == cell.end())
-      left.push_back(cell);
-    else
+  const auto is_at_point = [&](const Corners& cell) {
+    return std::find(cell.begin(), cell.end(), point) != cell.end();
+  };
+  for (const Corners& cell : cells)
+    if (is_at_point(cell))
       std::copy_if(cell.begin(), cell.end(), std::back_inserter(around), [&](int c) { return c != point; });
-  }
+  cells.erase(std::remove_if(cells.begin(), cells.end(), is_at_point), cells.end());
   std::sort(around.begin(), around.end());
   around.erase(std::unique(around.begin(), around.end()), around.end());
-  if (around.size() < 4) return left;
+  if (around.size() < 4) return true;
   std::vector<double> coordinates;
   for (const int c : around)
     for (const double x : at(c)) coordinates.push_back(x);
-  const auto new_cells = triangulated(std::move(coordinates));
-  if (!new_cells) return std::nullopt;
+  const auto between = triangulated(std::move(coordinates));
+  if (!between) return false;
   // Of those between the points around, the ones in the hole are those that the point was in the way of.
-  for (const Corners& cell : *new_cells) {
+  for (const Corners& cell : *between) {
     Corners numbers{};
     std::array<Eigen::Vector3d, 4> from_point;
     for (std::size_t c = 0; c < 4; ++c) {
       numbers[c] = around[static_cast<std::size_t>(cell[c])];
       from_point[c] = at(numbers[c]) - at(point);
     }
-    if (ballHoldsOrigin(from_point)) left.push_back(numbers);
+    if (ballHoldsOrigin(from_point)) cells.push_back(numbers);
   }
-  std::sort(left.begin(), left.end());
-  return left;
+  return true;
+}
+
+std::optional<std::vector<Delaunay::Corners>> Delaunay::without(std::span<const std::size_t> points) const {
+  std::vector<Corners> cells = tetrahedra_;
+  for (const std::size_t point : points)
+    if (!takeOut(static_cast<int>(point), cells)) return std::nullopt;
+  std::sort(cells.begin(), cells.end());
+  return cells;
 }
 
 }  // namespace fieldtrue::correctors

@@ -30,6 +30,7 @@ class EulerErrorRotation : public ErrorRotationModel {
   EulerErrorRotation(ErrorFrame frame, const Eigen::Quaterniond& q_reference, ChosenPolynomial angles)
       : ErrorRotationModel(frame), q_reference_(q_reference), angles_(std::move(angles)) {}
 
+  int coefficients() const override { return angles_.field.terms(); }
   std::string note() const override { return angles_.note(); }
 
  protected:

@@ -45,6 +45,7 @@ class PolynomialField {
 
   int dimension() const { return dimension_; }
   int degree() const { return degree_; }
+  int terms() const { return termCount(dimension_, degree_); }
   /// Ratio of smallest to largest pivot: near 1 well determined, below 1e-3 poorly.
   double pivotRatio() const { return pivot_ratio_; }
 

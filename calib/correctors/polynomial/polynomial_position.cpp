@@ -22,6 +22,7 @@ class PolynomialPosition : public PositionModel {
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
     return polynomial_.field.standardError(p_tracked_m);
   }
+  int coefficients() const override { return polynomial_.field.terms(); }
   std::string note() const override { return polynomial_.note(); }
   nlohmann::json parameters() const override { return polynomial_.toJson(); }
 

@@ -22,6 +22,7 @@ class PolynomialErrorRotation : public ErrorRotationModel {
   PolynomialErrorRotation(ErrorFrame frame, const Eigen::Quaterniond& q_reference, ChosenPolynomial vector_part)
       : ErrorRotationModel(frame), q_reference_(q_reference), vector_part_(std::move(vector_part)) {}
 
+  int coefficients() const override { return vector_part_.field.terms(); }
   std::string note() const override { return vector_part_.note(); }
 
  protected:

@@ -199,7 +199,8 @@ class AutomaticTest : public QObject {
 
   void innerScoresAreThoseOfRefits_data() {
     QTest::addColumn<QString>("id");
-    for (const char* id : {"none", "affine", "polynomial", "rbf", "gaussian_process"}) QTest::newRow(id) << id;
+    for (const char* id : {"none", "affine", "polynomial", "rbf", "gaussian_process", "tetrahedral"})
+      QTest::newRow(id) << id;
   }
   void innerScoresAreThoseOfRefits() {
     QFETCH(QString, id);
