@@ -111,16 +111,16 @@ void measureOrientation(const Corrector& first, const Corrector& second, const s
   to.angle_shared_deg = kDegPerRad * angleBetween_rad(shared, Eigen::Quaterniond::Identity());
 }
 
-PlaceErrors placeErrors(std::vector<double> errors_mm, bool is_tuned) {
+PlaceErrors placeErrors(std::vector<double> errors_mm, const FitFreedom& freedom) {
   PlaceErrors errors;
   errors.rms_mm = errors_mm.empty() ? 0.0 : rootMeanSquare(errors_mm);
-  errors.rms_90_mm = errors_mm.empty() ? Interval{} : rmsInterval90(errors_mm, is_tuned);
+  errors.rms_90_mm = errors_mm.empty() ? Interval{} : rmsInterval90(errors_mm, freedom);
   errors.mm = std::move(errors_mm);
   return errors;
 }
 
 PlaceErrors ownErrors(const MethodScore* score) {
-  return score ? placeErrors(score->place_errors, score->is_tuned) : PlaceErrors{};
+  return score ? placeErrors(score->place_errors, score->freedom) : PlaceErrors{};
 }
 
 struct PlaceError {
@@ -170,7 +170,7 @@ void measureAtPlaces(const Corrector& first, const Corrector& second, const Meth
     first_mm.push_back(found->second.mm);
     second_mm.push_back(second_score.place_errors[k]);
   }
-  to.first_at_second = placeErrors(std::move(first_mm), false);
+  to.first_at_second = placeErrors(std::move(first_mm), {});
   const std::vector<double>& at_mm = to.first_at_second.mm;
   const double most_own_mm = to.first_own.mm.empty() ? INFINITY : largest(to.first_own.mm);
   const auto n_above = [&](double limit_mm) {

@@ -67,7 +67,7 @@ FittedCandidate fittedCandidate(std::unique_ptr<Model> owned) {
         return model->covers(node.tracker_from_sensor.position_m) ? evaluateOnce(*model, node.tracker_from_sensor)
                                                                   : 0.0;
       },
-      model->note()};
+      model->note(), model->coefficients()};
 }
 
 template <class Model>
@@ -90,6 +90,9 @@ Candidate makeCandidate(const correctors::CorrectionMethod<Model>& method, Setti
     candidate.hold_out = [&method, settings](const correctors::FitData& data, const RunControl& control) {
       return method.hold_out(data, settings, control).map(fitWithout<Model>);
     };
+  candidate.holds_out = [&method, settings](const correctors::FitData& data) {
+    return method.canHoldOut(data, settings);
+  };
   candidate.fit = [&method, settings = std::move(settings)](const correctors::FitData& data,
                                                             const RunControl& control) {
     return method.fit(data, settings, control).map(fittedCandidate<Model>);
@@ -140,8 +143,10 @@ Result<FittedCandidate> fitSensorsApart(const Candidate& candidate, std::span<co
   }
   if (fits.empty()) return fail(ErrorCode::kTooFewNodes, "There are no rows to fit");
   FittedCandidate all;
-  for (const auto& [sensor, fitted] : fits)
+  for (const auto& [sensor, fitted] : fits) {
+    all.coefficients += fitted.coefficients;
     if (!fitted.note.empty()) all.note += (all.note.empty() ? "" : " ") + fitted.note;
+  }
   const auto shared = std::make_shared<const std::map<int, FittedCandidate>>(std::move(fits));
   const auto of = [shared](const Node& node) -> const FittedCandidate& {
     const auto found = shared->find(node.sensor);

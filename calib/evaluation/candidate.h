@@ -24,6 +24,7 @@ struct FittedCandidate {
   std::function<RowScore(const Node&, const calibration::Alignment&)> score;
   std::function<double(const Node&)> evaluate;  ///< One evaluation, for timing; the value means nothing.
   std::string note;
+  int coefficients = 0;  ///< @see PositionModel::coefficients; of all sensors where each has its own.
 };
 
 /// Fits of one candidate that leave rows out. @see HoldOutFits
@@ -37,9 +38,10 @@ struct Candidate {
   bool is_position = true;
   std::function<Result<FittedCandidate>(const correctors::FitData&, const RunControl&)> fit;
   std::function<Result<FitWithout>(const correctors::FitData&, const RunControl&)>
-      hold_out;            ///< Empty without a closed form.
-  bool is_costly = false;  ///< Held out in ten folds at most.
-  bool is_tuned = false;   ///< @see CorrectionMethod::tunes
+      hold_out;                                               ///< Empty without a closed form.
+  std::function<bool(const correctors::FitData&)> holds_out;  ///< Whether there is one for such data; with hold_out.
+  bool is_costly = false;                                     ///< Held out in ten folds at most.
+  bool is_tuned = false;                                      ///< @see CorrectionMethod::tunes
 };
 
 /// The candidates that texts name; all of the registry with default settings when there are none.

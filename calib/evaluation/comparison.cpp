@@ -24,11 +24,11 @@ namespace {
 
 /// Statistics over the places at the edge, or over the others; none where there are none.
 std::optional<ErrorStats> statsWhere(const std::vector<double>& errors, const std::vector<bool>& is_edge, bool wanted,
-                                     bool is_tuned) {
+                                     const FitFreedom& freedom) {
   std::vector<double> some;
   for (std::size_t i = 0; i < errors.size(); ++i)
     if (is_edge[i] == wanted) some.push_back(errors[i]);
-  return some.empty() ? std::nullopt : std::optional(errorStats(some, is_tuned));
+  return some.empty() ? std::nullopt : std::optional(errorStats(some, freedom));
 }
 
 /// The places' errors of one candidate, with what its fits told.
@@ -39,17 +39,17 @@ MethodScore methodScore(const Candidate& candidate, CandidateScores scores, cons
   score.settings = candidate.settings;
   score.skipped = std::move(scores.skipped);
   if (score.skipped) return score;
-  score.sensors = scoresBySensor(scored, scores.held_out, candidate.is_tuned);
+  score.freedom = {scores.coefficients_a_place, candidate.is_tuned};
+  score.sensors = scoresBySensor(scored, scores.held_out, score.freedom);
   PlaceScores held_out = gatherByPlace(places, scored, scores.held_out);
-  score.stats = errorStats(held_out.errors, candidate.is_tuned);
-  score.inside = statsWhere(held_out.errors, is_edge, false, candidate.is_tuned);
-  score.edge = statsWhere(held_out.errors, is_edge, true, candidate.is_tuned);
+  score.stats = errorStats(held_out.errors, score.freedom);
+  score.inside = statsWhere(held_out.errors, is_edge, false, score.freedom);
+  score.edge = statsWhere(held_out.errors, is_edge, true, score.freedom);
   score.n_uncovered = static_cast<int>(std::count(held_out.covered.begin(), held_out.covered.end(), false));
   score.place_errors = std::move(held_out.errors);
   score.place_covered = std::move(held_out.covered);
   if (candidate.is_position) score.residual_m = std::move(held_out.residual_m);
   score.validated = scores.validated;
-  score.is_tuned = candidate.is_tuned;
   score.tuned_inside = scores.tuned_inside;
   score.n_folds = scores.n_folds;
   score.closed_form = scores.closed_form;
@@ -88,7 +88,7 @@ void scoreMethods(const HeldOutJob& job, HeldOutScores& held_out, const std::vec
 
 void scoreBefore(const HeldOutJob& job, const HeldOutScores& held_out, const std::vector<Node>& scored,
                  Comparison& comparison) {
-  comparison.before_sensors = scoresBySensor(scored, held_out.before_position, false);
+  comparison.before_sensors = scoresBySensor(scored, held_out.before_position, {});
   PlaceScores position = gatherByPlace(comparison.places, scored, held_out.before_position);
   comparison.before_position_mm = errorStats(position.errors);
   comparison.before_place_mm = std::move(position.errors);

@@ -74,8 +74,8 @@ struct MethodScore {
   double rms_to_best = 0;    ///< RMS minus the best method's, mm or deg, with its paired 90 % interval.
   double rms_to_best_low90 = 0;
   double rms_to_best_high90 = 0;
-  Validation validated;                ///< What it was scored with; not the comparison's for a costly method under loo.
-  bool is_tuned = false;               ///< @see CorrectionMethod::tunes
+  Validation validated;  ///< What it was scored with; not the comparison's for a costly method under loo.
+  FitFreedom freedom;
   bool tuned_inside = true;            ///< Its fits chose nothing from the places they were scored on.
   int n_folds = 0;                     ///< Fits that were scored; fewer than asked for a costly method.
   bool closed_form = false;            ///< Held out by downdating one fit rather than by fitting anew.
@@ -120,7 +120,7 @@ inline bool isApart(const std::optional<SensorSplit>& split) { return split && s
 
 /// @param places node numbers, before and after in the same order; fewer than 3 never pass
 GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
-                  bool is_tuned = false);
+                  const FitFreedom& freedom = {});
 
 struct Verdict {
   bool apply_position = false;

@@ -107,9 +107,11 @@ void runClosedForm(Run& run, std::size_t i, ProgressMeter& meter, double share) 
 /// Whether the folds are taken off one fit. The closed form must be able to follow the alignment of each fold: it moves
 /// the true positions, while an orientation's truth is turned by the mounting too. What a fit is tuned to stays as all
 /// rows chose it, so only where refits would be as many as places is that accepted, and told.
-bool hasClosedForm(const HeldOutJob& job, const Candidate& candidate) {
+bool hasClosedForm(const Run& run, const Candidate& candidate) {
+  const HeldOutJob& job = run.job;
+  if (!candidate.hold_out || !candidate.holds_out(run.all_data)) return false;
   if (candidate.is_tuned && job.validation.kind != ValidationKind::kLeaveOneOut) return false;
-  return candidate.hold_out && (candidate.is_position || job.align == calibration::AlignMode::kNone);
+  return candidate.is_position || job.align == calibration::AlignMode::kNone;
 }
 
 bool isTooCostly(const HeldOutJob& job, const Candidate& candidate) {
@@ -155,7 +157,7 @@ Result<std::vector<Task>> makeTasks(Run& run, ProgressMeter& meter) {
     if (scores.skipped) continue;
     const Candidate& candidate = run.job.candidates[i];
     scores.n_folds = static_cast<int>(run.job.folds.size());
-    if (hasClosedForm(run.job, candidate)) {
+    if (hasClosedForm(run, candidate)) {
       closed.push_back(i);
     } else if (isTooCostly(run.job, candidate)) {
       FT_TRY_VOID(addCostly(run, i, meter, tasks));
@@ -184,7 +186,7 @@ double totalCost_s(const Run& run) {
     const CandidateScores& scores = run.scores.candidates[i];
     if (scores.skipped) continue;
     const Candidate& candidate = run.job.candidates[i];
-    const double n_fits = hasClosedForm(run.job, candidate) ? 3.0
+    const double n_fits = hasClosedForm(run, candidate)     ? 3.0
                           : isTooCostly(run.job, candidate) ? kCostlyFolds
                                                             : static_cast<double>(run.job.folds.size());
     total_s += n_fits * scores.fit_s;

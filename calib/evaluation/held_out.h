@@ -21,6 +21,7 @@ struct CandidateScores {
   bool tuned_inside = true;            ///< Nothing that its fits chose from the data came from the rows scored.
   int n_folds = 0;
   bool closed_form = false;
+  double coefficients_a_place = 0.0;  ///< @see FitFreedom
   double fit_s = 0.0;
   double eval_ns = 0.0;
   double in_sample_rms = 0.0;

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "calib/calibration/alignment.h"
+#include "calib/correctors/base/fit_checks.h"
 #include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/held_out_job.h"
 #include "calib/evaluation/place_scores.h"
@@ -63,6 +64,8 @@ CandidateScores fitInSample(const HeldOutJob& job, const Candidate& candidate, c
   if (job.validation.kind == ValidationKind::kRole) {
     scores.held_out = scoreRows(rowsOf(job, job.scored), alignment, model->score);
     scores.n_folds = 1;
+  } else {
+    scores.coefficients_a_place = model->coefficients / static_cast<double>(correctors::mergePlaces(data).size());
   }
   return scores;
 }

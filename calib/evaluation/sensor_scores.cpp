@@ -8,7 +8,8 @@
 
 namespace fieldtrue::evaluation {
 
-std::vector<SensorScore> scoresBySensor(std::span<const Node> nodes, std::span<const RowScore> scores, bool is_tuned) {
+std::vector<SensorScore> scoresBySensor(std::span<const Node> nodes, std::span<const RowScore> scores,
+                                        const FitFreedom& freedom) {
   struct Rows {
     std::vector<Node> nodes;
     std::vector<RowScore> scores;
@@ -26,7 +27,7 @@ std::vector<SensorScore> scoresBySensor(std::span<const Node> nodes, std::span<c
     score.sensor = sensor;
     score.places = placesOf(rows.nodes);
     score.place_errors = gatherByPlace(score.places, rows.nodes, rows.scores).errors;
-    score.stats = errorStats(score.place_errors, is_tuned);
+    score.stats = errorStats(score.place_errors, freedom);
     all.push_back(std::move(score));
   }
   return all;

@@ -10,6 +10,7 @@
 namespace fieldtrue::evaluation {
 
 /// Scores of rows, gathered by sensor and place; empty where all rows are of one sensor.
-std::vector<SensorScore> scoresBySensor(std::span<const Node> nodes, std::span<const RowScore> scores, bool is_tuned);
+std::vector<SensorScore> scoresBySensor(std::span<const Node> nodes, std::span<const RowScore> scores,
+                                        const FitFreedom& freedom);
 
 }  // namespace fieldtrue::evaluation

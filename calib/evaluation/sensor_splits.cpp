@@ -98,7 +98,7 @@ SensorSplit splitOf(const Comparison& together, const Comparison& apart, bool of
         pairedDifference(inShares(separate.sensors, shared.sensors), inShares(shared.sensors, shared.sensors));
     split.is_better = split.is_better || split.separate_less_shared_in_shares.high90 < -kTie;
   }
-  split.gain = testGain(apart.places, before, separate.place_errors, separate.is_tuned);
+  split.gain = testGain(apart.places, before, separate.place_errors, separate.freedom);
   split.before = rootMeanSquare(before);
   split.after = separate.place_errors;
   const char* unit = of_position ? "mm" : "degrees";

@@ -161,11 +161,11 @@ std::string orientationText(const Comparison& comparison) {
 }  // namespace
 
 GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
-                  bool is_tuned) {
+                  const FitFreedom& freedom) {
   FT_CHECK(places.size() == before.size() && before.size() == after.size());
   GainTest test;
   if (places.empty()) return test;
-  const PairedGain all = pairedGain(before, after, is_tuned);
+  const PairedGain all = pairedGain(before, after, freedom);
   test.gain = all.gain;
   test.low90 = all.low90;
   test.high90 = all.high90;
@@ -176,7 +176,7 @@ GainTest testGain(const std::vector<int>& places, const std::vector<double>& bef
     errors.erase(errors.begin() + static_cast<std::ptrdiff_t>(worst));
     return errors;
   };
-  const PairedGain rest = pairedGain(without(before), without(after), is_tuned);
+  const PairedGain rest = pairedGain(without(before), without(after), freedom);
   test.gain_without_worst_place = rest.gain;
   test.low90_without_worst_place = rest.low90;
   test.apply = all.low90 > 0.0 && all.gain >= kNeededGain && rest.low90 > 0.0 && rest.gain >= kNeededGain;
@@ -206,7 +206,7 @@ void pickBest(Comparison& comparison) {
   if (const auto row = comparison.best_position_row) {
     const MethodScore& best = comparison.position[*row];
     comparison.best_position = best.method;
-    judgePosition(verdict, testGain(comparison.places, comparison.before_place_mm, best.place_errors, best.is_tuned));
+    judgePosition(verdict, testGain(comparison.places, comparison.before_place_mm, best.place_errors, best.freedom));
     trueness.after_position_mm = excessError(best.stats.rms, comparison.floor_position_mm);
   }
   if (comparison.before_orientation_deg) {
@@ -219,7 +219,7 @@ void pickBest(Comparison& comparison) {
   if (const auto row = comparison.best_orientation_row) {
     const MethodScore& best = comparison.orientation[*row];
     comparison.best_orientation = best.method;
-    verdict.orientation = testGain(comparison.places, comparison.before_place_deg, best.place_errors, best.is_tuned);
+    verdict.orientation = testGain(comparison.places, comparison.before_place_deg, best.place_errors, best.freedom);
     trueness.after_orientation_deg = excessError(best.stats.rms, comparison.floor_orientation_deg);
   }
   tellDistanceToBest(comparison.position, comparison.best_position_row, comparison.before_place_mm);

@@ -2,7 +2,7 @@
 """How often the 90 % intervals of `compare` hold the truth they are about.
 
 interval_coverage.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 30,60,120,567] [--rooms a,b] [--processes N]
-                     [--keep FOLDER]
+                     [--keep FOLDER [--again]]
 
 Of every room thousands of places are recorded without noise, scattered evenly over its box. Tables are drawn from
 them; each stated position is then moved as a hand misplaces a jig, calm (Gaussian of 2 mm an axis) or with gross
@@ -11,11 +11,12 @@ its interval. The truth is this script's own: the calibration that `fit` makes o
 places for each of the table's (3,000 at least) that no table holds, and the mean square of what is left, plus the
 known mean square of the misplacing, is what the interval should hold: the RMS of this fitted correction at fresh
 places like those of the table. Untuned methods are left out one by one, at all sizes; the tuned ones stand in tables
-of 60 with ten folds. Printed: the share of tables whose interval holds the truth, by cell, with the least and the
-largest.
+of 60 with ten folds. Printed: the share of tables whose interval holds the truth, by cell, and mean, least and
+largest over the cells of a size.
 """
 import argparse
 import csv
+import functools
 import json
 import math
 import multiprocessing
@@ -117,18 +118,17 @@ def fresh_mean_square_m2(cli, table, method, fresh, folder):
     return math.fsum(square_m2) / len(square_m2)
 
 
-def judged_table(cli, table, methods, fresh, folder, misplaced_m2):
-    """What `compare` says of a table, and the truths that its intervals should hold."""
+def judged_table(cli, table, methods, truths_mm):
+    """What `compare` says of a table, beside the truths that its intervals should hold.
+
+    truths_mm: method -> RMS of its correction at fresh places
+    """
     judged = json.loads(run(cli, "compare", "--nodes", table, "--methods", ",".join(methods), "--json"))
     assert judged["validate"] == ("kfold:10" if methods is TUNED else "loo")
-    scores = {}
-    for method, score in zip(methods, judged["position"]):
-        if score["skipped"]:
-            continue
-        square_m2 = fresh_mean_square_m2(cli, table, method, fresh, folder) + misplaced_m2
-        scores[method] = {"truth": 1000 * math.sqrt(square_m2), "is_best": score["method"] == judged["best"]["position"],
-                          **{end: score["position_mm"][f"rms_{end}90"] for end in ("low", "high")},
-                          "place_mm": score["place_mm"]}
+    scores = {method: {"truth": truths_mm(method), "is_best": score["method"] == judged["best"]["position"],
+                       **{end: score["position_mm"][f"rms_{end}90"] for end in ("low", "high")},
+                       "place_mm": score["place_mm"]}
+              for method, score in zip(methods, judged["position"]) if not score["skipped"]}
     return {"scores": scores, "gain": {end: judged["verdict"][f"gain_{end}90"] for end in ("low", "high")}}
 
 
@@ -143,6 +143,7 @@ class Cell(typing.NamedTuple):
     n_tables: int
     tuned: bool
     keep: str
+    again: bool
 
     def placing(self):
         return "gross slips" if self.heavy else "calm"
@@ -151,28 +152,46 @@ class Cell(typing.NamedTuple):
         return f"{self.n_places} {self.room} {self.placing()}{' tuned' if self.tuned else ''}".replace(" ", "_")
 
 
+def kept_tables(path):
+    """Whole lines of a file, as what they hold."""
+    if not os.path.exists(path):
+        return []
+    with open(path, encoding="utf-8") as text:
+        return [json.loads(line) for line in text if line.endswith("\n")]
+
+
 def tables_of(cell):
-    """[what judged_table returned], from what is kept as far as that goes."""
+    """[what judged_table returned], from what is kept as far as that goes; nothing that is kept is lost."""
     path = os.path.join(cell.keep, f"{cell.name()}.jsonl")
-    kept = []
-    if os.path.exists(path):
-        with open(path, encoding="utf-8") as text:
-            kept = [line for line in text if line.endswith("\n")][:cell.n_tables]
-    if len(kept) < cell.n_tables:
-        with tempfile.TemporaryDirectory() as folder, open(path, "w", encoding="utf-8") as out:
-            out.writelines(kept)
+    growing = path + ".again" if cell.again else path
+    kept, tables = kept_tables(path), kept_tables(growing)
+    if len(tables) < cell.n_tables:
+        with open(growing + ".new", "w", encoding="utf-8") as out:
+            out.writelines(json.dumps(table) + "\n" for table in tables)
+        os.replace(growing + ".new", growing)
+        with tempfile.TemporaryDirectory() as folder, open(growing, "a", encoding="utf-8") as out:
             head, rows = record(cell.cli, cell.rooms, cell.room, folder, max(FEWEST_FRESH, FRESH_A_PLACE * cell.n_places))
             rows = [{name: text for name, text in row.items() if name in COLUMNS} for row in rows]
             fresh, table = os.path.join(folder, "fresh.csv"), os.path.join(folder, "table.nodes.csv")
             write(fresh, head, rows[POOL:])
             misplacing = Misplacing(cell.heavy)
-            for number in range(len(kept), cell.n_tables):
+
+            def truth_mm(method, number):
+                known = kept[number]["scores"].get(method) if number < len(kept) else None
+                if known:
+                    return known["truth"]
+                square_m2 = fresh_mean_square_m2(cell.cli, table, method, fresh, folder)
+                return 1000 * math.sqrt(square_m2 + misplacing.mean_square_m2())
+
+            for number in range(len(tables), cell.n_tables):
                 write(table, head, drawn_table(rows, cell.n_places, random.Random(f"{cell.name()} {number}"), misplacing))
-                kept.append(json.dumps(judged_table(cell.cli, table, TUNED if cell.tuned else UNTUNED, fresh, folder,
-                                                    misplacing.mean_square_m2())) + "\n")
-                out.write(kept[-1])
+                tables.append(judged_table(cell.cli, table, TUNED if cell.tuned else UNTUNED,
+                                           functools.partial(truth_mm, number=number)))
+                out.write(json.dumps(tables[-1]) + "\n")
                 out.flush()
-    return cell, [json.loads(line) for line in kept]
+    if cell.again and len(tables) >= len(kept):
+        os.replace(growing, path)
+    return cell, tables[:cell.n_tables]
 
 
 def holding(tables):
@@ -188,6 +207,12 @@ def holding(tables):
     return held
 
 
+def cells_of(given, keep):
+    return [Cell(given.cli, given.rooms_folder, room, heavy, n_places, given.tables, tuned, keep, given.again)
+            for n_places in map(int, given.places.split(",")) for tuned in ((False, True) if n_places == 60 else (False,))
+            for room in given.rooms.split(",") for heavy in (False, True)]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cli")
@@ -197,25 +222,23 @@ def main():
     parser.add_argument("--rooms", default="steel_floor,mixed")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--keep", help="folder of a line a table; a run that was ended goes on from there")
+    parser.add_argument("--again", action="store_true",
+                        help="judge kept tables anew: the intervals have changed, the fits have not")
     given = parser.parse_args()
+    shares = {}
+    print("| places | room | placing | figure | tables | intervals that hold the truth |\n|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as unkept, multiprocessing.Pool(given.processes) as pool:
-        keep = given.keep or unkept
-        os.makedirs(keep, exist_ok=True)
-        cells = [Cell(given.cli, given.rooms_folder, room, heavy, n_places, given.tables, tuned, keep)
-                 for n_places in map(int, given.places.split(",")) for tuned in ((False, True) if n_places == 60 else (False,))
-                 for room in given.rooms.split(",") for heavy in (False, True)]
-        shares = {}
-        print("| places | room | placing | figure | tables | intervals that hold the truth |\n|---|---|---|---|---|---|")
-        for cell, tables in pool.imap(tables_of, cells):
+        os.makedirs(given.keep or unkept, exist_ok=True)
+        for cell, tables in pool.imap(tables_of, cells_of(given, given.keep or unkept), chunksize=1):
             for (figure, method), hits in holding(tables).items():
                 share = sum(hits) / len(hits)
-                shares.setdefault(figure, []).append(share)
+                shares.setdefault((figure, cell.n_places, "tuned" if cell.tuned else "untuned"), []).append(share)
                 print(f"| {cell.n_places} | {cell.room} | {cell.placing()} | {figure} of {method} | {len(hits)} | {share:.3f} |",
                       flush=True)
-    for figure, values in shares.items():
-        inside = sum(0.85 <= value <= 0.95 for value in values)
-        print(f"\n{figure}: mean {sum(values) / len(values):.3f}, least {min(values):.2f}, largest {max(values):.2f}; "
-              f"{inside} of {len(values)} cells from 0.85 to 0.95")
+    print("\n| figure, places, methods | cells | mean | least | largest |\n|---|---|---|---|---|")
+    for (figure, n_places, kind), values in shares.items():
+        print(f"| {figure}, {n_places} places, {kind} | {len(values)} | {sum(values) / len(values):.3f} | {min(values):.3f} | "
+              f"{max(values):.3f} |")
 
 
 if __name__ == "__main__":

@@ -12,12 +12,13 @@
 namespace fieldtrue::evaluation {
 namespace {
 
-/// Widenings of the two sides, in 1/sqrt(n_e), and of a tuned method.
-constexpr double kBelow = 0.4;
-constexpr double kAbove = 1.4;
+/// Widening of a tuned method.
 constexpr double kTuned = 1.3;
-/// Of the end at which a gain is least, against Student's t of all places: it is that of the best of many methods.
+/// Of the end at which a gain is least, against Student's t of the free places: it is that of the best of many methods.
 constexpr double kLeastGain = 1.75;
+/// How much farther than t the upper end of a mean square lies, and both ends of a difference, in 1/sqrt(n_e).
+constexpr double kAbove = 1.0;
+constexpr double kAround = 1.4;
 
 double sumOfSquares(std::span<const double> values) {
   return std::inner_product(values.begin(), values.end(), values.begin(), 0.0);
@@ -59,21 +60,28 @@ double studentPoint95(double degrees) {
 
 namespace {
 
-/// How far a mean over places may be off: in SDs of the mean, to either side.
+/// How far a mean over places may be off: in SDs of the mean.
 struct Reach {
-  double below = 0.0;
-  double above = 0.0;
+  double t = 0.0;
+  double n_carrying = 0.0;
+
+  double beyond(double share) const { return t * (1.0 + share / std::sqrt(n_carrying)); }
 };
 
-/// @param relative what each place contributes, in units of the mean square
-Reach reach90(std::span<const double> relative) {
-  const double n_carrying = static_cast<double>(relative.size()) / (1.0 + sampleVariance(relative));
-  const double t = studentPoint95(0.5 * n_carrying);
-  return {t * (1.0 + kBelow / std::sqrt(n_carrying)), t * (1.0 + kAbove / std::sqrt(n_carrying))};
+/// Places less the coefficients of the fit.
+double freePlaces(std::size_t n_places, const FitFreedom& freedom) {
+  return std::max(1.0, static_cast<double>(n_places) * (1.0 - freedom.coefficients_a_place));
 }
 
-double sdOfMean(std::span<const double> values) {
-  return std::sqrt(sampleVariance(values) / static_cast<double>(values.size()));
+/// @param relative what each place contributes, in units of the mean square
+Reach reach90(std::span<const double> relative, const FitFreedom& freedom) {
+  const double n_carrying = freePlaces(relative.size(), freedom) / (1.0 + sampleVariance(relative));
+  return {studentPoint95(0.5 * n_carrying), n_carrying};
+}
+
+double sdOfMean(std::span<const double> values, const FitFreedom& freedom) {
+  const double widening = freedom.is_tuned ? kTuned : 1.0;
+  return widening * std::sqrt(sampleVariance(values) / freePlaces(values.size(), freedom));
 }
 
 double covariance(std::span<const double> a, std::span<const double> b) {
@@ -82,11 +90,11 @@ double covariance(std::span<const double> a, std::span<const double> b) {
   return 0.5 * (sampleVariance(sum) - sampleVariance(a) - sampleVariance(b));
 }
 
-/// The largest ratio r of two means, both 1 as seen, for which mean(a - r b) lies within `reach` SDs of zero; none
-/// where the mean of b does.
+/// The largest ratio r of two means, both 1 as seen, for which mean(a - r b) lies within `reach` SDs of a single place
+/// of zero; none where the mean of b does.
 /// @source Fieller 1954
 std::optional<double> fiellerRatio(std::span<const double> a, std::span<const double> b, double reach) {
-  const double scale = reach * reach / static_cast<double>(a.size());
+  const double scale = reach * reach;
   const std::vector<double> difference = differences(a, b);
   // With e = r - 1: e^2 = scale (var(a - b) - 2 e cov(a - b, b) + e^2 var b).
   const double square = 1.0 - scale * sampleVariance(b);
@@ -102,26 +110,27 @@ double rootMeanSquare(std::span<const double> values) {
   return values.empty() ? 0.0 : std::sqrt(sumOfSquares(values) / static_cast<double>(values.size()));
 }
 
-Interval rmsInterval90(std::span<const double> errors, bool is_tuned) {
+Interval rmsInterval90(std::span<const double> errors, const FitFreedom& freedom) {
   FT_CHECK(!errors.empty());
   if (errors.size() < 2) return {std::nan(""), std::nan("")};
   const double rms = rootMeanSquare(errors);
   const std::vector<double> relative = relativeSquares(errors);
-  const double sd = sdOfMean(relative) * (is_tuned ? kTuned : 1.0);
-  const Reach reach = reach90(relative);
-  return {rms * std::exp(-0.5 * reach.below * sd), rms * std::exp(0.5 * reach.above * sd)};
+  const double sd = sdOfMean(relative, freedom);
+  const Reach reach = reach90(relative, freedom);
+  return {rms * std::exp(-0.5 * reach.t * sd), rms * std::exp(0.5 * reach.beyond(kAbove) * sd)};
 }
 
-PairedGain pairedGain(std::span<const double> before, std::span<const double> after, bool is_tuned) {
+PairedGain pairedGain(std::span<const double> before, std::span<const double> after, const FitFreedom& freedom) {
   FT_CHECK(before.size() == after.size() && !before.empty());
   const double gain = gainOf(sumOfSquares(before), sumOfSquares(after));
   const std::vector<double> of_before = relativeSquares(before), of_after = relativeSquares(after);
   const std::vector<double> relative = differences(of_after, of_before);
-  const double sd = sdOfMean(relative) * (is_tuned ? kTuned : 1.0);
-  const double reach =
-      kLeastGain * (is_tuned ? kTuned : 1.0) * studentPoint95(static_cast<double>(before.size()) - 1.0);
-  const double most = fiellerRatio(of_after, of_before, reach).value_or(std::exp(reach * sd));
-  const double least = std::exp(-reach90(relative).above * sd);
+  const double sd = sdOfMean(relative, freedom);
+  const double n_free = freePlaces(before.size(), freedom);
+  const double reach = kLeastGain * studentPoint95(n_free - 1.0);
+  const double in_places = reach * (freedom.is_tuned ? kTuned : 1.0) / std::sqrt(n_free);
+  const double most = std::min(fiellerRatio(of_after, of_before, in_places).value_or(HUGE_VAL), std::exp(reach * sd));
+  const double least = std::exp(-reach90(relative, freedom).beyond(kAbove) * sd);
   return {gain, 1.0 - (1.0 - gain) * std::sqrt(most), 1.0 - (1.0 - gain) * std::sqrt(least)};
 }
 
@@ -130,11 +139,11 @@ PairedDifference pairedDifference(std::span<const double> errors, std::span<cons
   const double rms = rootMeanSquare(errors), best_rms = rootMeanSquare(of_best);
   std::vector<double> relative = relativeSquares(errors);
   std::vector<double> best_relative = relativeSquares(of_best);
-  const Reach reach = reach90(differences(relative, best_relative));
+  const Reach reach = reach90(differences(relative, best_relative), {});
   // d RMS = RMS/2 d log(mean square).
   for (double& value : relative) value *= 0.5 * rms;
   for (double& value : best_relative) value *= 0.5 * best_rms;
-  const double half = reach.above * sdOfMean(differences(relative, best_relative));
+  const double half = reach.beyond(kAround) * sdOfMean(differences(relative, best_relative), {});
   return {rms - best_rms, rms - best_rms - half, rms - best_rms + half};
 }
 

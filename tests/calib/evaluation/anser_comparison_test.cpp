@@ -54,7 +54,7 @@ double studentPoint95(double degrees) {
 }
 
 /// Low end of the gain's 90 % interval as the guide states it, by bisection.
-double lowGain(const std::vector<double>& before, const std::vector<double>& after, double widening) {
+double lowGain(const std::vector<double>& before, const std::vector<double>& after, const FitFreedom& freedom) {
   const auto n = static_cast<double>(before.size());
   const auto variance = [&](double of_after, double of_before, double mean) {
     double squares = 0.0;
@@ -63,19 +63,20 @@ double lowGain(const std::vector<double>& before, const std::vector<double>& aft
     return squares / (n - 1.0);
   };
   const double a_mean = std::pow(rms(after), 2), b_mean = std::pow(rms(before), 2);
-  const double reach = 1.75 * widening * studentPoint95(n - 1.0);
+  const double n_free = std::max(1.0, n * (1.0 - freedom.coefficients_a_place));
+  const double reach = 1.75 * (freedom.is_tuned ? 1.3 : 1.0) * studentPoint95(n_free - 1.0);
+  const double most = a_mean / b_mean * std::exp(reach * std::sqrt(variance(1.0 / a_mean, 1.0 / b_mean, 0.0) / n_free));
   double low = a_mean / b_mean, high = 1e4 * low;
   for (int i = 0; i < 200; ++i) {
     const double ratio = 0.5 * (low + high);
     const double mean = a_mean - ratio * b_mean;
-    (-mean <= reach * std::sqrt(variance(1.0, ratio, mean) / n) ? low : high) = ratio;
+    (-mean <= reach * std::sqrt(variance(1.0, ratio, mean) / n_free) ? low : high) = ratio;
   }
-  return 1.0 - std::sqrt(low);
+  return 1.0 - std::sqrt(std::min(low, most));
 }
 
 /// The rule of application, computed by itself from held-out errors.
-bool ruleSaysApply(const std::vector<double>& before, const std::vector<double>& after, bool is_tuned) {
-  const double widening = is_tuned ? 1.3 : 1.0;
+bool ruleSaysApply(const std::vector<double>& before, const std::vector<double>& after, const FitFreedom& freedom) {
   std::vector<double> lowest_before;
   std::vector<double> lowest_after;
   double lowest = HUGE_VAL;
@@ -89,8 +90,8 @@ bool ruleSaysApply(const std::vector<double>& before, const std::vector<double>&
     lowest_before = b;
     lowest_after = a;
   }
-  const double low_with = lowGain(before, after, widening);
-  const double low_without = lowGain(lowest_before, lowest_after, widening);
+  const double low_with = lowGain(before, after, freedom);
+  const double low_without = lowGain(lowest_before, lowest_after, freedom);
   if (gain(before, after) < 0.10 || lowest < 0.10) return false;
   return low_with > 0.0 && low_without > 0.0;
 }
@@ -149,7 +150,7 @@ class AnserComparisonTest : public QObject {
       for (const MethodScore& other : comparison->position)
         QVERIFY(other.skipped || other.stats.rms >= score.stats.rms - 1e-6);
       QCOMPARE(comparison->verdict.apply_position,
-               ruleSaysApply(comparison->before_place_mm, score.place_errors, score.is_tuned));
+               ruleSaysApply(comparison->before_place_mm, score.place_errors, score.freedom));
     } else {
       QVERIFY(!comparison->verdict.apply_position);
     }

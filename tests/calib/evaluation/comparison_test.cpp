@@ -81,6 +81,22 @@ std::vector<double> affineLeaveOneOut_mm(const CalibrationTable& table) {
 class ComparisonTest : public QObject {
   Q_OBJECT
  private slots:
+  /// An affine map takes 4 coefficients an axis and degree 3 takes 20, of 64 places; held-out validation places are
+  /// fresh, whatever was fitted to the others.
+  void whatAFitTookIsKnown() {
+    CalibrationTable table = bentTable();
+    const auto shareOf = [&](const char* method) {
+      const auto comparison = compareMethods(table, fewMethods());
+      return comparison ? scoreOf(comparison->position, method).freedom.coefficients_a_place : -1.0;
+    };
+    QCOMPARE(shareOf("affine"), 4.0 / 64.0);
+    QCOMPARE(shareOf("polynomial"), 20.0 / 64.0);
+    QCOMPARE(shareOf("none"), 0.0);
+    QCOMPARE(shareOf("hmq"), 0.0);
+    for (std::size_t i = 0; i < table.nodes.size(); i += 4) table.nodes[i].role = NodeRole::kValidation;
+    QCOMPARE(shareOf("affine"), 0.0);
+  }
+
   void leaveOneOutIsThatOfAnIndependentFit_data() {
     QTest::addColumn<QString>("align");
     QTest::newRow("none") << "none";

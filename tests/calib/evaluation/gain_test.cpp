@@ -67,16 +67,16 @@ class GainTestTest : public QObject {
     const double t_sd = 2.919986 / std::sqrt(8.0);
     const ErrorStats stats = errorStats(errors);
     FT_VERIFY_MATCH(near(stats.rms, 1.0, 1e-12));
-    FT_VERIFY_MATCH(near(stats.rms_low90, std::exp(-0.5 * t_sd * (1.0 + 0.4 / 2.0)), 1e-6));
-    FT_VERIFY_MATCH(near(stats.rms_high90, std::exp(0.5 * t_sd * (1.0 + 1.4 / 2.0)), 1e-6));
-    const ErrorStats tuned = errorStats(errors, true);
-    FT_VERIFY_MATCH(near(tuned.rms_high90, std::exp(1.3 * 0.5 * t_sd * (1.0 + 1.4 / 2.0)), 1e-6));
+    FT_VERIFY_MATCH(near(stats.rms_low90, std::exp(-0.5 * t_sd), 1e-6));
+    FT_VERIFY_MATCH(near(stats.rms_high90, std::exp(0.5 * t_sd * 1.5), 1e-6));
+    const ErrorStats tuned = errorStats(errors, {.is_tuned = true});
+    FT_VERIFY_MATCH(near(tuned.rms_high90, std::exp(1.3 * 0.5 * t_sd * 1.5), 1e-6));
     // Beside an error of 4 at each place, the ratio of mean squares varies as these do, and is linear in them; 1.894579
     // is the 95 % point of seven degrees of freedom.
     const GainTest gain = testGain(numbered(8), std::vector<double>(8, 4.0), errors);
     FT_VERIFY_MATCH(near(gain.gain, 0.75, 1e-12));
     FT_VERIFY_MATCH(near(gain.low90, 1.0 - 0.25 * std::sqrt(1.0 + 1.75 * 1.894579 / std::sqrt(8.0)), 1e-6));
-    FT_VERIFY_MATCH(near(gain.high90, 1.0 - 0.25 * std::exp(-0.5 * t_sd * 1.7), 1e-6));
+    FT_VERIFY_MATCH(near(gain.high90, 1.0 - 0.25 * std::exp(-0.5 * t_sd * 1.5), 1e-6));
     const PairedDifference difference = pairedDifference(errors, std::vector<double>(8, 4.0));
     FT_VERIFY_MATCH(near(difference.difference, -3.0, 1e-12));
     FT_VERIFY_MATCH(near(difference.high90, -3.0 + 0.5 * t_sd * 1.7, 1e-6));
@@ -95,6 +95,33 @@ class GainTestTest : public QObject {
       sum += std::pow(after[i] * after[i] - ratio * before[i] * before[i] - mean, 2) / 11.0;
     // 1.795885: Student's t, 95 %, eleven degrees of freedom, by the tables.
     FT_VERIFY_MATCH(near(-mean / std::sqrt(sum / 12.0), 1.75 * 1.795885, 1e-5));
+  }
+
+  /// Four coefficients of eight places leave four: two of them carry the mean square, and one degree of freedom has
+  /// 6.313752 for its 95 % point by the tables.
+  void coefficientsOfTheFitAreTakenOff() {
+    std::vector<double> errors;
+    for (int i = 0; i < 8; ++i) errors.push_back(std::sqrt(1.0 + (i % 2 == 0 ? 1.0 : -1.0) * std::sqrt(7.0 / 8.0)));
+    const double t_sd = 6.313752 / std::sqrt(4.0);
+    const ErrorStats stats = errorStats(errors, {.coefficients_a_place = 0.5});
+    FT_VERIFY_MATCH(near(stats.rms_low90, std::exp(-0.5 * t_sd), 1e-6));
+    FT_VERIFY_MATCH(near(stats.rms_high90, std::exp(0.5 * t_sd * (1.0 + 1.0 / std::sqrt(2.0))), 1e-4));
+  }
+
+  /// One place of twenty carries much of the error before: Fieller's bound is far off, or nowhere, and the low end is
+  /// that of the logarithm. Squares before are 9 and 1, their mean 1.4; after they are alike, so only those before
+  /// vary.
+  void fewPlacesThatCarryTheErrorLeaveALowEnd() {
+    std::vector<double> before(20, 1.0);
+    before[3] = 3.0;
+    const GainTest test = testGain(numbered(20), before, std::vector<double>(20, 0.5));
+    const double sd = (9.0 - 1.0) / 1.4 / std::sqrt(20.0) / std::sqrt(20.0);
+    // 1.729133: Student's t, 95 %, nineteen degrees of freedom, by the tables.
+    const double ratio = 0.25 / 1.4 * std::exp(1.75 * 1.729133 * sd);
+    FT_VERIFY_MATCH(near(test.low90, 1.0 - std::sqrt(ratio), 1e-6));
+    // Fieller's would be (1 + (sqrt(q) + q) / (1 - q)) times what is seen, q = T^2/20 times the variance: 7.4 times.
+    const double q = std::pow(1.75 * 1.729133, 2) * sd * sd;
+    QVERIFY(1.0 + (std::sqrt(q) + q) / (1.0 - q) > 3.0 * ratio / (0.25 / 1.4));
   }
 
   void oneErrorHasNoInterval() {
