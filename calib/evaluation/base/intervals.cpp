@@ -17,7 +17,7 @@ constexpr double kTuned = 1.3;
 /// Of the end at which a gain is least, against Student's t of the free places: it is that of the best of many methods.
 constexpr double kLeastGain = 1.75;
 /// How much farther than t the upper end of a mean square lies, and both ends of a difference, in 1/sqrt(n_e).
-constexpr double kAbove = 1.0;
+constexpr double kAbove = 1.2;
 constexpr double kAround = 1.4;
 
 double sumOfSquares(std::span<const double> values) {

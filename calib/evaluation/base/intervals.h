@@ -13,11 +13,11 @@ namespace fieldtrue::evaluation {
 ///   m   = places less the coefficients of the fit
 ///   c   = SD of the squares / their mean        n_e = m / (1 + c^2), the places that carry the mean square
 ///   t   = 95 % point of Student's t with max(1, n_e / 2) degrees of freedom
-///   log mean square: from -t c/sqrt(m) to +t c/sqrt(m) (1 + 1/sqrt(n_e))
+///   log mean square: from -t c/sqrt(m) to +t c/sqrt(m) (1 + 1.2/sqrt(n_e))
 ///
 /// c/sqrt(m) is widened by 1.3 for a tuned method, whose choices vary with the places too. What it covers:
 /// tests/studies/interval_coverage.py.
-/// @source effective number: Kish 1965, section 11.7; logarithm by the delta method; 1/sqrt(n_e) and 1.3 from the study
+/// @source effective number: Kish 1965, section 11.7; logarithm by the delta method; 1.2 and 1.3 from the study
 struct Interval {
   double low = 0.0;
   double high = 0.0;
@@ -40,7 +40,7 @@ Interval rmsInterval90(std::span<const double> errors, const FitFreedom& freedom
 
 /// What a correction gains on places its fits did not see: 1 - RMS after / RMS before, with its paired 90 % interval.
 /// With u = after^2 / mean(after^2) - before^2 / mean(before^2), c = SD of u, m, n_e and t as above: the ratio of mean
-/// squares is at least that seen times exp(-t c / sqrt(m) (1 + 1/sqrt(n_e))). It is at most the largest r for which
+/// squares is at least that seen times exp(-t c / sqrt(m) (1 + 1.2/sqrt(n_e))). It is at most the largest r for which
 /// mean(after^2 - r before^2) lies within T of zero, in its SDs, where T is 1.75 times the 95 % point of Student's t of
 /// m - 1 degrees, and no more than that seen times exp(T c / sqrt(m)): Fieller's r grows without bound where few places
 /// carry the error before. c is widened by 1.3 for a tuned method, and for Fieller's r T is.
