@@ -29,7 +29,9 @@ import typing
 
 EXTENT_M = (2.44, 2.44, 1.83)  # Of the rooms' grid.
 POOL = 9000
-FRESH_A_PLACE = 42  # The truth's own error, the same for all tables, is then a sixth of what a table errs by.
+# All tables share what the pool and the fresh places err by: a fifth of what a table errs by.
+POOL_A_PLACE = 60
+FRESH_A_PLACE = 42
 FEWEST_FRESH = 3000
 SLIP_SD_M = 0.002
 UNTUNED = ("none", "affine", "polynomial:degree=2", "hmq", "tetrahedral")
@@ -82,7 +84,7 @@ def write(path, head, rows):
         writer.writerows(rows)
 
 
-def record(cli, rooms, room, folder, n_fresh=FEWEST_FRESH):
+def record(cli, rooms, room, folder, n_fresh=FEWEST_FRESH, n_pool=POOL):
     """Readings without noise at places scattered over the room's box."""
     with open(os.path.join(rooms, f"{room}.scene.json"), encoding="utf-8") as text:
         scene = json.load(text)
@@ -90,7 +92,7 @@ def record(cli, rooms, room, folder, n_fresh=FEWEST_FRESH):
     scene["rig"] = {"tolerance_m": 0, "tolerance_rad": 0}
     draw = random.Random(room)
     nodes = [dict(zip(("x_m", "y_m", "z_m"), (draw.uniform(0, side_m) for side_m in EXTENT_M)), node=number)
-             for number in range(POOL + n_fresh)]
+             for number in range(n_pool + n_fresh)]
     paths = [os.path.join(folder, name) for name in ("room.scene.json", "room.plan.json", "room.nodes.csv")]
     for path, content in zip(paths, (scene, {"schema": "fieldtrue.plan/1", "nodes": nodes})):
         with open(path, "w", encoding="utf-8") as out:
@@ -99,9 +101,9 @@ def record(cli, rooms, room, folder, n_fresh=FEWEST_FRESH):
     return rows_of(paths[2])
 
 
-def drawn_table(rows, n_places, draw, misplacing):
+def drawn_table(rows, n_places, draw, misplacing, n_pool=POOL):
     """Rows of some places of the pool, each stated where the rig would say that it stands."""
-    some = [dict(row) for row in draw.sample(rows[:POOL], n_places)]
+    some = [dict(row) for row in draw.sample(rows[:n_pool], n_places)]
     for row in some:
         for axis, slip_m in zip("xyz", misplacing.draw_m(draw)):
             row[f"{axis}_true_m"] = repr(float(row[f"{axis}_true_m"]) + slip_m)
@@ -170,10 +172,12 @@ def tables_of(cell):
             out.writelines(json.dumps(table) + "\n" for table in tables)
         os.replace(growing + ".new", growing)
         with tempfile.TemporaryDirectory() as folder, open(growing, "a", encoding="utf-8") as out:
-            head, rows = record(cell.cli, cell.rooms, cell.room, folder, max(FEWEST_FRESH, FRESH_A_PLACE * cell.n_places))
+            n_pool = max(POOL, POOL_A_PLACE * cell.n_places)
+            head, rows = record(cell.cli, cell.rooms, cell.room, folder,
+                                max(FEWEST_FRESH, FRESH_A_PLACE * cell.n_places), n_pool)
             rows = [{name: text for name, text in row.items() if name in COLUMNS} for row in rows]
             fresh, table = os.path.join(folder, "fresh.csv"), os.path.join(folder, "table.nodes.csv")
-            write(fresh, head, rows[POOL:])
+            write(fresh, head, rows[n_pool:])
             misplacing = Misplacing(cell.heavy)
 
             def truth_mm(method, number):
@@ -184,7 +188,8 @@ def tables_of(cell):
                 return 1000 * math.sqrt(square_m2 + misplacing.mean_square_m2())
 
             for number in range(len(tables), cell.n_tables):
-                write(table, head, drawn_table(rows, cell.n_places, random.Random(f"{cell.name()} {number}"), misplacing))
+                draw = random.Random(f"{cell.name()} {number}")
+                write(table, head, drawn_table(rows, cell.n_places, draw, misplacing, n_pool))
                 tables.append(judged_table(cell.cli, table, TUNED if cell.tuned else UNTUNED,
                                            functools.partial(truth_mm, number=number)))
                 out.write(json.dumps(tables[-1]) + "\n")
