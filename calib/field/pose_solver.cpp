@@ -1,7 +1,7 @@
 #include "calib/field/pose_solver.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
 
 #include "calib/core/error.h"
@@ -16,6 +16,16 @@ constexpr double kSmallestGap = 1e-9;
 /// Root sum of squares of the nine couplings at a range.
 double signalAt(double range_m, double dipole_constant_m3) {
   return std::sqrt(6.0) * dipole_constant_m3 / (range_m * range_m * range_m);
+}
+
+using Across = Eigen::Matrix<double, 3, 2>;
+
+/// Two directions that stand square on a unit vector, right-handed with it.
+Across across(const Eigen::Vector3d& unit) {
+  Across both;
+  both.col(0) = unit.unitOrthogonal();
+  both.col(1) = unit.cross(both.col(0));
+  return both;
 }
 
 }  // namespace
@@ -44,22 +54,43 @@ tl::expected<PoseSolution, SolveError> solvePose(const Eigen::Matrix3d& coupling
   }
   if (signal > signalAt(limits.nearest_m, dipole_constant_m3)) return tl::make_unexpected(SolveError::kSaturated);
 
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(couplings, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d& d = svd.singularValues();
-  if (d[0] - d[1] < kSmallestGap * d[0]) return tl::make_unexpected(SolveError::kAmbiguous);
-  const Eigen::Matrix3d& P = svd.matrixU();
-  const Eigen::Matrix3d& Q = svd.matrixV();
-  const double s = P.determinant() * Q.determinant() > 0.0 ? 1.0 : -1.0;
-  const double k = (2.0 * d[0] + d[1] + s * d[2]) / 6.0;
+  const Eigen::Matrix3d scaled = couplings / signal;
+  const Eigen::Vector3d q1 = dominantDirection(scaled.transpose() * scaled);
+  const Eigen::Vector3d image = couplings * q1;
+  const double d1 = image.norm();
+  const Eigen::Vector3d p1 = image / d1;
+  const Across from = across(q1), to = across(p1);
+  const Eigen::Matrix2d rest = to.transpose() * couplings * from;
+  // Along and against the rotation that comes nearest to the rest: d2 + s d3 and d2 - s d3.
+  const Eigen::Vector2d along(rest(0, 0) + rest(1, 1), rest(1, 0) - rest(0, 1));
+  const double against = std::hypot(rest(0, 0) - rest(1, 1), rest(1, 0) + rest(0, 1));
+  const double sum = along.norm();
+  if (d1 - 0.5 * (sum + against) < kSmallestGap * d1) return tl::make_unexpected(SolveError::kAmbiguous);
+  const double k = (2.0 * d1 + sum) / 6.0;
+  Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();
+  if (sum > 0.0) turn << along[0] / sum, -along[1] / sum, along[1] / sum, along[0] / sum;
 
   PoseSolution solution;
-  const Eigen::Vector3d p_m = std::cbrt(dipole_constant_m3 / k) * Q.col(0);
+  const Eigen::Vector3d p_m = std::cbrt(dipole_constant_m3 / k) * q1;
   solution.tracker_from_sensor.position_m = p_m.dot(hemisphere) < 0.0 ? Eigen::Vector3d(-p_m) : p_m;
-  const Eigen::Matrix3d R = Q * Eigen::Vector3d(1.0, -1.0, -s).asDiagonal() * P.transpose();
+  const Eigen::Matrix3d R = q1 * p1.transpose() - from * turn.transpose() * to.transpose();
   solution.tracker_from_sensor.orientation = Eigen::Quaterniond(R).normalized();
-  const Eigen::Vector3d misfit(d[0] - 2.0 * k, d[1] - k, d[2] - s * k);
-  solution.residual_rms = misfit.norm() / 3.0;
+  solution.residual_rms = std::hypot(d1 - 2.0 * k, (rest - k * turn).norm()) / 3.0;
   return solution;
+}
+
+Eigen::Vector3d dominantDirection(Eigen::Matrix3d m) {
+  constexpr int kMostSquarings = 40;
+  m /= m.trace();
+  for (int i = 0; i < kMostSquarings; ++i) {
+    const Eigen::Matrix3d squared = m * m;
+    const double trace = squared.trace();
+    m = squared / trace;
+    if (trace > 1.0 - 1e-15) break;
+  }
+  Eigen::Index column = 0;
+  m.diagonal().maxCoeff(&column);
+  return m.col(column).normalized();
 }
 
 }  // namespace fieldtrue::field

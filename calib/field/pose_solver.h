@@ -51,6 +51,8 @@ struct PoseSolution {
 /// |S|^2 + 6 k^2 - 2 k (2 d1 + d2 + s d3), k = C/r^3 (von Neumann's trace inequality, for G has the singular values
 /// k (2, 1, 1)), and that bound is met by
 ///   u = q1,  R = Q diag(1, -1, -s) P^T,  k = (2 d1 + d2 + s d3)/6.
+/// Of the decomposition only q1 is sought; square on it, diag(1, s) in Q and P is the rotation nearest to what S is
+/// there, and d2 + s d3 what S is along it.
 /// An iterated least-squares solver of the nine equations ends at the same pose.
 ///
 /// @param couplings S: rows receiver coils, columns transmitter coils
@@ -61,6 +63,10 @@ struct PoseSolution {
 /// @source Raab 1981, IEEE Trans. AES-17 (direct solution, position first); the bound: Miranda and Thompson 1993
 tl::expected<PoseSolution, SolveError> solvePose(const Eigen::Matrix3d& couplings, double dipole_constant_m3,
                                                  const Eigen::Vector3d& hemisphere, const SolverLimits& limits = {});
+
+/// Unit eigenvector of the largest eigenvalue of a positive semidefinite symmetric matrix with a trace above 0, by
+/// repeated squaring: of undistorted couplings the others are a quarter of it, and five squarings leave 4^-32 of them.
+Eigen::Vector3d dominantDirection(Eigen::Matrix3d m);
 
 /// The pose that a tracker with this solver reports.
 ///

@@ -9,25 +9,6 @@
 #include "calib/field/pose_solver.h"
 
 namespace fieldtrue::field {
-namespace {
-
-/// Unit eigenvector of the largest eigenvalue of a positive symmetric matrix, by repeated squaring: undistorted, the
-/// others are a quarter of it, and five squarings leave 4^-32 of them.
-Eigen::Vector3d dominantDirection(Eigen::Matrix3d m) {
-  constexpr int kMostSquarings = 16;
-  m /= m.trace();
-  for (int i = 0; i < kMostSquarings; ++i) {
-    const Eigen::Matrix3d squared = m * m;
-    const double trace = squared.trace();
-    m = squared / trace;
-    if (trace > 1.0 - 1e-15) break;
-  }
-  Eigen::Index column = 0;
-  m.diagonal().maxCoeff(&column);
-  return m.col(column).normalized();
-}
-
-}  // namespace
 
 void add(const EffectResponse& part, double factor, EffectResponse& sum) {
   sum.shift_m += factor * part.shift_m;
