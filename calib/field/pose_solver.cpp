@@ -54,28 +54,29 @@ tl::expected<PoseSolution, SolveError> solvePose(const Eigen::Matrix3d& coupling
   }
   if (signal > signalAt(limits.nearest_m, dipole_constant_m3)) return tl::make_unexpected(SolveError::kSaturated);
 
-  const Eigen::Matrix3d scaled = couplings / signal;
-  const Eigen::Vector3d q1 = dominantDirection(scaled.transpose() * scaled);
-  const Eigen::Vector3d image = couplings * q1;
+  const Eigen::Matrix3d S = couplings / signal;
+  const Eigen::Vector3d q1 = dominantDirection(S.transpose() * S);
+  const Eigen::Vector3d image = S * q1;
   const double d1 = image.norm();
   const Eigen::Vector3d p1 = image / d1;
   const Across from = across(q1), to = across(p1);
-  const Eigen::Matrix2d rest = to.transpose() * couplings * from;
+  const Eigen::Matrix2d rest = to.transpose() * S * from;
   // Along and against the rotation that comes nearest to the rest: d2 + s d3 and d2 - s d3.
   const Eigen::Vector2d along(rest(0, 0) + rest(1, 1), rest(1, 0) - rest(0, 1));
-  const double against = std::hypot(rest(0, 0) - rest(1, 1), rest(1, 0) + rest(0, 1));
+  const Eigen::Vector2d against(rest(0, 0) - rest(1, 1), rest(1, 0) + rest(0, 1));
   const double sum = along.norm();
-  if (d1 - 0.5 * (sum + against) < kSmallestGap * d1) return tl::make_unexpected(SolveError::kAmbiguous);
+  if (d1 - 0.5 * (sum + against.norm()) < kSmallestGap * d1) return tl::make_unexpected(SolveError::kAmbiguous);
   const double k = (2.0 * d1 + sum) / 6.0;
   Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();
   if (sum > 0.0) turn << along[0] / sum, -along[1] / sum, along[1] / sum, along[0] / sum;
 
   PoseSolution solution;
-  const Eigen::Vector3d p_m = std::cbrt(dipole_constant_m3 / k) * q1;
+  const Eigen::Vector3d p_m = std::cbrt(dipole_constant_m3 / (k * signal)) * q1;
   solution.tracker_from_sensor.position_m = p_m.dot(hemisphere) < 0.0 ? Eigen::Vector3d(-p_m) : p_m;
   const Eigen::Matrix3d R = q1 * p1.transpose() - from * turn.transpose() * to.transpose();
   solution.tracker_from_sensor.orientation = Eigen::Quaterniond(R).normalized();
-  solution.residual_rms = std::hypot(d1 - 2.0 * k, (rest - k * turn).norm()) / 3.0;
+  const double along_misfit = d1 - 2.0 * k;
+  solution.residual_rms = signal * std::sqrt(along_misfit * along_misfit + (rest - k * turn).squaredNorm()) / 3.0;
   return solution;
 }
 
