@@ -4,6 +4,7 @@
 
 #include <QCoreApplication>
 #include <algorithm>
+#include <array>
 #include <clocale>
 #include <cstdio>
 #include <filesystem>
@@ -95,6 +96,19 @@ int finish(const std::string& who, const Outcome& outcome, bool as_json) {
   return kDone;
 }
 
+/// What is wrong with an option that is to name a file and names none; empty when nothing is.
+std::string emptyFileName(const CLI::App& command) {
+  static constexpr std::array<std::string_view, 5> kNamesFile = {"FILE", "CSV", "PATH", "LINK", "PLAN"};
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string type = option->get_type_name();
+    if (std::find(kNamesFile.begin(), kNamesFile.end(), type) == kNamesFile.end() || option->count() == 0) continue;
+    const std::vector<std::string>& given = option->results();
+    if (std::find(given.begin(), given.end(), "") != given.end())
+      return option->get_name() + (type == "PLAN" ? " needs a plan" : " needs a file name");
+  }
+  return {};
+}
+
 /// The options of a command that name what it writes.
 struct Outputs {
   std::string_view command;
@@ -178,6 +192,13 @@ std::string CommandLine::unknownCommand(int argc, char** argv) const {
   return "there is no command '" + std::string(argv[1]) + "'; known: " + known;
 }
 
+std::string CommandLine::unknownOption() const {
+  const std::vector<std::string> unread = app_.remaining(true);
+  const auto found = std::find_if(unread.begin(), unread.end(),
+                                  [](const std::string& one) { return one.size() > 1 && one.front() == '-'; });
+  return found == unread.end() ? std::string() : *found;
+}
+
 int CommandLine::run(int argc, char** argv) {
   if (const std::string unknown = unknownCommand(argc, argv); !unknown.empty()) {
     return complain(kProgram, {kWrongUsage, unknown});
@@ -189,10 +210,13 @@ int CommandLine::run(int argc, char** argv) {
       app_.exit(error);
       return kDone;
     }
-    return complain(kProgram, {kWrongUsage, std::string(error.what()) + " (help: fieldtrue-cli --help)"});
+    const std::string unknown = unknownOption();
+    const std::string wrong = unknown.empty() ? error.what() : "there is no option " + unknown;
+    return complain(kProgram, {kWrongUsage, wrong + " (help: fieldtrue-cli --help)"});
   }
   const CLI::App& command = *app_.get_subcommands().front();
   const std::string who = std::string(kProgram) + " " + command.get_name();
+  if (const std::string empty = emptyFileName(command); !empty.empty()) return complain(who, {kWrongUsage, empty});
   if (const std::string clash = writtenOver(command); !clash.empty()) return complain(who, {kWrongUsage, clash});
   const Result<int> status = commandBarrier([&] { return finish(who, run_(), common_.json); });
   return status ? *status : complain(who, {kNotPossible, status.error().message});

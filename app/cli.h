@@ -83,6 +83,8 @@ class CommandLine {
   CLI::App* addCommand(const std::string& name, const std::string& help);
   /// What is wrong with the command's name; empty when it is known or left out.
   std::string unknownCommand(int argc, char** argv) const;
+  /// The first argument that looks like an option and is none of the command's; empty when there is none.
+  std::string unknownOption() const;
 
   CLI::App app_;
   CommonOptions common_;

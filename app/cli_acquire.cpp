@@ -47,7 +47,7 @@ struct AcquireOptions {
   std::string scene;
   std::string plan;
   std::string session;
-  int samples_per_node = 60;
+  std::optional<int> samples_per_node;
   std::string until;          ///< When a take is complete, where not by that.
   std::string at_time_limit;  ///< What becomes of a take whose time is over, where not the usual.
   bool automatic = false;
@@ -81,8 +81,9 @@ class Acquisition {
     connectSignals();
   }
 
-  void setTakes(const acquisition::TakeLength& length, acquisition::AtTimeLimit at_time_limit) {
-    controller_.setTakeLength(length);
+  /// @param length none = the session's own
+  void setTakes(const std::optional<acquisition::TakeLength>& length, acquisition::AtTimeLimit at_time_limit) {
+    take_length_ = length;
     controller_.setAtTimeLimit(at_time_limit);
     asks_ = at_time_limit == acquisition::AtTimeLimit::kAsk;
   }
@@ -99,6 +100,7 @@ class Acquisition {
     controller_.setAutomatic(options_.automatic);
     if (const auto others = otherSensors(sensors); !others.empty()) return notPossible(others);
     chooseSensors(sensors);
+    if (take_length_) controller_.setTakeLength(*take_length_);
     controller_.setReconnects(patience_s() > 0.0);
     controller_.connectDevice(QString::fromStdString(options_.device), QString::fromStdString(options_.scene));
     if (!options_.automatic || asks_) listenToOperator();
@@ -335,6 +337,8 @@ class Acquisition {
 
   void onTakeFailed(const QString& reason, int) {
     const acquisition::AcquisitionStatus now = controller_.status();
+    // What cannot be stored would wait for a person, and by itself there may be none.
+    if (options_.automatic && now.not_stored) return fail(reason.toStdString());
     live_line_.clear();
     std::cerr << "Not taken: " << reason.toStdString() << std::endl;
     prompted_ = false;
@@ -500,6 +504,7 @@ class Acquisition {
   std::vector<std::string> remarks_;  ///< On how the session was opened, and on what it is recorded with.
   bool is_open_ = false;
   std::optional<nlohmann::json> expected_plan_;
+  std::optional<acquisition::TakeLength> take_length_;
   std::map<std::size_t, int> failed_takes_;
   LiveLine live_line_;
   QTimer place_timer_;
@@ -523,6 +528,17 @@ CLI::Validator someSensors() {
       "");
 }
 
+/// As it was asked for; none where nothing was said.
+Result<std::optional<acquisition::TakeLength>> takeLengthOf(const AcquireOptions& options) {
+  std::optional<acquisition::TakeLength> length;
+  if (!options.until.empty()) {
+    FT_TRY(length, acquisition::readTakeLength(options.until));
+  } else if (options.samples_per_node) {
+    FT_TRY(length, acquisition::readTakeLength(std::to_string(*options.samples_per_node)));
+  }
+  return length;
+}
+
 Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   const auto scene = readSceneArgument(options.scene);
   if (!scene) return tl::unexpected(scene.error());
@@ -532,8 +548,7 @@ Outcome runAcquire(const AcquireOptions& options, const CommonOptions& common) {
   if (const auto why = noTraceOf(**device, options.device, options.trace); !why.empty()) return wrongUsage(why);
   const auto setup = readSetupArgument(options.setup);
   if (!setup) return tl::unexpected(setup.error());
-  const auto length =
-      acquisition::readTakeLength(options.until.empty() ? std::to_string(options.samples_per_node) : options.until);
+  const auto length = takeLengthOf(options);
   if (!length) return wrongUsage("--until: " + length.error().message);
   const auto at_time_limit = options.at_time_limit.empty() ? Result<acquisition::AtTimeLimit>()
                                                            : acquisition::readAtTimeLimit(options.at_time_limit);
@@ -565,10 +580,11 @@ void addAcquireCommand(CommandLine& line) {
   addDeviceOptions(*command, options->device, options->scene);
   command->add_option("--plan", options->plan, "grid:... or a *.plan.json; not needed to resume a session")
       ->type_name("PLAN");
-  auto* samples =
-      command->add_option("--samples-per-node", options->samples_per_node, "Good samples at each place (default 60)")
-          ->type_name("N")
-          ->check(CLI::Range(1, 100000));
+  auto* samples = command
+                      ->add_option("--samples-per-node", options->samples_per_node,
+                                   "Good samples at each place (default 60; of a session that is resumed, its own)")
+                      ->type_name("N")
+                      ->check(CLI::Range(1, 100000));
   command
       ->add_option("--until", options->until,
                    "When a take is complete, instead: after a time (2.5s), or when its mean is known so well (0.05mm)")

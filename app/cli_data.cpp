@@ -107,7 +107,7 @@ void addSimulate(CommandLine& line) {
                    "[:reseat=m] in metres, or a *.plan.json")
       ->type_name("PLAN")
       ->required();
-  command->add_option("--seed", options->seed, "Seed of noise and placing (default 1)")->type_name("N");
+  addSeedOption(*command, options->seed, "Seed of noise and placing (default 1)");
   command->add_option("--samples-per-node", options->samples_per_node, "Samples at each place (default 60)")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
@@ -162,11 +162,24 @@ struct ImportOptions {
 
 constexpr std::size_t kRowsShown = 5;
 
+std::string readingCommand(const std::string& format, const std::string& in, const std::string& outputs) {
+  return "fieldtrue-cli import --format " + format + " --in '" + in + "'" + outputs + "\n";
+}
+
+/// The options that say where a recording goes: into a table beside it, of its places where their true positions are
+/// known.
+std::string recordingOutputs(const importers::Importer& importer, const Settings& settings, const std::string& in) {
+  if (importer.needs_truth) return " --truth TRUE_POSITIONS --nodes '" + in + ".nodes.csv'";
+  const auto imported = importer.read(in, {}, settings);
+  const bool has_samples_only = imported && !imported->table;
+  return has_samples_only ? " --samples '" + in + ".samples.csv'" : " --nodes '" + in + ".nodes.csv'";
+}
+
 /// The command that reads a file which is of a known format.
-Answer knownFormat(const std::string& id, const std::string& label, const ImportOptions& options) {
+Answer knownFormat(const std::string& id, const std::string& label, const std::string& in, const std::string& outputs) {
   Answer answer;
   answer.json = {{"format", id}};
-  answer.text = label + "\nfieldtrue-cli import --format " + id + " --in '" + options.in + "'\n";
+  answer.text = label + "\n" + readingCommand(id, in, outputs);
   return answer;
 }
 
@@ -181,9 +194,10 @@ bool isTypeable(const Settings& settings) {
 /// What a file seems to hold, and the command that reads it so. Nothing is written.
 Outcome runGuess(const ImportOptions& options) {
   if (const importers::Importer* importer = importers::recogniseRecording(options.in))
-    return knownFormat(importer->id, importer->label, options);
+    return knownFormat(importer->id, importer->label, options.in,
+                       recordingOutputs(*importer, importers::usualSettings(*importer), options.in));
   if (const exporters::CalibrationFormat* format = exporters::recogniseCalibration(options.in))
-    return knownFormat(format->id, format->label, options);
+    return knownFormat(format->id, format->label, options.in, " --calibration '" + options.in + ".ftcal.json'");
   const auto guess = importers::guessColumns(options.in);
   if (!guess) return notPossible(guess.error());
   const auto preview = importers::previewText(options.in, guess->settings, kRowsShown);
@@ -205,7 +219,8 @@ Outcome runGuess(const ImportOptions& options) {
   show(preview->columns);
   for (const std::vector<std::string>& row : preview->rows) show(row);
   if (isTypeable(guess->settings))
-    answer.text += "fieldtrue-cli import --format '" + format + "' --in '" + options.in + "'\n";
+    answer.text += readingCommand("'" + format + "'", options.in,
+                                  recordingOutputs(**importers::findImporter("columns"), guess->settings, options.in));
   else
     answer.text +=
         "a column that is used has , = or a quote in its name, which --format cannot take: rename it, or import "

@@ -120,7 +120,7 @@ void addEmulateCommand(CommandLine& line) {
   command->add_option("--sensors", options->sensors, "Sensors on the jig, 4 cm apart along its y (default 1)")
       ->type_name("N")
       ->check(CLI::Range(1, static_cast<int>(acquisition::kMostSensors)));
-  command->add_option("--seed", options->seed, "Seed of noise and faults (default 1)")->type_name("N");
+  addSeedOption(*command, options->seed, "Seed of noise and faults (default 1)");
   command->add_option("--duration", options->duration_s, "End by itself after so many seconds")
       ->type_name("S")
       ->check(numberWithin(0.0, 1e6));

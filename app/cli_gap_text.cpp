@@ -103,11 +103,21 @@ std::string remainingText(const gap::GapReport& report) {
   return text + ".\n" + gap::howFarOffText(report) + "\n";
 }
 
+/// Where an effect is that was named more than once.
+std::string placeText(const gap::GapReport& report, const gap::Prediction& prediction) {
+  const auto n_alike = std::count_if(report.selected.begin(), report.selected.end(),
+                                     [&](const gap::SelectedEffect& one) { return one.effect == prediction.effect; });
+  if (n_alike < 2 || prediction.selected >= report.selected.size()) return {};
+  const auto& at_m = report.selected[prediction.selected].location_m;
+  if (!at_m) return {};
+  return " at (" + fixedText(at_m->x(), 2) + ", " + fixedText(at_m->y(), 2) + ", " + fixedText(at_m->z(), 2) + ") m";
+}
+
 std::string predictionsText(const gap::GapReport& report) {
   std::string text;
   for (const gap::Prediction& prediction : report.predictions) {
-    text += "Without " + prediction.effect + " " + report.names.of(prediction.node) + " should go from " +
-            fixedText(prediction.now_mm, 1) + " to " + fixedText(prediction.then_mm, 1) + " +- " +
+    text += "Without " + prediction.effect + placeText(report, prediction) + " " + report.names.of(prediction.node) +
+            " should go from " + fixedText(prediction.now_mm, 1) + " to " + fixedText(prediction.then_mm, 1) + " +- " +
             fixedText(prediction.then_sd_mm, 1) + " mm.\n";
   }
   return text;

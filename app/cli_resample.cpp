@@ -89,6 +89,7 @@ Outcome runResample(const ResampleOptions& options, const CommonOptions& common)
                [](const Node& node) { return node.role == NodeRole::kFit; });
   Answer answer = answerOf(options, *resampled, evaluation::noiseFloor(used, reading->table.metadata));
   answer.remarks.insert(answer.remarks.begin(), reading->notes.begin(), reading->notes.end());
+  if (!resampled->note.empty()) answer.remarks.push_back(resampled->note);
   if (const std::size_t n_unused = reading->table.nodes.size() - used.size(); n_unused > 0)
     answer.remarks.push_back(std::to_string(n_unused) + " rows of role validation or skipped were not used");
   return answer;

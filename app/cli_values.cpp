@@ -1,9 +1,11 @@
 #include "app/cli_values.h"
 
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <string_view>
 
+#include "acquisition/plan/plan_text.h"
 #include "calib/calibration/alignment.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/registry.h"
@@ -68,6 +70,15 @@ CLI::Validator numberWithin(double low, double high) {
     return is_nan ? "Value " + text + " is not a number" : range(text);
   };
   return CLI::Validator(check, range.get_description());
+}
+
+void addSeedOption(CLI::App& command, std::uint64_t& seed, const std::string& help) {
+  const auto check = [](const std::string& text) {
+    if (acquisition::parseNumber<std::uint64_t>(text)) return std::string();
+    return "'" + text + "' is no seed; it must be a whole number from 0 to " +
+           std::to_string(std::numeric_limits<std::uint64_t>::max()) + ", digits only";
+  };
+  command.add_option("--seed", seed, help)->type_name("N")->check(check);
 }
 
 Read<acquisition::Plan> readPlanArgument(const std::string& text_or_path) {
@@ -170,7 +181,7 @@ void addComparisonOptions(CLI::App& command, ComparisonArguments& arguments) {
       .add_option("--align", arguments.align,
                   "none or rigid; default rigid unless the table says the alignment is known")
       ->type_name("MODE");
-  command.add_option("--seed", arguments.seed, "Seed of folds (default 1)")->type_name("N");
+  addSeedOption(command, arguments.seed, "Seed of folds (default 1)");
 }
 
 Read<evaluation::ComparisonOptions> readComparisonArguments(const ComparisonArguments& arguments) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +25,9 @@ using Read = tl::expected<T, Failure>;
 
 /// Numbers from low to high; unlike CLI::Range it takes no NaN.
 CLI::Validator numberWithin(double low, double high);
+
+/// `--seed`: digits only, so that no sign is wrapped and no large number cut.
+void addSeedOption(CLI::App& command, std::uint64_t& seed, const std::string& help);
 
 /// `--device`, which must be given, and the `--scene` of a simulated one.
 void addDeviceOptions(CLI::App& command, std::string& device, std::string& scene);

@@ -7,7 +7,12 @@
 namespace fieldtrue::acquisition {
 
 AcquisitionController::Impl::Impl(AcquisitionController* controller, const SamplerOptions& options)
-    : owner(controller), tracker(controller), places(store), take(options), views(controller) {
+    : owner(controller),
+      tracker(controller),
+      places(store),
+      usual_length(options.length),
+      take(options),
+      views(controller) {
   const auto at = [this](const QTimer& timer, auto call) {
     QObject::connect(&timer, &QTimer::timeout, owner, [this, call] { guarded(*owner, call); });
   };
@@ -65,8 +70,9 @@ void AcquisitionController::disconnectDevice() {
   impl_->views.tellSoon();
 }
 
-void AcquisitionController::openSession(const QString& path, const QString& create_plan_json) {
-  impl_->open(path, create_plan_json);
+void AcquisitionController::openSession(const QString& path, const QString& create_plan_json,
+                                        const std::optional<TakeLength>& length) {
+  impl_->open(path, create_plan_json, length);
 }
 
 void AcquisitionController::closeSession() { impl_->close(); }
@@ -74,6 +80,7 @@ void AcquisitionController::closeSession() { impl_->close(); }
 void AcquisitionController::take() {
   if (impl_->take.runs()) return;
   impl_->take.times_again = 0;
+  impl_->take.not_stored = false;
   if (!impl_->store) {
     emit takeFailed(QStringLiteral("There is no session to record into; make a plan or open a session first."));
   } else if (impl_->store->isReadOnly()) {
@@ -122,16 +129,18 @@ void AcquisitionController::skip() {
 }
 
 void AcquisitionController::undo() {
+  if (!impl_->places.can_undo) return;
+  if (impl_->take.runs()) return cancelTake();
   if (const auto place = impl_->step(&SessionStore::undo)) impl_->setCurrent(*place);
 }
 
 void AcquisitionController::redo() {
-  if (impl_->step(&SessionStore::redo)) impl_->advance();
+  if (impl_->places.can_redo && impl_->step(&SessionStore::redo)) impl_->advance();
 }
 
 void AcquisitionController::goTo(int place) {
   if (!impl_->store || place >= static_cast<int>(impl_->places.states.size())) return;
-  impl_->take.failure.clear();
+  impl_->take.forgetFailure();
   impl_->stopTake();
   impl_->setCurrent(place < 0 ? impl_->places.next() : static_cast<std::size_t>(place));
 }
@@ -140,7 +149,7 @@ void AcquisitionController::setAutomatic(bool automatic) {
   if (impl_->take.automatic == automatic) return;
   impl_->take.automatic = automatic;
   if (!impl_->take.stand.hasTaken()) impl_->take.stand.forget();
-  impl_->take.failure.clear();
+  impl_->take.forgetFailure();
   impl_->take.waiting_since_s.reset();
   impl_->views.tellSoon();
 }
@@ -152,10 +161,12 @@ void AcquisitionController::setReconnects(bool reconnects) { impl_->tracker.reco
 void AcquisitionController::setSetup(const Setup& stated) { impl_->correctSetup(stated); }
 
 void AcquisitionController::setTakeLength(const TakeLength& length) {
-  if (!impl_->told(checked(length))) return;
-  impl_->take.options.length = length;
-  if (!impl_->take.runs()) impl_->take.sampler = TakeSampler(impl_->take.options);
-  impl_->views.tellSoon();
+  if (!impl_->store) return;
+  if (impl_->keepTakeLength(length)) {
+    impl_->useTakeLength(length);
+  } else {
+    emit takeLengthKnown(impl_->take.options.length);
+  }
 }
 
 void AcquisitionController::setAtTimeLimit(AtTimeLimit at_time_limit) {
@@ -168,7 +179,7 @@ void AcquisitionController::setSessionState(const QString& key, const QString& v
 }
 
 void AcquisitionController::storeFit(const QString& name, const QString& ftcal_text) {
-  if (impl_->store) impl_->told(impl_->store->storeFit(name.toStdString(), ftcal_text.toStdString()));
+  if (impl_->store) emit fitStored(impl_->told(impl_->store->storeFit(name.toStdString(), ftcal_text.toStdString())));
 }
 
 void AcquisitionController::requestTables() {

@@ -13,6 +13,7 @@
 #include "acquisition/devices/tracker_device.h"
 #include "acquisition/plan/place_state.h"
 #include "acquisition/sampling/node_sampler.h"
+#include "acquisition/sampling/take_length.h"
 #include "acquisition/sampling/time_limit.h"
 #include "acquisition/session/session_store.h"
 #include "acquisition/session/signal_snapshot.h"
@@ -82,6 +83,7 @@ struct AcquisitionStatus {
   bool distance_known = false;       ///< The takes done tell it well enough to show.
   bool away = false;                 ///< The sensor stands too far from the current place to be taken without asking.
   bool refused = false;              ///< A take was refused for that; asked for once more, it is taken.
+  bool not_stored = false;           ///< The last take could not be stored: none begins by itself until an action.
   bool has_trace = false;            ///< There are bytes of a line to be saved.
   std::vector<SensorProgress> sensors;  ///< Those recorded, the leading one first; empty until it is known.
   std::vector<int> reporting;           ///< Every sensor that the tracker sends.
@@ -103,10 +105,11 @@ enum class RemarkKind {
 ///
 /// Automatic mode takes when the sensor stands still near the current place (frame relation known), or has stood still
 /// for 0.7 s after having moved since the last take (not known yet; 3 s when it was found standing at the very start).
-/// The same stand is never taken twice by itself: it must be moved or lifted, or the take asked for. A tracker that ran
-/// and is lost is started again, at growing intervals, until it is back or another is connected (setReconnects). Lives
-/// in one worker thread (or in the main thread of the command line); all calls are slots, all answers are signals
-/// carrying whole values.
+/// The same stand is never taken twice by itself: it must be moved or lifted, or the take asked for. After a take that
+/// could not be stored none begins by itself before a person asks for something. A tracker that ran and is lost is
+/// started again, at growing intervals, until it is back or another is connected (setReconnects). Lives in one worker
+/// thread (or in the main thread of the command line); all calls are slots, all answers are signals carrying whole
+/// values.
 class AcquisitionController : public QObject {
   Q_OBJECT
  public:
@@ -131,7 +134,9 @@ class AcquisitionController : public QObject {
   void disconnectDevice();
   /// Takes over a session file; the one that is open already only tells sessionOpened. @param create_plan_json when not
   /// empty, the file is created with this plan (JSON or readPlan's text). The session before stays when this one fails.
-  void openSession(const QString& path, const QString& create_plan_json);
+  /// @param length of its takes from now on; none = as it keeps, the usual where it keeps none
+  void openSession(const QString& path, const QString& create_plan_json,
+                   const std::optional<fieldtrue::acquisition::TakeLength>& length = {});
   void closeSession();
   /// Starts collecting at the current place (space bar, Page Down). Where the takes done tell that the sensor stands
   /// elsewhere, it is refused once; asked for again within a few seconds it is taken, and marked.
@@ -141,7 +146,7 @@ class AcquisitionController : public QObject {
   void waitLonger();  ///< The same: it goes on, for as long again.
   void takeAgain();   ///< The same: it begins anew.
   void skip();
-  void undo();
+  void undo();  ///< Of a take that runs no more than that take: it is stopped.
   void redo();
   void goTo(int place);  ///< Makes any place current: retake it. -1 goes back to the first one not done.
   void setAutomatic(bool automatic);
@@ -150,7 +155,9 @@ class AcquisitionController : public QObject {
   /// are dead: the leading one stays while it reports.
   void setSensors(const std::vector<int>& sensors);
   void setReconnects(bool reconnects);  ///< Whether a tracker that is lost is started again; so it is at first.
-  void setTakeLength(const fieldtrue::acquisition::TakeLength& length);  ///< Answers with failed where it is none.
+  /// Of the open session, from its next take on, and kept with it. Answers with failed and takeLengthKnown where it is
+  /// none, or cannot be kept.
+  void setTakeLength(const fieldtrue::acquisition::TakeLength& length);
   /// What becomes of a take whose time is over. Asked, a person answers by keepTake, waitLonger, takeAgain, skip or
   /// cancelTake; the jig that is carried on means keepTake.
   void setAtTimeLimit(fieldtrue::acquisition::AtTimeLimit at_time_limit);
@@ -160,7 +167,7 @@ class AcquisitionController : public QObject {
   void requestSignal();                                            ///< Answers with signalReady.
   void requestTrace();                                             ///< Answers with traceReady, or failed.
   void setSessionState(const QString& key, const QString& value);  ///< SessionStore::setState.
-  void storeFit(const QString& name, const QString& ftcal_text);
+  void storeFit(const QString& name, const QString& ftcal_text);   ///< Answers with fitStored.
   /// Answers with tablesReady, or failed. Reads every sample: once for a session, then placeChanged and looseKept tell.
   void requestTables();
 
@@ -188,6 +195,9 @@ class AcquisitionController : public QObject {
   void sessionOpened(const QString& path, const QString& page, const QString& plan_json);
   void fitOpened(const QString& ftcal_text);  ///< The newest calibration of the session just opened, if it has one.
   void gapOpened(const QString& text);        ///< What was kept of its diagnosis as state "gap", likewise.
+  void fitStored(bool is_stored);             ///< Where it is not, failed tells why.
+  /// Of the session just opened; what still holds where another one was refused.
+  void takeLengthKnown(const fieldtrue::acquisition::TakeLength& length);
   /// What the user should know of the session and of what records it; no failure.
   void remarked(const QString& message, fieldtrue::acquisition::RemarkKind kind);
   void failed(const QString& message);  ///< One sentence for the message line.

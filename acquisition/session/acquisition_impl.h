@@ -12,6 +12,7 @@ namespace fieldtrue::acquisition {
 /// Joins the parts of one running acquisition. Slots and timers of the controller call in here; nothing here blocks.
 struct AcquisitionController::Impl {
   static constexpr const char* kDefaultRig = "wooden jig";
+  static constexpr const char* kTakeLengthState = "take_length";
 
   Impl(AcquisitionController* owner, const SamplerOptions& options);
   ~Impl() { tracker.cut(); }
@@ -52,14 +53,18 @@ struct AcquisitionController::Impl {
   Result<void> markOtherTracker();
 
   // Session.
-  void open(const QString& path, const QString& create_plan_json);
+  void open(const QString& path, const QString& create_plan_json, const std::optional<TakeLength>& length);
   Result<SessionStore> createSession(const QString& path, const QString& plan_text) const;
   bool isOpenAlready(const QString& path) const;
   void tellOpened(const std::string& page);
+  /// Where the session keeps none, or none that can be read, it is the usual one.
+  TakeLength keptTakeLength();
+  bool keepTakeLength(const TakeLength& length);  ///< @return whether it is one, and the session keeps it
+  void useTakeLength(const TakeLength& length);   ///< From the next take on.
   void close();
   /// Reads again what is known of one place, and tells.
   Result<void> reloadPlace(std::size_t place);
-  /// Undoes or redoes. @return the place it concerned, none when nothing is left or it failed
+  /// Undoes or redoes. @return the place it concerned, none when it failed
   std::optional<std::size_t> step(Result<std::optional<std::size_t>> (SessionStore::*go)());
   void keepLoose(const std::vector<LooseSample>& readings);
   void setCurrent(std::optional<std::size_t> place);
@@ -90,6 +95,7 @@ struct AcquisitionController::Impl {
   std::string suspicionOfTake(std::size_t place) const;
   void finishTake();
   void failTake(const std::string& reason);
+  void failToStore(const std::string& reason);
   void refuse(double off_m);
 
   // Words and numbers for the views.
@@ -116,6 +122,7 @@ struct AcquisitionController::Impl {
   std::vector<int> late_sensors;        ///< That are not recorded, and not told of yet.
   SignalWindow heard;                   ///< Of every sensor, by the device's clock.
   KnownPlaces places;
+  TakeLength usual_length;
   RunningTake take;
   ViewUpdates views;
 };

@@ -32,7 +32,8 @@ Result<SessionStore> AcquisitionController::Impl::createSession(const QString& p
   return SessionStore::create(path, plan, metadata, now());
 }
 
-void AcquisitionController::Impl::open(const QString& path, const QString& create_plan_json) {
+void AcquisitionController::Impl::open(const QString& path, const QString& create_plan_json,
+                                       const std::optional<TakeLength>& length) {
   if (isOpenAlready(path)) {
     if (create_plan_json.isEmpty())
       tellOpened(store->state("page").value_or(std::string()));
@@ -50,6 +51,7 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   store.emplace(*std::move(opened));
   places.fill(*content);
   ++views.revision;
+  useTakeLength(length && keepTakeLength(*length) ? *length : keptTakeLength());
   keepChoiceOfSensors();
   settleSensors();
   mergeMetadata();
@@ -57,6 +59,7 @@ void AcquisitionController::Impl::open(const QString& path, const QString& creat
   places.judgeAll();
   setCurrent(places.next());
   tellOpened(content->page);
+  emit owner->takeLengthKnown(take.options.length);
   if (!content->newest_fit.empty()) emit owner->fitOpened(QString::fromStdString(content->newest_fit));
   if (!content->gap.empty()) emit owner->gapOpened(QString::fromStdString(content->gap));
   for (const std::string& text : store->remarks()) remark(text);
@@ -75,6 +78,23 @@ bool AcquisitionController::Impl::isOpenAlready(const QString& path) const {
 void AcquisitionController::Impl::tellOpened(const std::string& page) {
   const QString plan_json = QString::fromStdString(toJson(store->plan()).dump());
   emit owner->sessionOpened(store->path(), QString::fromStdString(page), plan_json);
+}
+
+TakeLength AcquisitionController::Impl::keptTakeLength() {
+  const auto text = store->state(kTakeLengthState);
+  if (!told(text) || text->empty()) return usual_length;
+  const auto length = readTakeLength(*text);
+  return told(length) ? *length : usual_length;
+}
+
+bool AcquisitionController::Impl::keepTakeLength(const TakeLength& length) {
+  return told(checked(length)) && told(store->setState(kTakeLengthState, textOf(length)));
+}
+
+void AcquisitionController::Impl::useTakeLength(const TakeLength& length) {
+  take.options.length = length;
+  if (!take.runs()) take.sampler = TakeSampler(take.options);
+  views.tellSoon();
 }
 
 void AcquisitionController::Impl::close() {
@@ -108,8 +128,7 @@ Result<void> AcquisitionController::Impl::reloadPlace(std::size_t place) {
 }
 
 std::optional<std::size_t> AcquisitionController::Impl::step(Result<std::optional<std::size_t>> (SessionStore::*go)()) {
-  if (!store) return std::nullopt;
-  take.failure.clear();
+  take.forgetFailure();
   stopTake();
   const auto place = (*store.*go)();
   if (!told(place) || !*place || !told(reloadPlace(**place))) return std::nullopt;

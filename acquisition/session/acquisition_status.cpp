@@ -71,6 +71,7 @@ AcquisitionStatus AcquisitionController::Impl::status() const {
   result.distance_known = places.rig.usable() || places.guess.known;
   result.away = places.tooFar_m(tracker.live).has_value();
   result.refused = take.isRefusedAt(places.current);
+  result.not_stored = take.not_stored;
   result.has_trace = tracker.device ? tracker.device->hasTrace() : tracker.last_trace.has_value();
   result.sensors = progress();
   result.reporting = tracker.reporting();

@@ -46,6 +46,7 @@ TakeState RunningTake::add(const Sample& sample, bool is_judged) {
 void RunningTake::forgetFailure() {
   failure.clear();
   refused_at.reset();
+  not_stored = false;
 }
 
 bool RunningTake::watch(const Sample& sample, bool has_session) {
@@ -98,7 +99,7 @@ bool AcquisitionController::Impl::follow(const Sample& sample) {
   const bool look = take.watch(sample, store.has_value());
   const bool over =
       sample.time_s - take.failure_time_s > kFailureShown_s || (take.refused_at && !places.tooFar_m(tracker.live));
-  if (!take.failure.isEmpty() && over) take.forgetFailure();
+  if (!take.failure.isEmpty() && !take.not_stored && over) take.forgetFailure();
   return look;
 }
 
@@ -154,14 +155,14 @@ void AcquisitionController::Impl::takeAgain() {
 }
 
 void AcquisitionController::Impl::skip(const std::string& why) {
-  take.failure.clear();
+  take.forgetFailure();
   stopTake();
   if (!told(store->skip(*places.current, why))) return;
   if (told(reloadPlace(*places.current))) advance();
 }
 
 void AcquisitionController::Impl::considerAutomaticTake() {
-  if (!store || store->isReadOnly() || !places.current || !tracker.running()) return;
+  if (!store || store->isReadOnly() || !places.current || !tracker.running() || take.not_stored) return;
   if (take.waitedInVain(*tracker.live)) failTake(take.stillness.reason());
   if (!tracker.silentSensors().empty()) return;
   if (places.current && take.hasRested(places.guess.known) && !places.isElsewhere(tracker.live))
@@ -189,6 +190,11 @@ void AcquisitionController::Impl::failTake(const std::string& why) {
   note("take failed", text);
   views.tellSoon();
   emit owner->takeFailed(take.failure, places.current ? static_cast<int>(*places.current) : -1);
+}
+
+void AcquisitionController::Impl::failToStore(const std::string& why) {
+  take.not_stored = true;
+  failTake("not stored: " + why);
 }
 
 void AcquisitionController::Impl::refuse(double off_m) {
@@ -230,7 +236,7 @@ void AcquisitionController::Impl::finishTake() {
   for (const TakeSampler::OfSensor& one : take.sampler.ofSensors())
     sensors.push_back({one.sampler.samples(), *one.sampler.statistics()});
   const auto stored = store->storeTake(place, sensors, suspicious);
-  if (!stored) return failTake("not stored: " + stored.error().message);
+  if (!stored) return failToStore(stored.error().message);
   told(markOtherTracker());
   for (const TakeSampler::OfSensor& one : take.sampler.ofSensors())
     keepLoose(loose.cancelled(store->places()[place].node, one.sampler.abandoned()));

@@ -48,6 +48,7 @@ struct RunningTake {
   std::optional<double> waiting_since_s;  ///< Session time since which the current place waits for a usable signal.
   QString failure;                        ///< Why the last take failed; shown until the next action, or for a while.
   double failure_time_s = 0.0;
+  bool not_stored = false;  ///< The last take failed for that: it is shown, and none begins by itself, until an action.
 };
 
 }  // namespace fieldtrue::acquisition

@@ -206,7 +206,7 @@ void AcquisitionController::Impl::beginStream() {
   tracker.beginStream();
   settleSensors();
   take.stillness.clear();
-  take.failure.clear();
+  if (!take.not_stored) take.failure.clear();
   mergeMetadata();
   remarkOnTracker();
   places.updateGuess();

@@ -15,6 +15,11 @@ namespace fieldtrue::acquisition {
 
 namespace {
 
+/// What a device tells of itself need not be UTF-8; what is not is replaced.
+std::string metadataText(const TableMetadata& metadata) {
+  return toJson(metadata).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 QString text(const std::string& value) { return QString::fromStdString(value); }
 
 QString now() { return QDateTime::currentDateTimeUtc().toString(Qt::ISODateWithMs); }
@@ -95,7 +100,7 @@ struct SessionStore::Impl {
   Result<void> writeHead() const {
     for (const auto& [key, value] :
          {std::pair{QStringLiteral("plan"), text(toJson(plan).dump())},
-          std::pair{QStringLiteral("metadata"), text(toJson(metadata).dump())},
+          std::pair{QStringLiteral("metadata"), text(metadataText(metadata))},
           std::pair{QStringLiteral("created_utc"), created.toString(Qt::ISODateWithMs)},
           std::pair{QStringLiteral("software"), QStringLiteral("fieldtrue " FIELDTRUE_VERSION)}}) {
       if (auto written = setMeta(key, value); !written) return written;
@@ -351,7 +356,7 @@ const TableMetadata& SessionStore::metadata() const { return impl_->metadata; }
 QDateTime SessionStore::created() const { return impl_->created; }
 
 Result<void> SessionStore::setMetadata(const TableMetadata& metadata) {
-  auto written = impl_->setMeta(QStringLiteral("metadata"), text(toJson(metadata).dump()));
+  auto written = impl_->setMeta(QStringLiteral("metadata"), text(metadataText(metadata)));
   if (written) impl_->metadata = metadata;
   return written;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 #include <span>
 
 #include "calib/core/place_name.h"
@@ -68,6 +69,30 @@ std::map<int, std::set<int>> placesSharedBySensors(std::span<const Node> nodes) 
     shared[b.node].insert(a.node);
   });
   return shared;
+}
+
+double positionsAPlace(std::span<const Node> nodes) {
+  std::map<const Node*, std::set<int>> others;
+  if (!nodes.empty()) {
+    forEachCoincident(nodes, [&](const Node& a, const Node& b) {
+      others[&a].insert(b.node);
+      others[&b].insert(a.node);
+    });
+  }
+  struct Sum {
+    double positions = 0.0;
+    double rows = 0.0;
+  };
+  std::map<int, Sum> by_place;
+  for (const Node& node : nodes) {
+    const auto found = others.find(&node);
+    Sum& sum = by_place[node.node];
+    sum.positions += found == others.end() ? 1.0 : 1.0 / (1.0 + static_cast<double>(found->second.size()));
+    sum.rows += 1.0;
+  }
+  double n_positions = 0.0;
+  for (const auto& [place, sum] : by_place) n_positions += sum.positions / sum.rows;
+  return by_place.empty() ? 1.0 : n_positions / static_cast<double>(by_place.size());
 }
 
 std::string joinCoincidentPlaces(std::vector<Node>& nodes) {

@@ -20,4 +20,8 @@ std::string joinCoincidentPlaces(std::vector<Node>& nodes);
 /// apart: its error there would foretell this one's. Places without any are not in it.
 std::map<int, std::set<int>> placesSharedBySensors(std::span<const Node> nodes);
 
+/// How many true positions a place stands for, in the mean: 1, and less where one position is a row of several places,
+/// which then share it.
+double positionsAPlace(std::span<const Node> nodes);
+
 }  // namespace fieldtrue::calibration

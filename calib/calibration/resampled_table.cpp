@@ -5,6 +5,7 @@
 #include <string>
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/coincident_places.h"
 #include "calib/core/file_io.h"
 #include "calib/core/memory_limit.h"
 #include "calib/core/statistics.h"
@@ -116,6 +117,8 @@ Result<ResampledTable> resampleTable(const CalibrationTable& table, std::span<co
   std::copy_if(table.nodes.begin(), table.nodes.end(), std::back_inserter(nodes),
                [](const Node& node) { return node.role == NodeRole::kFit; });
   if (nodes.empty()) return fail(ErrorCode::kTooFewNodes, "Resampling needs measured places of role fit, got none");
+  ResampledTable resampled;
+  resampled.note = joinCoincidentPlaces(nodes);
   FT_TRY(const auto alignment, align == AlignMode::kRigid ? fitAlignment(nodes) : Result<Alignment>(Alignment{}));
   const correctors::FitData data = makeFitData(nodes, table.metadata, alignment);
   FT_TRY_VOID(correctors::checkPositions(data, "Resampling"));
@@ -126,7 +129,6 @@ Result<ResampledTable> resampleTable(const CalibrationTable& table, std::span<co
   const MeasuredErrors errors = measuredErrors(nodes, data, alignment);
 
   const correctors::Regridder regridder(errors.places.p_tracked_m, options);
-  ResampledTable resampled;
   resampled.table.metadata = table.metadata;
   resampled.table.metadata.other["resampled"] = correctors::regridMethodId(options.method);
   if (options.method == correctors::RegridMethod::kLivingston)

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/corrector.h"
@@ -18,6 +19,7 @@ struct ResampledTable {
   CalibrationTable table;             ///< Rows in the order of the grid; those without support have role skipped.
   std::size_t n_without_support = 0;  ///< Grid nodes.
   correctors::RegridError error;      ///< What the resampling costs by itself.
+  std::string note;                   ///< On places of one true position, which count as one; empty without any.
 };
 
 /// Interpolates the errors of measured places to the nodes of a grid in tracked space (survey, section 5). Each row's

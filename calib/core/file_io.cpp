@@ -4,8 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -132,11 +134,28 @@ Result<void> writeThrough(const std::filesystem::path& path, const std::function
   return {};
 }
 
+/// Whether a session goes by that name: it, or what SQLite keeps beside it while it is open.
+bool isNamedSession(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return extension == ".fieldtrue" || extension == ".fieldtrue-wal" || extension == ".fieldtrue-shm";
+}
+
+/// A session is not even opened to be read: closing the descriptor would drop the locks that this program may have on
+/// it.
+Result<void> refuseSession(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return {};
+  if (!isNamedSession(path) && !isNamedSession(std::filesystem::weakly_canonical(path, ignored))) return {};
+  return fail(ErrorCode::kBadInput,
+              "Cannot read " + path.string() + ": it is a session; open it, or use fieldtrue-cli tables --session");
+}
+
 /// Whether a session stands there: a day's work, held in a database that a program may have open. By its name first,
 /// for closing a descriptor of a session that this program has open would drop the locks on it.
 bool isSession(const std::filesystem::path& target) {
-  const std::string extension = target.extension().string();
-  if (extension == ".fieldtrue" || extension == ".fieldtrue-wal" || extension == ".fieldtrue-shm") return true;
+  if (isNamedSession(target)) return true;
   constexpr std::string_view kDatabase("SQLite format 3\0", 16);
   const Descriptor descriptor(target, O_RDONLY);
   std::array<char, kDatabase.size()> head{};
@@ -169,6 +188,7 @@ Result<std::string> readFile(const std::filesystem::path& path) {
   const auto cannotRead = [&](int error_number) {
     return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": " + reasonText(error_number));
   };
+  FT_TRY_VOID(refuseSession(path));
   const Descriptor descriptor(path, O_RDONLY);
   if (!descriptor.valid()) return cannotRead(errno);
   std::string content;
@@ -189,6 +209,7 @@ Result<std::ifstream> openForReading(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path, ignored)) {
     return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": it is a folder");
   }
+  FT_TRY_VOID(refuseSession(path));
   errno = 0;
   std::ifstream in(path, std::ios::binary);
   if (!in) return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": " + reasonText(errno));

@@ -10,10 +10,13 @@
 
 namespace fieldtrue {
 
-/// The whole file as bytes. @error kIo with the system's reason.
+/// The whole file as bytes.
+/// @error kIo with the system's reason; kBadInput for a session, which is not opened: it may be open in this program,
+/// and closing a descriptor of it would drop the locks on it
 Result<std::string> readFile(const std::filesystem::path& path);
 
-/// A stream over the file's bytes, for readers that need not hold it whole. @error kIo with the system's reason
+/// A stream over the file's bytes, for readers that need not hold it whole.
+/// @error kIo with the system's reason; kBadInput for a session, as above
 Result<std::ifstream> openForReading(const std::filesystem::path& path);
 
 /// Writes beside, syncs to disk, renames over: the path holds either the old or the whole new content, never a part.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -185,18 +186,36 @@ void measureAtPlaces(const Corrector& first, const Corrector& second, const Meth
 /// The chance that so many of the largest errors all fall to the second's places where nothing changed and each place
 /// is as likely as any other to have them.
 /// @source Rosenbaum 1954, Annals of Mathematical Statistics 25
-double chanceOfLargest(const PlaceErrors& own, const CalibrationDifference& difference) {
-  auto n_there = static_cast<double>(difference.first_at_second.mm.size());
-  auto n_all = n_there + static_cast<double>(own.mm.size());
+double chanceOfLargest(std::size_t n_largest, std::size_t n_there, std::size_t n_own) {
   double chance = 1.0;
-  for (std::size_t k = 0; k < difference.n_beyond; ++k) chance *= n_there-- / n_all--;
+  for (std::size_t k = 0; k < n_largest; ++k)
+    chance *= static_cast<double>(n_there - k) / static_cast<double>(n_there + n_own - k);
   return chance;
 }
 
-/// The largest change that would not be seen: evenly spread, it would not bring the intervals apart.
+double chanceOfLargest(const CalibrationDifference& difference) {
+  return chanceOfLargest(difference.n_beyond, difference.first_at_second.mm.size(), difference.first_own.mm.size());
+}
+
+/// The smallest change that, evenly spread, brings so many of the second's places beyond the first's own as is rare;
+/// infinite where no number of them is.
+double countedFrom_mm(const PlaceErrors& there, const PlaceErrors& own) {
+  if (own.mm.empty()) return INFINITY;
+  std::vector<double> falling_mm = there.mm;
+  std::sort(falling_mm.begin(), falling_mm.end(), std::greater<>());
+  for (std::size_t n = 1; n <= falling_mm.size(); ++n)
+    if (chanceOfLargest(n, falling_mm.size(), own.mm.size()) < kRare)
+      return excessError(largest(own.mm), falling_mm[n - 1]);
+  return INFINITY;
+}
+
+/// The largest change that would not be seen: evenly spread, it would neither bring the intervals apart nor many places
+/// beyond the first's own.
 double unseen_mm(const CalibrationDifference& difference) {
   const PlaceErrors& there = difference.first_at_second;
-  return excessError(difference.first_own.rms_90_mm.high * there.rms_mm / there.rms_90_mm.low, there.rms_mm);
+  const PlaceErrors& own = difference.first_own;
+  return std::min(excessError(own.rms_90_mm.high * there.rms_mm / there.rms_90_mm.low, there.rms_mm),
+                  countedFrom_mm(there, own));
 }
 
 DifferenceVerdict verdictOn(const CalibrationDifference& difference) {
@@ -204,7 +223,7 @@ DifferenceVerdict verdictOn(const CalibrationDifference& difference) {
   const PlaceErrors& own = difference.first_own;
   if (there.mm.empty() || own.mm.empty() || !difference.first_less_second_mm) return DifferenceVerdict::kCannotTell;
   const bool is_apart = there.rms_90_mm.low > own.rms_90_mm.high;
-  if ((is_apart && difference.first_less_second_mm->low90 > 0.0) || chanceOfLargest(own, difference) < kRare)
+  if ((is_apart && difference.first_less_second_mm->low90 > 0.0) || chanceOfLargest(difference) < kRare)
     return DifferenceVerdict::kChanged;
   return is_apart || difference.n_far > 0 ? DifferenceVerdict::kCannotTell : DifferenceVerdict::kNotShown;
 }

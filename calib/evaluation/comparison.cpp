@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "calib/calibration/coincident_places.h"
 #include "calib/correctors/method_label.h"
 #include "calib/evaluation/base/intervals.h"
 #include "calib/evaluation/base/noise_floor.h"
@@ -33,7 +34,7 @@ std::optional<ErrorStats> statsWhere(const std::vector<double>& errors, const st
 
 /// The places' errors of one candidate, with what its fits told.
 MethodScore methodScore(const Candidate& candidate, CandidateScores scores, const std::vector<Node>& scored,
-                        const std::vector<int>& places, const std::vector<bool>& is_edge) {
+                        const Comparison& comparison) {
   MethodScore score;
   score.method = candidate.id;
   score.settings = candidate.settings;
@@ -41,10 +42,11 @@ MethodScore methodScore(const Candidate& candidate, CandidateScores scores, cons
   if (score.skipped) return score;
   score.freedom = {scores.coefficients_a_place, candidate.is_tuned};
   score.sensors = scoresBySensor(scored, scores.held_out, score.freedom);
-  PlaceScores held_out = gatherByPlace(places, scored, scores.held_out);
+  score.freedom.positions_a_place = comparison.positions_a_place;
+  PlaceScores held_out = gatherByPlace(comparison.places, scored, scores.held_out);
   score.stats = errorStats(held_out.errors, score.freedom);
-  score.inside = statsWhere(held_out.errors, is_edge, false, score.freedom);
-  score.edge = statsWhere(held_out.errors, is_edge, true, score.freedom);
+  score.inside = statsWhere(held_out.errors, comparison.is_edge, false, score.freedom);
+  score.edge = statsWhere(held_out.errors, comparison.is_edge, true, score.freedom);
   score.n_uncovered = static_cast<int>(std::count(held_out.covered.begin(), held_out.covered.end(), false));
   score.place_errors = std::move(held_out.errors);
   score.place_covered = std::move(held_out.covered);
@@ -70,7 +72,7 @@ void scoreCommonPlaces(std::vector<MethodScore>& scores, std::size_t n_places) {
     std::vector<double> common;
     for (std::size_t k = 0; k < n_places; ++k)
       if (covered_by_all[k]) common.push_back(score.place_errors[k]);
-    score.rms_common_mm = rootMeanSquare(common);
+    score.rms_common_mm = common.empty() ? std::nan("") : rootMeanSquare(common);
   }
 }
 
@@ -79,8 +81,7 @@ void scoreMethods(const HeldOutJob& job, HeldOutScores& held_out, const std::vec
   std::vector<MethodScore> scores(job.candidates.size());
   control.parallel_for(scores.size(), [&](std::size_t i) {
     if (control.stop.stop_requested()) return;
-    scores[i] = methodScore(job.candidates[i], std::move(held_out.candidates[i]), scored, comparison.places,
-                            comparison.is_edge);
+    scores[i] = methodScore(job.candidates[i], std::move(held_out.candidates[i]), scored, comparison);
   });
   for (std::size_t i = 0; i < scores.size(); ++i)
     (job.candidates[i].is_position ? comparison.position : comparison.orientation).push_back(std::move(scores[i]));
@@ -90,12 +91,13 @@ void scoreBefore(const HeldOutJob& job, const HeldOutScores& held_out, const std
                  Comparison& comparison) {
   comparison.before_sensors = scoresBySensor(scored, held_out.before_position, {});
   PlaceScores position = gatherByPlace(comparison.places, scored, held_out.before_position);
-  comparison.before_position_mm = errorStats(position.errors);
+  const FitFreedom freedom{.positions_a_place = comparison.positions_a_place};
+  comparison.before_position_mm = errorStats(position.errors, freedom);
   comparison.before_place_mm = std::move(position.errors);
   comparison.before_residual_m = std::move(position.residual_m);
   if (!job.has_orientation) return;
   PlaceScores orientation = gatherByPlace(comparison.places, scored, held_out.before_orientation);
-  comparison.before_orientation_deg = errorStats(orientation.errors);
+  comparison.before_orientation_deg = errorStats(orientation.errors, freedom);
   comparison.before_place_deg = std::move(orientation.errors);
 }
 
@@ -115,6 +117,7 @@ Comparison begin(const HeldOutJob& job, const std::vector<Node>& scored) {
   comparison.validation = job.validation;
   comparison.align = job.align;
   comparison.places = placesOf(scored);
+  comparison.positions_a_place = calibration::positionsAPlace(scored);
   comparison.is_edge = outermostPlaces(rowsOf(job, job.fitted), job.nodes, comparison.places);
   comparison.names = PlaceNames(job.nodes);
   comparison.n_places = static_cast<int>(placesOf(job.nodes).size());

@@ -70,7 +70,7 @@ struct MethodScore {
   std::vector<SensorScore> sensors;  ///< In order; empty where there is one.
   std::vector<bool> place_covered;   ///< Same order; where false the input stood unchanged.
   int n_uncovered = 0;
-  double rms_common_mm = 0;  ///< Position only: over the places all methods cover.
+  double rms_common_mm = 0;  ///< Position only: over the places all methods cover; not a number where there is none.
   double rms_to_best = 0;    ///< RMS minus the best method's, mm or deg, with its paired 90 % interval.
   double rms_to_best_low90 = 0;
   double rms_to_best_high90 = 0;
@@ -92,8 +92,8 @@ struct GainTest {
   double gain = 0;  ///< 1 - RMS after / RMS before, over the places scored.
   double low90 = 0;
   double high90 = 0;
-  int worst_place = -1;  ///< Node number; -1 = nothing was tested.
-  double gain_without_worst_place = 0;
+  int worst_place = -1;                 ///< Node number; -1 = nothing was tested.
+  double gain_without_worst_place = 0;  ///< Not a number where there are too few places to leave one out.
   double low90_without_worst_place = 0;
   bool apply = false;
 };
@@ -115,8 +115,10 @@ struct SensorSplit {
   std::string text;           ///< One sentence.
 };
 
-/// Whether each sensor is to have a correction of its own.
-inline bool isApart(const std::optional<SensorSplit>& split) { return split && split->is_better; }
+/// Whether each sensor is to have a correction of its own: better than one for all, and better than none.
+inline bool isApart(const std::optional<SensorSplit>& split) {
+  return split && split->is_better && split->separate < split->before;
+}
 
 /// @param places node numbers, before and after in the same order; fewer than 3 never pass
 GainTest testGain(const std::vector<int>& places, const std::vector<double>& before, const std::vector<double>& after,
@@ -168,6 +170,7 @@ struct Comparison {
   calibration::AlignMode align = calibration::AlignMode::kNone;
   std::vector<int> places;       ///< Node numbers scored.
   std::vector<bool> is_edge;     ///< Of each: whether it is an outermost place.
+  double positions_a_place = 1;  ///< @see FitFreedom
   PlaceNames names;              ///< What the places of the table are called.
   double validated_share = 1.0;  ///< Volume of the box around the scored places, of that around all places.
   int n_places = 0;              ///< In the table, skipped ones left out.

@@ -13,14 +13,16 @@ using nlohmann::json;
 /// What cannot be stated is null, never absent and never zero.
 json nullUnless(bool stated, const json& value) { return stated ? value : json(nullptr); }
 
+json ifFinite(double value) { return nullUnless(std::isfinite(value), value); }
+
 json statsToJson(const ErrorStats& stats) {
   return {{"mean", stats.mean},
           {"median", stats.median},
           {"rms", stats.rms},
           {"p95", stats.p95},
           {"max", stats.max},
-          {"rms_low90", nullUnless(std::isfinite(stats.rms_low90), stats.rms_low90)},
-          {"rms_high90", nullUnless(std::isfinite(stats.rms_high90), stats.rms_high90)}};
+          {"rms_low90", ifFinite(stats.rms_low90)},
+          {"rms_high90", ifFinite(stats.rms_high90)}};
 }
 
 json optionalToJson(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
@@ -37,7 +39,7 @@ json sensorsToJson(const std::vector<SensorScore>& sensors) {
 }
 
 json splitToJson(const SensorSplit& split, const std::string& unit) {
-  const auto figure = [&](double value) { return split.is_told ? json(value) : json(nullptr); };
+  const auto figure = [&](double value) { return nullUnless(split.is_told, ifFinite(value)); };
   return {{"shared_" + unit, figure(split.shared)},
           {"separate_" + unit, figure(split.separate)},
           {"separate_less_shared_" + unit, figure(split.separate_less_shared.difference)},
@@ -61,15 +63,15 @@ json scoreToJson(const MethodScore& score, const char* stats_key, bool is_positi
              {"eval_ns", nullUnless(used, score.eval_ns)},
              {is_position ? "in_sample_rms_mm" : "in_sample_rms_deg", nullUnless(used, score.in_sample_rms)},
              {"rms_to_best", nullUnless(used, score.rms_to_best)},
-             {"rms_to_best_low90", nullUnless(used, score.rms_to_best_low90)},
-             {"rms_to_best_high90", nullUnless(used, score.rms_to_best_high90)},
+             {"rms_to_best_low90", nullUnless(used, ifFinite(score.rms_to_best_low90))},
+             {"rms_to_best_high90", nullUnless(used, ifFinite(score.rms_to_best_high90))},
              {"validated", nullUnless(used, toText(score.validated))},
              {"tuned_inside", nullUnless(used, score.tuned_inside)},
              {"n_folds", nullUnless(used, score.n_folds)},
              {"closed_form", nullUnless(used, score.closed_form)},
              {"notes", score.notes},
              {"skipped", nullUnless(!used, score.skipped.value_or(""))}};
-  if (is_position) to["rms_common_mm"] = nullUnless(used, score.rms_common_mm);
+  if (is_position) to["rms_common_mm"] = nullUnless(used, ifFinite(score.rms_common_mm));
   if (!score.sensors.empty()) to["sensors"] = sensorsToJson(score.sensors);
   const std::string key = stats_key;
   to[key + "_inside"] = score.inside ? statsToJson(*score.inside) : json(nullptr);
@@ -79,11 +81,11 @@ json scoreToJson(const MethodScore& score, const char* stats_key, bool is_positi
 
 json testToJson(const GainTest& test) {
   return {{"gain", test.gain},
-          {"low90", test.low90},
-          {"high90", test.high90},
+          {"low90", ifFinite(test.low90)},
+          {"high90", ifFinite(test.high90)},
           {"worst_place", nullUnless(test.worst_place >= 0, test.worst_place)},
-          {"gain_without_worst_place", test.gain_without_worst_place},
-          {"low90_without_worst_place", test.low90_without_worst_place}};
+          {"gain_without_worst_place", ifFinite(test.gain_without_worst_place)},
+          {"low90_without_worst_place", ifFinite(test.low90_without_worst_place)}};
 }
 
 json verdictToJson(const Verdict& verdict) {
@@ -91,9 +93,9 @@ json verdictToJson(const Verdict& verdict) {
           {"apply_orientation", verdict.apply_orientation},
           {"inside_out", verdict.is_inside_out},
           {"mirrored", nullUnless(!verdict.mirrored.empty(), verdict.mirrored)},
-          {"gain_low90", verdict.gain_low90},
-          {"gain_high90", verdict.gain_high90},
-          {"gain_without_worst_place", verdict.gain_without_worst_place},
+          {"gain_low90", ifFinite(verdict.gain_low90)},
+          {"gain_high90", ifFinite(verdict.gain_high90)},
+          {"gain_without_worst_place", ifFinite(verdict.gain_without_worst_place)},
           {"position", testToJson(verdict.position)},
           {"orientation", testToJson(verdict.orientation)},
           {"inside_mm", optionalToJson(verdict.inside_mm)},

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/coincident_places.h"
 #include "calib/core/statistics.h"
 #include "calib/evaluation/base/index_source.h"
 #include "calib/evaluation/base/intervals.h"
@@ -41,6 +42,16 @@ HeldOutPlaces splitPlaces(const HeldOutJob& job) {
   shuffle(places, source);
   const auto n_scored = static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, places.size() / 5));
   return {{places.begin(), places.begin() + n_scored}, {places.begin() + n_scored, places.end()}};
+}
+
+/// Takes places from the pool at whose true position another sensor is scored.
+void leaveSharedOut(HeldOutPlaces& places, std::span<const Node> nodes) {
+  std::set<int> near;
+  const auto shared = calibration::placesSharedBySensors(nodes);
+  for (const int place : places.scored)
+    if (const auto found = shared.find(place); found != shared.end())
+      near.insert(found->second.begin(), found->second.end());
+  std::erase_if(places.pool, [&](int place) { return near.contains(place); });
 }
 
 /// Rows that are fitted to and rows that are scored, of one draw.
@@ -114,7 +125,8 @@ Result<std::vector<LearningCurve>> learningCurves(const CalibrationTable& table,
   position_only.orientation_methods = {{"none", {}}};
   FT_TRY(auto job, makeJob(table, position_only));
   job.candidates.pop_back();
-  const HeldOutPlaces split = splitPlaces(job);
+  HeldOutPlaces split = splitPlaces(job);
+  leaveSharedOut(split, job.nodes);
   const std::set<int> is_scored(split.scored.begin(), split.scored.end());
   std::vector<Node> scored;
   for (const std::size_t row : job.scored)

@@ -61,6 +61,15 @@ std::string unequalText(const std::string& what, const char* unit, const std::ve
          toText(validation) + ").";
 }
 
+/// Of corrections for each sensor that are better than one for all, and worse than none.
+std::string harmfulText(const SensorSplit& split, const std::string& what, const char* unit,
+                        const Validation& validation) {
+  return "No correction of " + what +
+         " helps, neither one that all sensors share nor one for each: " + errorText(split.shared) + " and " +
+         errorText(split.separate) + " " + unit + ", without any " + errorText(split.before) + " " + unit + " (" +
+         toText(validation) + ").";
+}
+
 std::string splitText(const SensorSplit& split, const std::string& what, const char* unit,
                       const Validation& validation) {
   const PairedDifference& difference = split.separate_less_shared;
@@ -91,11 +100,12 @@ SensorSplit splitOf(const Comparison& together, const Comparison& apart, bool of
   const std::vector<double>& before = of_position ? apart.before_place_mm : apart.before_place_deg;
   split.shared = shared.stats.rms;
   split.separate = separate.stats.rms;
-  split.separate_less_shared = pairedDifference(separate.place_errors, shared.place_errors);
+  const double positions_a_place = separate.freedom.positions_a_place;
+  split.separate_less_shared = pairedDifference(separate.place_errors, shared.place_errors, positions_a_place);
   split.is_better = split.separate_less_shared.high90 < -kTie;
   if (!shared.sensors.empty() && shared.sensors.size() == separate.sensors.size()) {
-    split.separate_less_shared_in_shares =
-        pairedDifference(inShares(separate.sensors, shared.sensors), inShares(shared.sensors, shared.sensors));
+    split.separate_less_shared_in_shares = pairedDifference(
+        inShares(separate.sensors, shared.sensors), inShares(shared.sensors, shared.sensors), positions_a_place);
     split.is_better = split.is_better || split.separate_less_shared_in_shares.high90 < -kTie;
   }
   split.gain = testGain(apart.places, before, separate.place_errors, separate.freedom);
@@ -103,8 +113,11 @@ SensorSplit splitOf(const Comparison& together, const Comparison& apart, bool of
   split.after = separate.place_errors;
   const char* unit = of_position ? "mm" : "degrees";
   const bool only_in_shares = split.is_better && split.separate_less_shared.high90 >= -kTie;
-  split.text = only_in_shares ? unequalText(what, unit, separate.sensors, shared.sensors, apart.validation)
-                              : splitText(split, what, unit, apart.validation);
+  if (split.is_better && !isApart(split))
+    split.text = harmfulText(split, what, unit, apart.validation);
+  else
+    split.text = only_in_shares ? unequalText(what, unit, separate.sensors, shared.sensors, apart.validation)
+                                : splitText(split, what, unit, apart.validation);
   return split;
 }
 
@@ -157,6 +170,7 @@ Result<SplitOfRow> bestSplit(const Comparison& comparison, bool of_position, con
 void takePosition(Comparison& comparison, std::size_t row) {
   comparison.best_position_row = row;
   comparison.best_position = comparison.position[row].method;
+  tellDistanceTo(comparison.split->after, comparison.position);
   comparison.trueness.after_position_mm = excessError(comparison.split->separate, comparison.floor_position_mm);
   judgePosition(comparison.verdict, comparison.split->gain);
   comparison.verdict.limited_by.clear();
@@ -165,6 +179,7 @@ void takePosition(Comparison& comparison, std::size_t row) {
 
 void takeOrientation(Comparison& comparison, std::size_t row) {
   comparison.best_orientation_row = row;
+  tellDistanceTo(comparison.orientation_split->after, comparison.orientation);
   comparison.best_orientation = comparison.orientation[row].method;
   comparison.trueness.after_orientation_deg =
       excessError(comparison.orientation_split->separate, comparison.floor_orientation_deg);

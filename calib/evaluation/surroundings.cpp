@@ -1,6 +1,7 @@
 #include "calib/evaluation/surroundings.h"
 
 #include "calib/calibration/alignment.h"
+#include "calib/calibration/coincident_places.h"
 #include "calib/calibration/corrector.h"
 #include "calib/correctors/base/fit_checks.h"
 #include "calib/correctors/regrid/regrid_error.h"
@@ -59,6 +60,15 @@ std::vector<ResamplingError> resamplingErrors(const Comparison& comparison, cons
   return errors;
 }
 
+/// Rows of one true position are one place; skipped ones stay what they are.
+CalibrationTable withPlacesJoined(const CalibrationTable& table) {
+  CalibrationTable joined{table.metadata, {}}, skipped{table.metadata, {}};
+  for (const Node& node : table.nodes) (node.role == NodeRole::kSkipped ? skipped : joined).nodes.push_back(node);
+  calibration::joinCoincidentPlaces(joined.nodes);
+  joined.nodes.insert(joined.nodes.end(), skipped.nodes.begin(), skipped.nodes.end());
+  return joined;
+}
+
 /// None where it cannot be asked.
 Result<std::optional<OrientationDependence>> dependenceOn(const HeldOutJob& job, PosePart part,
                                                           const RunControl& control) {
@@ -74,7 +84,7 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
                              const RunControl& control) {
   RunControl quiet = control;
   quiet.progress = [](double) {};
-  comparison.coverage = coverageOf(table);
+  comparison.coverage = coverageOf(withPlacesJoined(table));
   if (auto going = unlessStopped(control, 0.1); !going) return going;
   auto fold_back = foldBack(comparison, job, quiet);
   if (!fold_back) return tl::unexpected(fold_back.error());

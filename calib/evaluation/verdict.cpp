@@ -29,21 +29,14 @@ std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, doubl
   return best;
 }
 
-/// Fills in each method's RMS minus that of the best, or of no correction where none beats it, with the interval over
-/// the same places.
+/// To the best, or to no correction where none beats it.
 void tellDistanceToBest(std::vector<MethodScore>& scores, std::optional<std::size_t> best_row,
                         const std::vector<double>& before) {
-  const std::vector<double> of_best = best_row ? scores[*best_row].place_errors : before;
-  for (MethodScore& score : scores) {
-    if (score.skipped) continue;
-    const PairedDifference difference = pairedDifference(score.place_errors, of_best);
-    score.rms_to_best = difference.difference;
-    score.rms_to_best_low90 = difference.low90;
-    score.rms_to_best_high90 = difference.high90;
-  }
+  tellDistanceTo(best_row ? std::vector<double>(scores[*best_row].place_errors) : before, scores);
 }
 
 std::string intervalText(const GainTest& test) {
+  if (!std::isfinite(test.low90)) return "no interval";
   const std::string high = percentText(test.high90) + " %";
   if (test.low90 < -1.0) return "90 % interval from an error more than doubled to " + high;
   return "90 % interval " + percentText(test.low90) + " to " + high;
@@ -171,6 +164,7 @@ GainTest testGain(const std::vector<int>& places, const std::vector<double>& bef
   test.high90 = all.high90;
   const std::size_t worst = worstPlace(before, after);
   test.worst_place = places[worst];
+  test.gain_without_worst_place = test.low90_without_worst_place = std::nan("");
   if (places.size() < kFewestPlaces) return test;
   const auto without = [&](std::vector<double> errors) {
     errors.erase(errors.begin() + static_cast<std::ptrdiff_t>(worst));
@@ -185,6 +179,16 @@ GainTest testGain(const std::vector<int>& places, const std::vector<double>& bef
 
 bool isRanked(const MethodScore& score, const Comparison& comparison) {
   return score.tuned_inside && score.validated == comparison.validation;
+}
+
+void tellDistanceTo(const std::vector<double>& of_best, std::vector<MethodScore>& scores) {
+  for (MethodScore& score : scores) {
+    if (score.skipped) continue;
+    const PairedDifference difference = pairedDifference(score.place_errors, of_best, score.freedom.positions_a_place);
+    score.rms_to_best = difference.difference;
+    score.rms_to_best_low90 = difference.low90;
+    score.rms_to_best_high90 = difference.high90;
+  }
 }
 
 double excessError(double rms, double floor) { return std::sqrt(std::max(0.0, rms * rms - floor * floor)); }

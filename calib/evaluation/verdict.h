@@ -22,6 +22,10 @@ bool isRanked(const MethodScore& score, const Comparison& comparison);
 /// What the gain of a position correction says of it.
 void judgePosition(Verdict& verdict, const GainTest& test);
 
+/// Fills in each method's RMS minus that of the best, with the interval over the same places.
+/// @param of_best the best one's errors of the places, mm or deg
+void tellDistanceTo(const std::vector<double>& of_best, std::vector<MethodScore>& scores);
+
 /// Picks the best of the ranked methods by held-out RMS (nothing wins unless it beats the error before), tests their
 /// gain, and tells how far the others are from the best.
 void pickBest(Comparison& comparison);

@@ -1,12 +1,15 @@
 #include "calib/exporters/imported_calibration.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 
 #include "calib/core/file_io.h"
 #include "calib/core/number_text.h"
 #include "calib/correctors/baked/imported_lattice.h"
 #include "calib/exporters/registry.h"
+#include "calib/recording/unit_slip.h"
 
 namespace fieldtrue::exporters {
 namespace {
@@ -89,15 +92,42 @@ Region regionOf(const LatticeField& field) {
   return Region::around(points_m, 3, 0.0);
 }
 
-Result<void> check(const LatticeField& field, const std::string& name) {
+/// False also for what is not finite.
+bool isWithinReach(const Eigen::Vector3d& moved_m) { return moved_m.norm() <= recording::kTrackerReach_m; }
+
+/// What is wrong with a displacement that no tracker needs.
+std::string wrongText(const Eigen::Vector3d& moved_m, const CalibrationFormat& format) {
+  if (!moved_m.allFinite()) return " is not a finite number";
+  // With an exponent where it must be: damaged numbers have hundreds of digits.
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.begin(), text.end(), moved_m.stableNorm(), std::chars_format::general, 3).ptr;
+  return " is " + std::string(text.begin(), end) + " m, more than the " + shortNumber(recording::kTrackerReach_m) +
+         " m that any tracker reaches; its numbers were taken as " + format.unit;
+}
+
+/// As calibration files must have it.
+Result<void> checkPoints(const LatticePoints& points, const std::string& name) {
+  if (!points.origin_m.allFinite() || !points.pitch_m.allFinite() || !(points.pitch_m.minCoeff() > 0.0))
+    return fail(ErrorCode::kBadInput,
+                name + ": the origin and spacing of the lattice must be finite, the spacing above 0");
+  if (!(points.axes.transpose() * points.axes).isApprox(Eigen::Matrix3d::Identity(), 1e-6))
+    return fail(ErrorCode::kBadInput, name + ": the axes of the lattice are not at right angles");
+  return {};
+}
+
+Result<void> check(const LatticeField& field, const CalibrationFormat& format, const std::string& name) {
   if (field.points.size() > correctors::kMostImportedPoints)
     return fail(ErrorCode::kBadInput, name + " has " + std::to_string(field.points.size()) +
                                           " points, and a calibration holds at most " +
                                           std::to_string(correctors::kMostImportedPoints) + "; thin the field out");
+  FT_TRY_VOID(checkPoints(field.points, name));
   for (std::size_t i = 0; i < field.displacement_m.size(); ++i)
-    if (isInside(field, i) && !field.displacement_m[i].allFinite())
-      return fail(ErrorCode::kBadInput,
-                  name + ": the displacement of point " + std::to_string(i) + " is not a finite number");
+    if (isInside(field, i) && !isWithinReach(field.displacement_m[i]))
+      return fail(ErrorCode::kBadInput, name + ": the displacement of point " + std::to_string(i) +
+                                            wrongText(field.displacement_m[i], format));
+  for (std::size_t i = 0; i < field.rotation.size(); ++i)
+    if (isInside(field, i) && !field.rotation[i].coeffs().allFinite())
+      return fail(ErrorCode::kBadInput, name + ": the turn of point " + std::to_string(i) + " is not a finite number");
   if (std::none_of(field.inside.begin(), field.inside.end(), [](char one) { return one != 0; }) &&
       !field.inside.empty())
     return fail(ErrorCode::kBadInput, name + " has no point that counts as inside");
@@ -139,7 +169,7 @@ const CalibrationFormat* recogniseCalibration(const std::filesystem::path& path)
     const Result<const Exporter*> reader = readerFor(format, path);
     if (!reader) continue;
     const Result<LatticeField> field = (*reader)->read(path);
-    if (field && check(*field, path.filename().string())) return &format;
+    if (field && check(*field, format, path.filename().string())) return &format;
   }
   return nullptr;
 }
@@ -148,7 +178,7 @@ Result<Corrector> importCalibration(const CalibrationFormat& format, const std::
   const std::string name = path.filename().string();
   FT_TRY(const Exporter* exporter, readerFor(format, path));
   FT_TRY(LatticeField field, exporter->read(path));
-  FT_TRY_VOID(check(field, name));
+  FT_TRY_VOID(check(field, format, name));
   FT_TRY(const std::string content, readFile(path));
   if (saysTrueToMeasured(content))
     return fail(ErrorCode::kBadInput, name + " says that it takes true positions to measured ones, and a calibration " +
@@ -158,10 +188,12 @@ Result<Corrector> importCalibration(const CalibrationFormat& format, const std::
   double squares_m2 = 0.0;
   for (std::size_t i = 0; i < field.displacement_m.size(); ++i) {
     const Eigen::Vector3d moved_m =
-        field.displacement_m[i].allFinite() ? field.displacement_m[i] : Eigen::Vector3d(Eigen::Vector3d::Zero());
+        isWithinReach(field.displacement_m[i]) ? field.displacement_m[i] : Eigen::Vector3d(Eigen::Vector3d::Zero());
     squares_m2 += moved_m.squaredNorm() / static_cast<double>(field.displacement_m.size());
     append(displacements.values, moved_m);
-    if (!field.rotation.empty()) append(turns.values, rotationVector_rad(field.rotation[i]));
+    if (field.rotation.empty()) continue;
+    const bool is_turn = field.rotation[i].coeffs().allFinite();
+    append(turns.values, is_turn ? rotationVector_rad(field.rotation[i]) : Eigen::Vector3d(Eigen::Vector3d::Zero()));
   }
   const std::string note =
       "Imported from " + name + " (" + format.label + "), numbers taken as " + format.unit +

@@ -1,6 +1,9 @@
 #include <matio.h>
 
+#include <memory>
+
 #include "calib/core/file_io.h"
+#include "calib/exporters/bytes.h"
 #include "calib/exporters/lattice_arrays.h"
 #include "calib/exporters/rows.h"
 
@@ -80,6 +83,29 @@ Result<void> writeMat(const LatticeField& field, const Facts& facts, const std::
   });
 }
 
+/// Walks over the elements of a file of version 5: what is missing or damaged matio takes for zeros.
+/// @error kBadInput with the reason alone
+/// @source MathWorks, MAT-File Format, "Level 5 MAT-File Format"
+Result<void> checkElements(std::string_view bytes) {
+  constexpr std::size_t kHead = 128, kTag = 8;
+  constexpr std::uint32_t kCompressed = 15;
+  if (bytes.size() < kHead) return fail(ErrorCode::kBadInput, "the file is cut off");
+  const bool is_big_endian = bytes.substr(kHead - 2, 2) == "MI";
+  const auto numberAt = [&](std::size_t at) {
+    const auto number = static_cast<std::uint32_t>(int32At(bytes, at));
+    return is_big_endian ? __builtin_bswap32(number) : number;
+  };
+  for (std::size_t at = kHead; at < bytes.size();) {
+    const std::size_t left = bytes.size() - at;
+    if (left < kTag || numberAt(at + 4) > left - kTag) return fail(ErrorCode::kBadInput, "the file is cut off");
+    const std::size_t n = numberAt(at + 4);
+    // Unpacked to the end, where its check sum is.
+    if (numberAt(at) == kCompressed) FT_TRY_VOID(inflated(bytes.substr(at + kTag, n)).map([](const std::string&) {}));
+    at += kTag + n;
+  }
+  return {};
+}
+
 std::vector<double> numbersOf(mat_t* file, const char* name) {
   matvar_t* variable = Mat_VarRead(file, name);
   if (variable == nullptr) return {};
@@ -96,13 +122,16 @@ Result<LatticeField> readMat(const std::filesystem::path& path) {
   const auto isNot = [&](const std::string& why) {
     return fail(ErrorCode::kBadInput, path.string() + " is no lattice that can be read: " + why);
   };
-  mat_t* file = Mat_Open(path.c_str(), MAT_ACC_RDONLY);
-  if (file == nullptr) return isNot("it is no MAT-file");
+  FT_TRY(const std::string bytes, readFile(path));
+  const std::unique_ptr<mat_t, int (*)(mat_t*)> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), Mat_Close);
+  // Version 4 has no arrays of more than two dimensions; version 7.3 is HDF5, which misses its own end.
+  if (!file || Mat_GetVersion(file.get()) == MAT_FT_MAT4) return isNot("it is no MAT-file of version 5 or later");
+  if (Mat_GetVersion(file.get()) == MAT_FT_MAT5)
+    if (const auto whole = checkElements(bytes); !whole) return isNot(whole.error().message);
   LatticeArrays arrays;
   for (std::size_t axis = 0; axis < 3; ++axis)
-    arrays.axes_m[axis] = numbersOf(file, (std::string(1, "xyz"[axis]) + "_m").c_str());
-  const std::vector<double> corrected = numbersOf(file, "corrected_m"), turned = numbersOf(file, "q_wxyz");
-  Mat_Close(file);
+    arrays.axes_m[axis] = numbersOf(file.get(), (std::string(1, "xyz"[axis]) + "_m").c_str());
+  const std::vector<double> corrected = numbersOf(file.get(), "corrected_m"), turned = numbersOf(file.get(), "q_wxyz");
   const std::size_t nx = arrays.axes_m[0].size(), ny = arrays.axes_m[1].size(), nz = arrays.axes_m[2].size();
   const std::size_t n = nx * ny * nz;
   if (n == 0 || corrected.size() != 3 * n)

@@ -83,6 +83,7 @@ Result<LatticeField> readNpz(const std::filesystem::path& path) {
   };
   constexpr std::uint64_t kMostBytes = std::uint64_t{4} << 30U;
   auto members = readZip(path, kMostBytes);
+  if (!members && members.error().code == ErrorCode::kIo) return tl::unexpected(members.error());
   if (!members) return isNot("it is no archive");
   LatticeArrays arrays;
   for (std::size_t axis = 0; axis < 3; ++axis)

@@ -16,13 +16,15 @@ constexpr int kSyzygyPadding = 2;
 
 std::string feet(double length_m) { return formatNumber(length_m / kFoot_m); }
 
-Result<std::vector<double>> numbersOfFile(const std::filesystem::path& path) {
-  FT_TRY(const auto content, readFile(path));
-  return numbersIn(content.substr(0, content.find('#')));
-}
-
 tl::unexpected<Error> isNot(const std::filesystem::path& path, const std::string& why) {
   return fail(ErrorCode::kBadInput, path.string() + " is no table that can be read: " + why);
+}
+
+Result<std::vector<double>> numbersOfFile(const std::filesystem::path& path) {
+  FT_TRY(const auto content, readFile(path));
+  auto numbers = numbersIn(content.substr(0, content.find('#')));
+  if (!numbers) return isNot(path, numbers.error().message);
+  return numbers;
 }
 
 Result<void> writeCave(const LatticeField& field, const Facts& facts, const std::filesystem::path& path) {
@@ -44,7 +46,7 @@ Result<void> writeCave(const LatticeField& field, const Facts& facts, const std:
 
 Result<LatticeField> readCave(const std::filesystem::path& path) {
   const auto numbers = numbersOfFile(path);
-  if (!numbers) return isNot(path, numbers.error().message);
+  if (!numbers) return tl::unexpected(numbers.error());
   constexpr std::size_t kBounds = 6;
   if (numbers->size() < kBounds + 8 * 6 || (numbers->size() - kBounds) % 6 != 0)
     return isNot(path, "it needs three pairs of bounds and six numbers a row");
@@ -104,7 +106,7 @@ Result<void> writeSyzygy(const LatticeField& field, const Facts& facts, const st
 
 Result<LatticeField> readSyzygy(const std::filesystem::path& path) {
   const auto numbers = numbersOfFile(path);
-  if (!numbers) return isNot(path, numbers.error().message);
+  if (!numbers) return tl::unexpected(numbers.error());
   constexpr std::size_t kHead = 9;
   if (numbers->size() < kHead) return isNot(path, "its head needs nine numbers");
   LatticeField field;

@@ -268,6 +268,16 @@ void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, 
       1.0 - floor_excess);
 }
 
+/// Which of the selected terms a candidate is: of an effect that was selected twice the leading one.
+std::optional<std::size_t> selectedAs(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                                      const std::string& effect) {
+  const auto is = [&](std::size_t t) { return search.ways()[selection.ways[t]].effect->id == effect; };
+  if (selection.leading < selection.ways.size() && is(selection.leading)) return selection.leading;
+  for (std::size_t t = 0; t < selection.ways.size(); ++t)
+    if (is(t)) return t;
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, const Judgement& judgement,
@@ -287,10 +297,8 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
     candidates.push_back(std::move(candidate));
   }
   findEquivalents(search, selection, candidates);
-  for (std::size_t t = 0; t < selection.ways.size(); ++t) {
-    for (GapCandidate& c : candidates)
-      if (c.effect == search.ways()[selection.ways[t]].effect->id) c.shrinkage = shrinkageOfStep(judgement.far, t);
-  }
+  for (GapCandidate& c : candidates)
+    if (const auto t = selectedAs(search, selection, c.effect)) c.shrinkage = shrinkageOfStep(judgement.far, *t);
   const MostEvidence most_of = mostEvidence(search, selection, candidates);
   addNameless(judgement, has_gap, scattered_share, most_of, search.thresholds(), candidates);
   setProbabilities(!selection.ways.empty() || judgement.refusal != Refusal::kNone, most_of, search.thresholds(),
@@ -318,7 +326,7 @@ std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, 
     effect.equivalents = {effect.effect};
     effect.probability = 1.0;
     for (const GapCandidate& c : candidates) {
-      if (c.effect != effect.effect) continue;
+      if (c.effect != effect.effect || selectedAs(search, selection, c.effect) != t) continue;
       effect.equivalents = c.equivalents;
       effect.probability = c.probability;
       effect.bic_gain = c.bic_gain;

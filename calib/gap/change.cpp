@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "calib/core/file_io.h"
 #include "calib/core/units.h"
 #include "calib/gap/two_recordings.h"
 #include "calib/gap/verdict.h"
@@ -284,7 +285,11 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
 
 namespace {
 
-std::string howSure(double p_value) { return p_value < 1e-3 ? "p < 0.001" : "p < " + shown(std::min(1.0, p_value)); }
+/// The next larger thousandth or, from a hundredth on, hundredth.
+std::string howSure(double p_value) {
+  const double steps = p_value < 0.01 ? 1000.0 : 100.0;
+  return "p < " + formatNumber(std::min(1.0, (std::floor(p_value * steps) + 1.0) / steps));
+}
 
 std::string nothingText(const RecordingChange& change) {
   return "Nothing changed since the earlier recording that these two would show; they would show a change of about " +

@@ -22,6 +22,7 @@
 #include "calib/identify/selection.h"
 #include "calib/recording/cleaning.h"
 #include "calib/recording/finding.h"
+#include "calib/recording/own_samples.h"
 #include "calib/tables/table_sensors.h"
 
 namespace fieldtrue::gap {
@@ -167,7 +168,7 @@ void describeJudgement(const identify::GapSearch& search, const Judgement& judge
   report.origin = search.structureOfNone().origin;
   report.selected = describeSelected(search, judgement, report.candidates, control);
   report.rival = rivalOf(judgement);
-  if (report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
+  if (report.not_looked_for.empty() && report.candidates.size() > 1 && report.candidates[1].probability > 0.0)
     report.odds_over_next = report.candidates[0].probability / report.candidates[1].probability;
   if (belongs_together) addFindings(search, rows, judgement, has_gap, report);
   if (belongs_together && has_gap && rows.has_dipoles) report.source_shape = sourceShapeOf(search, judgement.selection);
@@ -210,6 +211,10 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
   const std::size_t fewest = options.thresholds.fewest_places_for_causes;
   const bool has_enough = rows.place_nodes.size() >= fewest;
   selecting.most_effects = has_enough && belongs_together && known_gap.value_or(true) ? options.most_effects : 0;
+  if (!has_enough)
+    report.not_looked_for =
+        std::to_string(report.input.places) + " places are too few, " + std::to_string(fewest) + " are needed";
+  if (!belongs_together) report.not_looked_for = "the readings do not belong to their places as the table states them";
   const double part = options.replicates > 0 ? 0.1 : 1.0;  // Of the progress, without replicates.
   const identify::EffectSelection selection =
       identify::selectEffects(search, selecting, partOf(control, 0.1 * part, 0.7 * part));
@@ -229,10 +234,6 @@ Result<GapReport> diagnoseRows(recording::Cleaned cleaned, const TableMetadata& 
     report.next_measurement = "Nothing needs to be measured: put the table right, and diagnose it again.";
   }
   report.text = verdictText(report, known_gap ? "change" : "gap");
-  if (!has_enough) {
-    report.text += " Causes are not looked for: " + std::to_string(report.input.places) + " places are too few, " +
-                   std::to_string(fewest) + " are needed.";
-  }
   selectSignalFindings(report);
   if (options.replicates > 0) {
     addReplicates(search, judgement, scene, options, selecting.most_effects, partOf(control, part, 1.0), report);
@@ -265,6 +266,10 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
                            const DiagnosisOptions& options, const RunControl& control) {
   if (options.against != nullptr) return diagnoseChange(table, scene, options, control);
   recording::Cleaned cleaned = recording::cleanRows(table);
+  if (samples != nullptr) {
+    FT_TRY(auto foreign, recording::foreignSamples(*samples, table));
+    if (foreign) cleaned.findings.push_back(*std::move(foreign));
+  }
   addSignalFindings(table, samples, scene, cleaned);
   return diagnoseRows(std::move(cleaned), table.metadata, samples, scene, options, {}, control);
 }

@@ -29,7 +29,8 @@ struct DiagnosisOptions {
 /// @param samples the raw readings of the table's rows; null = none
 /// @param scene what the simulator believes; null = an ideal tracker in free space
 /// @error kTooFewNodes below 8 usable places (causes are looked for from 12 on), those with a value that is not finite
-/// left out and named, or where an earlier recording tells the field at fewer; kCancelled
+/// left out and named, or where an earlier recording tells the field at fewer; kBadInput where most samples are not
+/// those of the table's rows; kCancelled
 Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
                            const DiagnosisOptions& options = {}, const RunControl& control = {});
 

@@ -36,9 +36,13 @@ void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) 
   for (const GapNode& node : report.nodes)
     if (node.is_flagged && std::find(nodes.begin(), nodes.end(), node.node) == nodes.end()) nodes.push_back(node.node);
   if (nodes.empty()) return;
-  std::string text = nodes.size() == 1 ? "One place does not fit the others: " : "Places that do not fit the others: ";
+  const bool are_few = nodes.size() * 3 < rows.place_nodes.size();
+  std::string text =
+      nodes.size() == 1 ? "One place does not fit the others: "
+      : are_few         ? "Places that do not fit the others: "
+                : std::to_string(nodes.size()) + " of " + std::to_string(rows.place_nodes.size()) + " places lie off: ";
   text += report.names.list(nodes, kMostNamed) + ".";
-  if (report.hotspot && !rows.has_dipoles && nodes.size() * 3 < rows.place_nodes.size()) {
+  if (report.hotspot && !rows.has_dipoles && are_few) {
     const Eigen::Vector3d& at = report.hotspot->center_m;
     text += " Something local acts within " + shown(report.hotspot->radius_m) + " m of (" + shown(at.x()) + ", " +
             shown(at.y()) + ", " + shown(at.z()) + ") m";

@@ -223,17 +223,23 @@ std::vector<std::string> adviceFor(const Isolability& isolability, const identif
   double last_s = -1e300;
   std::size_t climbs = 0;
   double last_z = -1e300;
+  double first_z = rows.rows.empty() ? 0.0 : rows.rows.front().reference_from_sensor.position_m.z();
+  bool has_layers = false;
   for (const identify::GapRow& row : rows.rows) {
     in_order = in_order && row.time_s >= last_s;
     last_s = row.time_s;
     climbs += row.reference_from_sensor.position_m.z() >= last_z - 1e-6 ? 1 : 0;
     last_z = row.reference_from_sensor.position_m.z();
+    has_layers = has_layers || std::abs(last_z - first_z) > 1e-6;
   }
-  if (in_order && climbs + rows.rows.size() / 10 >= rows.rows.size())
+  if (has_layers && in_order && climbs + rows.rows.size() / 10 >= rows.rows.size())
     advice.push_back("The places are visited layer by layer: in random order drift can be told from a leaning rig.");
-  std::map<std::size_t, int> visits;
-  for (const identify::GapRow& row : rows.rows) ++visits[row.place];
-  const auto revisited = std::count_if(visits.begin(), visits.end(), [](const auto& v) { return v.second > 1; });
+  std::map<std::size_t, std::map<std::size_t, int>> visits;  // Of each place by each sensor.
+  for (const identify::GapRow& row : rows.rows) ++visits[row.place][row.sensor];
+  const auto isAgain = [](const auto& of_sensor) { return of_sensor.second > 1; };
+  const auto revisited = std::count_if(visits.begin(), visits.end(), [&](const auto& of_place) {
+    return std::any_of(of_place.second.begin(), of_place.second.end(), isAgain);
+  });
   if (revisited < 10)
     advice.push_back("Set the jig anew at ten places or more: only that measures how well it is placed.");
   return advice;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <set>
 
 #include "calib/core/file_io.h"
 #include "calib/effects/registry.h"
@@ -68,9 +69,12 @@ std::vector<Proposal> outerProposals(const identify::GapRows& table, double pitc
              sign * table.rows[b].reference_from_sensor.position_m[axis];
     });
     const double face_m = table.rows[order.front()].reference_from_sensor.position_m[axis];
-    std::vector<std::size_t> face;
+    std::vector<std::size_t> face;  // A row of each place.
+    std::set<std::size_t> places;
     for (const std::size_t i : order)
-      if (std::abs(table.rows[i].reference_from_sensor.position_m[axis] - face_m) < 0.3 * pitch_m) face.push_back(i);
+      if (std::abs(table.rows[i].reference_from_sensor.position_m[axis] - face_m) < 0.3 * pitch_m &&
+          places.insert(table.rows[i].place).second)
+        face.push_back(i);
     Proposal proposal;
     const std::size_t count = std::min<std::size_t>(6, face.size());
     for (std::size_t k = 0; k < count; ++k) {
@@ -78,8 +82,9 @@ std::vector<Proposal> outerProposals(const identify::GapRows& table, double pitc
       row.reference_from_sensor.position_m[axis] += sign * pitch_m;
       proposal.rows.push_back(row);
     }
-    proposal.text = "measure " + std::to_string(count) + " more places one step (" + rounded(pitch_m, 2) +
-                    " m) beyond " + names.list(nodesOf(proposal.rows)) + ", towards " + kSides[side];
+    proposal.text = "measure " + std::to_string(count) + (count == 1 ? " more place" : " more places") + " one step (" +
+                    rounded(pitch_m, 2) + " m) beyond " + names.list(nodesOf(proposal.rows)) + ", towards " +
+                    kSides[side];
     proposals.push_back(std::move(proposal));
   }
   return proposals;
@@ -247,6 +252,7 @@ void predictRemoval(const identify::GapSearch& search, const identify::EffectSel
       const Removal::Then then = removal.at(i);
       Prediction prediction;
       prediction.effect = report.selected[t].effect;
+      prediction.selected = t;
       prediction.node = report.nodes[i].node;
       prediction.now_mm = 1e3 * report.nodes[i].before_m.norm();
       prediction.then_mm = 1e3 * then.size_m;
@@ -256,21 +262,19 @@ void predictRemoval(const identify::GapSearch& search, const identify::EffectSel
   }
 }
 
+/// Of the first effect that can be taken away with something to be seen.
 std::string interventionText(const GapReport& report) {
-  const SelectedEffect& first = report.selected.front();
+  const Prediction& prediction = report.predictions.front();
+  const SelectedEffect& first = report.selected[prediction.selected];
   std::string text = "Move or remove what acts as " + effects::labelOf(first.effect);
   if (first.location_m) {
     const Eigen::Vector3d& p = *first.location_m;
     text += " near (" + rounded(p.x(), 2) + ", " + rounded(p.y(), 2) + ", " + rounded(p.z(), 2) +
             ") m from the transmitter";
   }
-  for (const Prediction& p : report.predictions) {
-    if (p.effect != first.effect) continue;
-    text += " and measure " + report.names.of(p.node) + " again: its gap should go from " + rounded(p.now_mm, 0) +
-            " to " + rounded(p.then_mm, 0) + " +- " + rounded(p.then_sd_mm, 0) + " mm";
-    break;
-  }
-  return text + ".";
+  return text + " and measure " + report.names.of(prediction.node) + " again: its gap should go from " +
+         rounded(prediction.now_mm, 0) + " to " + rounded(prediction.then_mm, 0) + " +- " +
+         rounded(prediction.then_sd_mm, 0) + " mm.";
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "calib/gap/plan_check.h"
 
 #include <algorithm>
+#include <set>
 
 #include "calib/field/tracker_model.h"
 #include "calib/gap/isolability.h"
@@ -23,6 +24,13 @@ Pose defaultTransmitter(std::span<const PlannedPlace> plan) {
 
 double placingSd_m(const simulation::Scene& scene) {
   return scene.rig.tolerance_m > 0.0 ? scene.rig.tolerance_m : evaluation::kUsualPlacing_m;
+}
+
+std::size_t countPlaces(std::span<const PlannedPlace> plan) {
+  std::set<int> nodes;
+  for (const PlannedPlace& place : plan)
+    if (place.role != NodeRole::kSkipped) nodes.insert(place.node);
+  return nodes.size();
 }
 
 /// The rows that a plan would give were nothing wrong, with the noise of the scene's tracker and rig.
@@ -66,12 +74,13 @@ Result<PlanCheck> planCheck(std::span<const PlannedPlace> plan, const simulation
                             const RunControl& control) {
   simulation::Scene believed = scene != nullptr ? *scene : simulation::Scene{};
   if (scene == nullptr) believed.reference_from_tracker = defaultTransmitter(plan);
-  FT_TRY(auto rows, plannedRows(plan, believed));
   const std::size_t fewest = identify::Thresholds{}.fewest_places_for_causes;
-  if (rows.place_nodes.size() < fewest) {
+  const std::size_t n_places = countPlaces(plan);
+  if (n_places < fewest) {
     return fail(ErrorCode::kTooFewNodes, "A plan is checked with at least " + std::to_string(fewest) +
-                                             " places; this one has " + std::to_string(rows.place_nodes.size()) + ".");
+                                             " places; this one has " + std::to_string(n_places) + ".");
   }
+  FT_TRY(auto rows, plannedRows(plan, believed));
   FT_TRY(auto effects, simulation::makeEffects(believed.effects, rows.excitation));
   const identify::GapSearch search(rows, std::move(effects), identify::NoiseFrom::kStated);
   PlanCheck check{

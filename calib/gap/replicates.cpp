@@ -81,15 +81,18 @@ std::vector<std::pair<std::string, Eigen::Vector3d>> placedIn(const identify::Ga
   return placed_m;
 }
 
-/// How far each thing in the room was found again from where it was found first: the nearest of its kind.
+/// How far the things in the room were found again from where they were found first, the nearest of its kind to each:
+/// the farthest of them.
 void addOff(const std::vector<std::pair<std::string, Eigen::Vector3d>>& first, const Named& again,
             std::vector<double>& off_m) {
+  std::optional<double> farthest_m;
   for (const auto& [effect, at_m] : first) {
     std::optional<double> nearest_m;
     for (const auto& [other, there_m] : again.placed_m)
       if (other == effect) nearest_m = std::min(nearest_m.value_or(1e9), (there_m - at_m).norm());
-    if (nearest_m) off_m.push_back(*nearest_m);
+    if (nearest_m) farthest_m = std::max(farthest_m.value_or(0.0), *nearest_m);
   }
+  if (farthest_m) off_m.push_back(*farthest_m);
 }
 
 Named namedBy(const identify::GapRows& rows, const BelievedEffects& believed, const ReplicateOptions& options,

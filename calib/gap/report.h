@@ -150,6 +150,7 @@ struct SmallestDetectable {
 /// What would happen at the worst places were an effect taken away: to be checked by doing so.
 struct Prediction {
   std::string effect;
+  std::size_t selected = 0;  ///< Which of the selected effects it is.
   int node = 0;
   double now_mm = 0.0;
   double then_mm = 0.0;
@@ -244,6 +245,7 @@ struct GapReport {
   std::optional<Replicates> replicates;
   std::optional<Against> against;
   std::optional<double> odds_over_next;  ///< Of the first candidate over the second.
+  std::string not_looked_for;            ///< Why causes of a gap were not, half a sentence; empty where they were.
   Isolability isolability;
   std::string next_measurement;
   std::vector<std::string> next_separates;

@@ -242,6 +242,7 @@ json againstToJson(const Against& against) {
 
 json predictionToJson(const Prediction& prediction) {
   return {{"effect", prediction.effect},
+          {"selected", prediction.selected},
           {"node", prediction.node},
           {"now_mm", numberToJson(prediction.now_mm)},
           {"then_mm", numberToJson(prediction.then_mm)},
@@ -292,6 +293,7 @@ json toJson(const GapReport& report) {
           {"remaining", remainingToJson(report.remaining)},
           {"rival", rivalToJson(report.rival)},
           {"odds_over_next", numberToJson(report.odds_over_next)},
+          {"not_looked_for", report.not_looked_for},
           {"replicates", report.replicates ? replicatesToJson(*report.replicates) : json(nullptr)},
           {"against", report.against ? againstToJson(*report.against) : json(nullptr)},
           {"isolability", toJson(report.isolability)},

@@ -1,5 +1,7 @@
 #include "calib/gap/report_reader.h"
 
+#include <algorithm>
+
 #include "calib/core/file_io.h"
 #include "calib/core/json_reader.h"
 #include "calib/core/json_text.h"
@@ -179,7 +181,9 @@ void readLists(const JsonReader& reader, GapReport& report) {
                    item["high90_mm"].optionalNumber()};
   });
   report.predictions = reader["predictions"].list([](const JsonReader& item) {
-    return Prediction{item["effect"].text(), item["node"].integer(), item["now_mm"].numberOrNan(),
+    const int selected = item.has("selected") ? item["selected"].integer() : 0;
+    return Prediction{item["effect"].text(),         static_cast<std::size_t>(std::max(0, selected)),
+                      item["node"].integer(),        item["now_mm"].numberOrNan(),
                       item["then_mm"].numberOrNan(), item["then_sd_mm"].numberOrNan()};
   });
 }
@@ -269,6 +273,7 @@ GapReport reportFrom(const JsonReader& root) {
   if (const auto replicates = root.find("replicates"); replicates && !replicates->isNull())
     report.replicates = replicatesFrom(*replicates);
   if (const auto against = root.find("against"); against && !against->isNull()) report.against = againstFrom(*against);
+  if (root.has("not_looked_for")) report.not_looked_for = root["not_looked_for"].text();
   if (root.has("odds_over_next")) report.odds_over_next = root["odds_over_next"].optionalNumber();
   report.isolability = isolabilityFrom(root["isolability"]);
   report.next_measurement = root["next_measurement"]["text"].text();

@@ -151,6 +151,8 @@ std::string verdictText(const GapReport& report, const std::string& thing) {
         return "There is a " + thing + " (" + gap + ") that no known effect explains; the nearest is " +
                causesText(report) + ": " + fallText(report) + ".";
       }
+      if (!report.not_looked_for.empty())
+        return "There is a " + thing + " (" + gap + "); its cause is not looked for: " + report.not_looked_for + ".";
       return "There is a " + thing + " (" + gap + ") that no known effect explains" +
              (report.rival.why.empty() ? "." : ": " + report.rival.why + ".");
   }

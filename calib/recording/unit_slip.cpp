@@ -19,7 +19,6 @@ namespace fieldtrue::recording {
 
 namespace {
 
-constexpr double kWidest_m = 30.0;
 constexpr double kNarrowest_m = 1e-3;
 constexpr std::size_t kFewestPlaces = 4;
 constexpr double kLargestRatio = 2.0;
@@ -136,9 +135,9 @@ Result<void> checkUnits(const CalibrationTable& table) {
     return fail(ErrorCode::kBadInput, slipText(nearestSlip(nodes)) + "; both must be in metres");
   }
   const std::string the_places = "the " + std::to_string(places.size()) + " places ";
-  if (width_m > kWidest_m) {
+  if (width_m > kTrackerReach_m) {
     return fail(ErrorCode::kBadInput, the_places + "are spread over " + threeFigures(width_m) + " m, more than the " +
-                                          threeFigures(kWidest_m) +
+                                          threeFigures(kTrackerReach_m) +
                                           " m that any tracker reaches; true positions must be in metres");
   }
   if (width_m <= kNarrowest_m) {

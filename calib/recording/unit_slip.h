@@ -25,6 +25,9 @@ inline constexpr std::array<UnitSlip, 7> kUnitSlips{{{1000.0, "millimetres for m
                                                      {39.37, "inches for metres"},
                                                      {3.28, "feet for metres"}}};
 
+/// Farther than any tracker reaches.
+inline constexpr double kTrackerReach_m = 30.0;
+
 /// Refuses a table whose positions cannot all be metres: places more than 30 m apart or all within 1 mm, or, from four
 /// places on, distances between true places and between their readings (mirrored ones put back) that differ by more
 /// than a factor of two in the median. Only distances count, so that neither an alignment nor mirrored axes, nor a

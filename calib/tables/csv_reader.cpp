@@ -76,7 +76,7 @@ Result<void> CsvReader::readHeader(CsvHeader header) {
                   name() + (line() == 0 ? " is empty" : " has no header row") + "; it needs a row of column names");
     }
     if (line_.find('\0') != std::string::npos) {
-      return fail(ErrorCode::kBadInput, where() + ": this is not UTF-8 text; save the table as comma-separated UTF-8");
+      return fail(ErrorCode::kBadInput, where() + ": " + std::string(kNotUtf8));
     }
     if (line_.starts_with('#')) {
       const std::optional<MetadataLine> metadata = metadataLine(is_comment_header ? '=' : ':');

@@ -15,6 +15,9 @@
 
 namespace fieldtrue {
 
+/// Follows the line in messages.
+inline constexpr std::string_view kNotUtf8 = "this is not UTF-8 text; save the table as comma-separated UTF-8";
+
 /// Where a table's columns have their names.
 enum class CsvHeader {
   kRow,       ///< In the first row.

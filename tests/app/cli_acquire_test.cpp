@@ -7,6 +7,7 @@
 #include <QTest>
 #include <set>
 
+#include "acquisition/session/session_store.h"
 #include "calib/tables/table_io.h"
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
@@ -229,6 +230,20 @@ class CliAcquireTest : public QObject {
     QVERIFY2(wrong.err.contains("'5kg' is no length of a take"), wrong.err.constData());
     FT_VERIFY_STATUS(run({"--until", "1s", "--samples-per-node", "20", "--session", at("none.fieldtrue")}), 2);
     QVERIFY(!QFileInfo::exists(at("none.fieldtrue")));
+  }
+
+  void aResumedSessionGoesOnWithItsOwnLength() {
+    const QString session = at("length.fieldtrue");
+    const auto run = [&](const QStringList& more) {
+      const CliRun done = runCli(QStringList{"acquire", "--device", "simulated:speed=20", "--plan", "grid:1x1x1@0.2",
+                                             "--auto", "--session", session} +
+                                 more);
+      const auto store = acquisition::SessionStore::open(session);
+      return done.status == 0 && store ? store->state("take_length").value_or("unread") : "failed";
+    };
+    QCOMPARE(run({"--until", "0.5s"}), std::string("0.5s"));
+    QCOMPARE(run({}), std::string("0.5s"));
+    QCOMPARE(run({"--samples-per-node", "20"}), std::string("20"));
   }
 
   void aTrackerThatComesBackGoesOn() {

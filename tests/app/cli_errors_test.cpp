@@ -61,8 +61,18 @@ class CliErrorsTest : public QObject {
     row("no command", "", 2, {"subcommand"});
     row("unknown command", "calibrate", 2, {"calibrate", "compare"});
     row("missing option", "fit --nodes @/good.nodes.csv", 2, {"required"});
-    row("unknown option", "compare --nodes @/good.nodes.csv --colour red", 2, {"--colour"});
+    row("unknown option", "compare --nodes @/good.nodes.csv --colour red", 2, {"no option --colour"});
+    row("unknown option in place of a required one", "fit --nodez @/good.nodes.csv --position affine --out @/o.json", 2,
+        {"no option --nodez"});
     row("not a number", "simulate --plan grid:2x2x2@0.1 --nodes @/o.csv --seed seven", 2, {"seven"});
+    for (const char* seed : {"-1", "99999999999999999999999", "0x10", "1.5", "+3"}) {
+      const QByteArray of_seed = QByteArray("--seed ") + seed;
+      const QList<QByteArray> told{seed, "from 0 to 18446744073709551615"};
+      row(("simulate " + of_seed).constData(),
+          ("simulate --plan grid:2x2x2@0.1 --nodes @/o.csv " + of_seed).constData(), 2, told);
+      row(("compare " + of_seed).constData(),
+          ("compare --nodes @/good.nodes.csv --methods rigid " + of_seed).constData(), 2, told);
+    }
     row("no threads", "compare --nodes @/good.nodes.csv --threads 0", 2, {"threads"});
     row("bad plan", "simulate --plan grid:2x2@0.1 --nodes @/o.csv", 2, {"grid"});
     row("unknown method", "compare --nodes @/good.nodes.csv --methods rigid,magic", 2,
@@ -170,6 +180,30 @@ class CliErrorsTest : public QObject {
       QVERIFY2(!file.startsWith("o.") && !file.contains(".part-"), qPrintable(file + " was left behind"));
     }
     QVERIFY(readWhole(at("good.nodes.csv")).startsWith("#") || readWhole(at("good.nodes.csv")).contains("x_true_m"));
+  }
+
+  void anEmptyNameOrSeedIsRefused_data() {
+    QTest::addColumn<QString>("arguments");  // ended by the option whose value is left empty
+    QTest::addColumn<QByteArray>("told");
+    QTest::newRow("output") << "simulate --plan grid:2x2x2@0.1 --nodes" << QByteArray("--nodes needs a file name");
+    QTest::newRow("second output") << "simulate --plan grid:2x2x2@0.1 --nodes @/o.csv --samples"
+                                   << QByteArray("--samples needs a file name");
+    QTest::newRow("page") << "compare --nodes @/good.nodes.csv --methods rigid --html"
+                          << QByteArray("--html needs a file name");
+    QTest::newRow("input") << "simulate --plan grid:2x2x2@0.1 --nodes @/o.csv --scene"
+                           << QByteArray("--scene needs a file name");
+    QTest::newRow("plan") << "plan-check --nodes @/good.nodes.csv --plan" << QByteArray("--plan needs a plan");
+    QTest::newRow("seed") << "simulate --plan grid:2x2x2@0.1 --nodes @/o.csv --seed"
+                          << QByteArray("18446744073709551615");
+  }
+  void anEmptyNameOrSeedIsRefused() {
+    QFETCH(QString, arguments);
+    QFETCH(QByteArray, told);
+    const CliRun run = runCli(arguments.replace("@/", folder_.path() + "/").split(' ') + QStringList{QString("")});
+    FT_VERIFY_STATUS(run, 2);
+    QVERIFY2(run.err.contains(told), run.err.constData());
+    QCOMPARE(run.err.count('\n'), qsizetype(1));
+    QVERIFY(!QFileInfo::exists(at("o.csv")));
   }
 
   void helpIsNoMistake_data() {

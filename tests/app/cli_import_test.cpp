@@ -111,6 +111,33 @@ class CliImportTest : public QObject {
     QCOMPARE(QString::fromStdString(run.json().at("format").get<std::string>()), format);
   }
 
+  /// As it stands, the command that a guess prints reads the file.
+  void printedCommandReadsTheFile_data() {
+    QTest::addColumn<QString>("file");
+    QTest::addColumn<QString>("written");
+    QTest::newRow("node table") << "a.csv"
+                                << "a.csv.nodes.csv";
+    QTest::newRow("columns") << "columns.csv"
+                             << "columns.csv.nodes.csv";
+    QTest::newRow("columns without truth") << "readings.csv"
+                                           << "readings.csv.samples.csv";
+    QTest::newRow("trajectory") << "a.traj"
+                                << "a.traj.samples.csv";
+    QTest::newRow("calibration") << "a.nrrd"
+                                 << "a.nrrd.ftcal.json";
+  }
+  void printedCommandReadsTheFile() {
+    QFETCH(QString, file);
+    QFETCH(QString, written);
+    makeFilesToGuess();
+    const CliRun guess = runCli({"import", "--guess", "--in", folder_.filePath(file)});
+    FT_VERIFY_STATUS(guess, 0);
+    QVERIFY(!QFile::exists(folder_.filePath(written)));
+    const QString command = QString::fromUtf8(guess.out).split('\n', Qt::SkipEmptyParts).last().replace('\'', '"');
+    FT_VERIFY_STATUS(runCli(QProcess::splitCommand(command).mid(1)), 0);
+    QVERIFY(QFile::exists(folder_.filePath(written)));
+  }
+
   /// To the byte: what a session gives back is what was in the table.
   void recordingsComeBackFromTheirSession() {
     FT_REQUIRE_REAL_DATA();
@@ -146,6 +173,23 @@ class CliImportTest : public QObject {
   }
 
  private:
+  void makeFilesToGuess() {
+    const auto at = [this](const char* name) { return folder_.filePath(name); };
+    QVERIFY(writeWhole(at("columns.csv"),
+                       "x_mm;y_mm;z_mm;x_true_mm;y_true_mm;z_true_mm\n1;2;3;1;2;3\n100;200;300;100;200;300\n"
+                       "400;5;6;400;5;6\n70;8;9;70;8;9\n"));
+    QVERIFY(writeWhole(at("readings.csv"), "x_mm,y_mm,z_mm\n1,2,3\n100,200,300\n400,5,6\n70,8,9\n"));
+    QVERIFY(writeWhole(at("a.traj"),
+                       "1 0 0 0.1\n0 1 0 0.2\n0 0 1 0.3\n0 0 0 1\n\n1 0 0 0.2\n0 1 0 0.2\n0 0 1 0.3\n0 0 0 1\n"));
+    FT_VERIFY_STATUS(runCli({"simulate", "--plan", "grid:3x3x3@0.2", "--seed", "1", "--samples-per-node", "5",
+                             "--nodes", at("a.csv")}),
+                     0);
+    FT_VERIFY_STATUS(runCli({"fit", "--nodes", at("a.csv"), "--position", "affine", "--out", at("a.ftcal.json")}), 0);
+    FT_VERIFY_STATUS(runCli({"export", "--calibration", at("a.ftcal.json"), "--format", "itk_nrrd",
+                             "--max-deviation-um", "1000", "--force", "--out", at("a.nrrd")}),
+                     0);
+  }
+
   QTemporaryDir folder_;
 };
 

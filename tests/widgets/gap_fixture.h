@@ -79,7 +79,7 @@ inline gap::GapReport writtenReport() {
   report.by_time = {{0.0, 60.0, 3.0, 1.5}};
   report.origin = {0.8, 0.1, 0.05, 0.05};
   report.findings = {{"", "Places 0 and 3 hold the same reading.", {0, 3}}};
-  report.predictions = {{"compact_metal", 2, 31.0, 12.0, 4.0}};
+  report.predictions = {{"compact_metal", 0, 2, 31.0, 12.0, 4.0}};
   return report;
 }
 

@@ -93,12 +93,12 @@ std::vector<std::size_t> CurvePanel::chosenRows() const {
 
 void CurvePanel::run() {
   if (!comparison_) return;
-  rows_ = chosenRows();
+  const std::vector<std::size_t> rows = chosenRows();
   evaluation::ComparisonOptions options;
   options.validation = comparison_->validation;
   options.align = comparison_->align;
   options.with_surroundings = false;
-  for (const std::size_t row : rows_)
+  for (const std::size_t row : rows)
     options.position_methods.push_back(
         methodTextOf(comparison_->position[row].method, comparison_->position[row].settings));
   if (options.position_methods.empty()) {
@@ -107,7 +107,7 @@ void CurvePanel::run() {
   }
   jobs_.run([table = table_,
              options](const RunControl& control) { return evaluation::learningCurves(table, options, control); },
-            [this](Result<std::vector<evaluation::LearningCurve>> result) { arrived(std::move(result)); },
+            [this, rows](Result<std::vector<evaluation::LearningCurve>> result) { arrived(rows, std::move(result)); },
             [this](double fraction) { progress_->setValue(static_cast<int>(1000.0 * fraction)); });
   showState();
 }
@@ -118,12 +118,13 @@ void CurvePanel::stop() {
   showState();
 }
 
-void CurvePanel::arrived(Result<std::vector<evaluation::LearningCurve>> result) {
+void CurvePanel::arrived(const std::vector<std::size_t>& rows, Result<std::vector<evaluation::LearningCurve>> result) {
   if (!result) {
     showState();
     text_->setText(QString::fromStdString(result.error().message));
     return;
   }
+  rows_ = rows;
   curves_ = std::move(*result);
   draw();
 }

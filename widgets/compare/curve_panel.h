@@ -33,7 +33,7 @@ class CurvePanel : public QWidget {
   enum class Which { kBest, kShown, kAll };
   void run();
   std::vector<std::size_t> chosenRows() const;
-  void arrived(Result<std::vector<evaluation::LearningCurve>> result);
+  void arrived(const std::vector<std::size_t>& rows, Result<std::vector<evaluation::LearningCurve>> result);
   void draw();
   void showState();
   QString verdictText() const;

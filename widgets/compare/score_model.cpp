@@ -199,6 +199,7 @@ QString ScoreModel::toBestText(const Row& row) const {
   if (row.best) return tr("best");
   // A small difference of large errors is told no finer than the errors are.
   const int decimals = decimalsOf(row.score->stats.rms);
+  if (!std::isfinite(row.score->rms_to_best_low90)) return signedFigures(row.score->rms_to_best, decimals);
   const QString figures =
       tr("%1 (%2 to %3)")
           .arg(signedFigures(row.score->rms_to_best, decimals), signedFigures(row.score->rms_to_best_low90, decimals),

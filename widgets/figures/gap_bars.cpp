@@ -170,6 +170,8 @@ std::string gapHeadline(const gap::GapReport& report) {
     case gap::GapVerdict::kPartlyExplained:
       return (is_change ? "Changed, and partly explained" : "Partly explained") + names;
     case gap::GapVerdict::kUnexplained:
+      if (!report.not_looked_for.empty())
+        return is_change ? "Changed; no cause looked for" : "A gap; no cause looked for";
       return is_change ? "Changed, by no known effect" : "Not explained by any known effect";
   }
   return {};

@@ -354,12 +354,15 @@ void ComparePage::showChoice() {
   if (!why.isEmpty()) return fitted_->setText(why);
   if (!corrector) return fitted_->setText(choice);
   if (!workbench_.correctorIsCurrent())
-    return fitted_->setText(
-        tr("%1 The places have changed since the calibration that is kept was fitted: fit again.").arg(choice));
-  fitted_->setText(tr("Fitted on %1 rows; what is left on those same rows (no verdict): RMS %2. Kept in the session, "
-                      "ready to export.")
+    return fitted_->setText(tr("%1 The places have changed since the calibration was fitted: fit again.").arg(choice));
+  const std::optional<bool> is_kept = workbench_.correctorIsKept();
+  const QString kept = !is_kept   ? QString()
+                       : *is_kept ? tr(" Kept in the session, ready to export.")
+                                  : tr(" Not kept in the session: export it now.");
+  fitted_->setText(tr("Fitted on %1 rows; what is left on those same rows (no verdict): RMS %2.")
                        .arg(corrector->report().n_nodes)
-                       .arg(millimetreText(corrector->report().rms_m)));
+                       .arg(millimetreText(corrector->report().rms_m)) +
+                   kept);
 }
 
 void ComparePage::onShown() {

@@ -124,7 +124,7 @@ QLineEdit* DifferencePage::addFileRow(QGridLayout* grid, const QString& label, c
   grid->addWidget(path, row, 1);
   grid->addWidget(browse, row, 2);
   connect(browse, &QPushButton::clicked, this, [this, path] { choose(path); });
-  connect(path, &QLineEdit::textChanged, this, &DifferencePage::showButtons);
+  connect(path, &QLineEdit::textChanged, this, &DifferencePage::forget);
   return path;
 }
 
@@ -211,14 +211,17 @@ void DifferencePage::showSensors(const std::vector<int>& sensors, int sensor) {
   sensor_->setVisible(!sensors.empty());
 }
 
-void DifferencePage::onSessionCalibration() {
-  // What was told of the session's calibration is of the one before.
-  if (second_->text().isEmpty()) {
-    jobs_.stop();
-    difference_.reset();
-    showSensors({}, 0);
-  }
+/// What was told is of other calibrations.
+void DifferencePage::forget() {
+  jobs_.stop();
+  difference_.reset();
+  showSensors({}, 0);
   showDifference();
+}
+
+void DifferencePage::onSessionCalibration() {
+  if (second_->text().isEmpty()) return forget();
+  showButtons();
 }
 
 void DifferencePage::showButtons() {

@@ -42,6 +42,7 @@ class DifferencePage : public QWidget {
                                   const RunControl& control);
   void onResult(Result<Compared> result);
   void showSensors(const std::vector<int>& sensors, int sensor);
+  void forget();
   void onSessionCalibration();
   void showButtons();
   void showDifference();

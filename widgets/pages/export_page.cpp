@@ -234,7 +234,10 @@ void ExportPage::showCalibration() {
   for (std::size_t row = 0; row < targets_.size(); ++row) {
     QListWidgetItem* item = items_[row];
     const bool offered = corrects || !targets_[row].exporter;
-    item->setFlags(offered ? item->flags() | Qt::ItemIsEnabled : item->flags() & ~Qt::ItemIsEnabled);
+    {
+      const QSignalBlocker quiet(list_);
+      item->setFlags(offered ? item->flags() | Qt::ItemIsEnabled : item->flags() & ~Qt::ItemIsEnabled);
+    }
     if (offered && (!chosen() || !(list_->currentItem()->flags() & Qt::ItemIsEnabled))) list_->setCurrentItem(item);
   }
 }
@@ -286,14 +289,23 @@ void ExportPage::onTarget() {
   about_->setText(several.size() > 1 ? tr("Each file is named after the session and its format.") : target->reads_it);
   write_->setText(several.size() > 1 ? tr("Write %1 files").arg(several.size()) : tr("Write the file"));
   const QString folder = QFileInfo(workbench_.sessionPath()).absolutePath();
-  path_->setText(several.size() > 1 ? folder : folder + QLatin1Char('/') + suggestedName(*target));
+  suggest(several.size() > 1 ? folder : folder + QLatin1Char('/') + suggestedName(*target));
   showBusy();
+}
+
+/// What was typed or picked stays until another place is suggested.
+void ExportPage::suggest(const QString& path) {
+  if (path == suggested_) return;
+  suggested_ = path;
+  path_->setText(path);
 }
 
 void ExportPage::showBusy() {
   const bool busy = jobs_.busy();
   progress_->setVisible(busy);
   stop_->setVisible(busy);
+  stop_->setEnabled(!stopping_.stop_requested());
+  stop_->setText(stop_->isEnabled() ? tr("Stop") : tr("Stopping..."));
   write_->setEnabled(!busy);
 }
 
@@ -333,6 +345,7 @@ QString ExportPage::pathProblem() const {
 }
 
 void ExportPage::write() {
+  if (jobs_.busy()) return;
   if (const QString problem = pathProblem(); !problem.isEmpty()) {
     workbench_.showMessage({problem, Severity::kAttention, {}, {}});
     path_->setFocus();
@@ -356,9 +369,11 @@ void ExportPage::write() {
   if (sensor_->count() > 0) choices.sensor = sensor_->currentData().toInt();
   for (const File& file : wanted_files) writings.push_back({file.path, file.target->prepare(choices), {}});
   progress_->setValue(0);
-  jobs_.run([writings](const RunControl& control) { return writeAll(writings, control); },
-            [this](const Result<std::vector<Writing>>& written) { onWritten(*written); },
-            [this](double fraction) { progress_->setValue(static_cast<int>(fraction * kExportSteps)); });
+  stopping_ = std::stop_source();
+  jobs_.run(
+      [writings, stopping = stopping_](const RunControl& control) { return writeAll(writings, control, stopping); },
+      [this](const Result<std::vector<Writing>>& written) { onWritten(written); },
+      [this](double fraction) { progress_->setValue(static_cast<int>(fraction * kExportSteps)); });
   showBusy();
 }
 
@@ -378,10 +393,17 @@ void ExportPage::askToReplace(const QStringList& present) {
 }
 
 /// One after the other, so that a stop leaves whole files.
-std::vector<ExportPage::Writing> ExportPage::writeAll(std::vector<Writing> writings, const RunControl& control) {
+std::vector<ExportPage::Writing> ExportPage::writeAll(std::vector<Writing> writings, const RunControl& control,
+                                                      const std::stop_source& stopping) {
+  const std::stop_callback page_goes(control.stop, [&stopping] { stopping.request_stop(); });
   const double each = 1.0 / static_cast<double>(writings.size());
-  for (std::size_t i = 0; i < writings.size() && !control.stop.stop_requested(); ++i) {
+  for (std::size_t i = 0; i < writings.size(); ++i) {
+    if (stopping.stop_requested()) {
+      writings[i].result = fail(ErrorCode::kCancelled, "Stopped on request");
+      continue;
+    }
     RunControl part = control;
+    part.stop = stopping.get_token();
     part.progress = [&control, each, i](double fraction) {
       control.progress((static_cast<double>(i) + fraction) * each);
     };
@@ -391,38 +413,53 @@ std::vector<ExportPage::Writing> ExportPage::writeAll(std::vector<Writing> writi
   return writings;
 }
 
+/// Some files are written in one go: what became of all of them is told when the writing has ended.
 void ExportPage::stop() {
-  jobs_.stop();
+  stopping_.request_stop();
   showBusy();
-  workbench_.showMessage({tr("Stopped: files that were not finished are not there."), Severity::kInfo, {}, {}});
 }
 
-void ExportPage::onWritten(const std::vector<Writing>& written) {
+void ExportPage::onWritten(const Result<std::vector<Writing>>& result) {
   showBusy();
+  if (!result) {
+    workbench_.showMessage({QString::fromStdString(result.error().message), Severity::kDanger, {}, {}});
+    return;
+  }
+  const std::vector<Writing>& written = *result;
   QStringList failures, notes;
+  qsizetype n_stopped = 0;
   for (const Writing& file : written) {
     if (file.result) {
       if (!replaceable_.contains(file.path)) replaceable_ << file.path;
       if (!file.result->empty()) notes << QString::fromStdString(*file.result);
+    } else if (file.result.error().code == ErrorCode::kCancelled) {
+      ++n_stopped;
     } else {
       failures << QString::fromStdString(file.result.error().message);
     }
   }
   const QString first = written.front().path;
-  const auto open_folder = [first] { QDesktopServices::openUrl(QUrl::fromLocalFile(QFileInfo(first).absolutePath())); };
-  const auto n_written = static_cast<qsizetype>(written.size()) - failures.size();
-  if (n_written == 0) {
+  const std::function<void()> open_folder = [first] {
+    QDesktopServices::openUrl(QUrl::fromLocalFile(QFileInfo(first).absolutePath()));
+  };
+  const auto n_written = static_cast<qsizetype>(written.size()) - failures.size() - n_stopped;
+  if (n_written == 0 && n_stopped == 0) {
     workbench_.showMessage({failures.join(QLatin1Char(' ')), Severity::kDanger, {}, {}});
     return;
   }
-  QStringList told{
-      written.size() == 1
-          ? tr("Written: %1").arg(QDir::toNativeSeparators(first))
-          : tr("%1 files written to %2").arg(n_written).arg(QDir::toNativeSeparators(QFileInfo(first).absolutePath()))};
-  if (written.size() == 1) told << notes;
+  const QString folder = QDir::toNativeSeparators(QFileInfo(first).absolutePath());
+  QStringList told;
+  if (n_written == 0)
+    told << tr("Stopped: nothing was written");
+  else if (n_stopped > 0)
+    told << tr("Stopped: %1 of %2 files written to %3").arg(n_written).arg(written.size()).arg(folder);
+  else if (written.size() == 1)
+    told << tr("Written: %1").arg(QDir::toNativeSeparators(first)) << notes;
+  else
+    told << tr("%1 files written to %2").arg(n_written).arg(folder);
   if (!failures.isEmpty()) told << tr("%1 could not be: %2").arg(failures.size()).arg(failures.join(QLatin1Char(' ')));
   workbench_.showMessage({told.join(QStringLiteral(". ")), failures.isEmpty() ? Severity::kInfo : Severity::kAttention,
-                          tr("Open the folder"), open_folder});
+                          tr("Open the folder"), n_written > 0 ? open_folder : std::function<void()>()});
 }
 
 }  // namespace fieldtrue::widgets

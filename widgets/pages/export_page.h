@@ -2,6 +2,7 @@
 
 #include <QStringList>
 #include <QWidget>
+#include <stop_token>
 
 #include "widgets/pages/export_targets.h"
 #include "widgets/workbench/background.h"
@@ -50,9 +51,11 @@ class ExportPage : public QWidget {
   QString pathProblem() const;
   void write();
   void askToReplace(const QStringList& present);
-  static std::vector<Writing> writeAll(std::vector<Writing> writings, const RunControl& control);
+  static std::vector<Writing> writeAll(std::vector<Writing> writings, const RunControl& control,
+                                       const std::stop_source& stopping);
   void stop();
-  void onWritten(const std::vector<Writing>& written);
+  void onWritten(const Result<std::vector<Writing>>& result);
+  void suggest(const QString& path);
   void showBusy();
   std::vector<File> files() const;
   QString suggestedName(const ExportTarget& target) const;
@@ -74,8 +77,10 @@ class ExportPage : public QWidget {
   QLabel* pitch_;
   QDoubleSpinBox* deviation_;
   QLineEdit* path_;
+  QString suggested_;        ///< Stands in path_ until it is typed over.
   QStringList replaceable_;  ///< Files that may be written over: the person was asked, or they were written from here.
   BackgroundJobs jobs_{this};
+  std::stop_source stopping_;  ///< Of the files being written: what is stopped by it still tells what became of them.
   QPushButton* write_;
   QPushButton* stop_;
   QProgressBar* progress_;

@@ -211,7 +211,7 @@ void GapPage::tryAgainAndAgain() {
   gap::DiagnosisOptions options;
   options.replicates = kReplicates;
   options.against = against_;
-  run(options);
+  run(options, against_name_);
 }
 
 void GapPage::chooseEarlier() {
@@ -238,10 +238,9 @@ void GapPage::diagnoseSince(const QString& path) {
   const auto table = std::make_shared<const CalibrationTable>(*std::move(earlier));
   const auto hold = [page = QPointer(this), table, name = QFileInfo(path).fileName()] {
     if (!page) return;
-    page->against_name_ = name;
     gap::DiagnosisOptions options;
     options.against = table;
-    page->run(options);
+    page->run(options, name);
   };
   if (const auto units = recording::checkUnits(*table); !units) {
     workbench_.showMessage(
@@ -251,32 +250,33 @@ void GapPage::diagnoseSince(const QString& path) {
   hold();
 }
 
-void GapPage::run(const gap::DiagnosisOptions& options) {
+void GapPage::run(const gap::DiagnosisOptions& options, const QString& against_name) {
   jobs_.stop();
-  if (!workbench_.mayUse(table_, [page = QPointer(this), options] {
-        if (page) page->run(options);
+  if (!workbench_.mayUse(table_, [page = QPointer(this), options, against_name] {
+        if (page) page->run(options, against_name);
       }))
     return showReport();
-  against_ = options.against;
   has_changed_ = false;
   progress_->setValue(0);
   provisional_.reset();
   const bool is_first = !report_ && !options.against && options.replicates == 0;
   if (const auto first = is_first ? gap::firstLook(table_) : std::nullopt) {
-    diagnoseIn(kFirstShare, *first, {}, options, [this, options](Result<gap::GapReport> result) {
-      diagnoseAll(options);
+    diagnoseIn(kFirstShare, *first, {}, options, [this, options, against_name](Result<gap::GapReport> result) {
+      diagnoseAll(options, against_name);
       if (result) provisional_ = std::move(*result);
       showReport();
     });
   } else {
-    diagnoseAll(options);
+    diagnoseAll(options, against_name);
   }
   showReport();
 }
 
-void GapPage::diagnoseAll(const gap::DiagnosisOptions& options) {
+void GapPage::diagnoseAll(const gap::DiagnosisOptions& options, const QString& against_name) {
   diagnoseIn(1.0, table_, samples_ ? samples_() : SampleTable(), options,
-             [this](Result<gap::GapReport> result) { onResult(std::move(result)); });
+             [this, against = options.against, against_name](Result<gap::GapReport> result) {
+               onResult(std::move(result), against, against_name);
+             });
 }
 
 /// Goes on from where the progress is to `to`.
@@ -293,13 +293,17 @@ void GapPage::diagnoseIn(double to, const CalibrationTable& table, SampleTable s
       });
 }
 
-void GapPage::onResult(Result<gap::GapReport> result) {
+void GapPage::onResult(Result<gap::GapReport> result, std::shared_ptr<const CalibrationTable> against,
+                       const QString& against_name) {
   provisional_.reset();
   if (result) {
     report_ = std::move(*result);
+    against_ = std::move(against);
+    against_name_ = against_name;
     keep();
   } else {
     report_.reset();
+    against_.reset();
     if (result.error().code != ErrorCode::kCancelled)
       workbench_.showMessage({QString::fromStdString(result.error().message), Severity::kAttention, {}, {}});
   }

@@ -64,13 +64,15 @@ class GapPage : public QWidget {
   QWidget* makeButtons(QWidget* header);
   QWidget* makeFieldSide();
   QPushButton* addButton(QWidget* parent, const QString& words, const char* name, void (GapPage::*slot)());
-  void run(const gap::DiagnosisOptions& options = {});
+  /// @param against_name of the earlier recording that the options hold
+  void run(const gap::DiagnosisOptions& options = {}, const QString& against_name = {});
   void tryAgainAndAgain();
   void chooseEarlier();
-  void diagnoseAll(const gap::DiagnosisOptions& options);
+  void diagnoseAll(const gap::DiagnosisOptions& options, const QString& against_name);
   void diagnoseIn(double to, const CalibrationTable& table, SampleTable samples, const gap::DiagnosisOptions& options,
                   std::function<void(Result<gap::GapReport>)> done);
-  void onResult(Result<gap::GapReport> result);
+  void onResult(Result<gap::GapReport> result, std::shared_ptr<const CalibrationTable> against,
+                const QString& against_name);
   void keep();
   void restore();
   void runOrStop();
@@ -94,7 +96,7 @@ class GapPage : public QWidget {
   std::vector<Earlier> earlier_;
   std::optional<gap::GapReport> report_;
   std::optional<gap::GapReport> provisional_;        ///< Of some of the places, until there is a report of all.
-  std::shared_ptr<const CalibrationTable> against_;  ///< Of the last diagnosis.
+  std::shared_ptr<const CalibrationTable> against_;  ///< What the report is held against.
   QString against_name_;
   bool is_restored_ = false;  ///< What the open session keeps was looked at.
   bool has_changed_ = false;  ///< The places, since the last diagnosis.

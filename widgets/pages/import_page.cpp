@@ -179,10 +179,16 @@ void ImportPage::chooseTarget() {
 }
 
 void ImportPage::setFile(const QString& path) {
-  file_->setText(path);
+  const bool is_session = path.endsWith(QStringLiteral(".fieldtrue"), Qt::CaseInsensitive);
+  file_->setText(is_session ? QString() : path);
   file_->setModified(false);
   truth_->clear();
   look({});
+  if (!is_session) return;
+  if (workbench_.sessionIsOpen() && QFileInfo(path) == QFileInfo(workbench_.sessionPath()))
+    return tell(tr("%1 is the session that is open; choose another program's file.").arg(QFileInfo(path).fileName()),
+                true);
+  workbench_.openSession(path);
 }
 
 /// Finds the format where none is given, and of a table of text what its columns are.
@@ -190,8 +196,8 @@ void ImportPage::look(std::optional<int> chosen) {
   looking_.stop();
   reading_.stop();
   read_ = {};
-  make_->setEnabled(false);
-  if (file_->text().isEmpty()) return;
+  showMake();
+  if (file_->text().isEmpty()) return showFormat({});
   tell(tr("Reading %1 ...").arg(QFileInfo(file_->text()).fileName()), false);
   looking_.run(
       [path = std::filesystem::path(file_->text().toStdString()), chosen,
@@ -253,7 +259,7 @@ void ImportPage::showFormat(const Look& found) {
     part->setVisible(may_have_truth);
   target_label_->setText(is_recording ? tr("Session") : tr("Calibration"));
   make_->setText(is_recording ? tr("Make the session") : tr("Write the calibration"));
-  make_->setEnabled(false);
+  showMake();
   target_->setText(suggestedTarget());
   if (file_->text().isEmpty()) tell(tr("Choose a file, or drop one here."), false);
 }
@@ -264,7 +270,9 @@ void ImportPage::onHowItIsWritten() {
   const Settings now = settings();
   const Result<importers::TextPreview> preview = importers::previewText(file_->text().toStdString(), now, kPreviewRows);
   if (!preview) {
-    make_->setEnabled(false);
+    reading_.stop();
+    read_ = {};
+    showMake();
     return tell(text(preview.error().message), true);
   }
   const QSignalBlocker quiet(columns_);
@@ -275,7 +283,7 @@ void ImportPage::onHowItIsWritten() {
 void ImportPage::read() {
   reading_.stop();
   read_ = {};
-  make_->setEnabled(false);
+  showMake();
   if (file_->text().isEmpty()) return;
   if (readsColumns() && choiceSetting(settings(), "unit") == kNoUnit)
     return tell(tr("Choose the unit of the positions."), true);
@@ -300,9 +308,9 @@ void ImportPage::read() {
 void ImportPage::onRead(Result<Read> result) {
   if (!result) return tell(text(result.error().message), true);
   read_ = *std::move(result);
+  showMake();
   if (read_.recording) return showRecording(*read_.recording);
   tell(lines(read_.calibration->report().notes, kNotesShown), false);
-  make_->setEnabled(true);
 }
 
 void ImportPage::showRecording(const importers::Import& recording) {
@@ -327,7 +335,6 @@ void ImportPage::showRecording(const importers::Import& recording) {
   tell(rows + (units ? QString() : QLatin1Char('\n') + text(units.error().message)) +
            (notes.isEmpty() ? QString() : QLatin1Char('\n') + notes),
        !units);
-  make_->setEnabled(true);
 }
 
 void ImportPage::tell(const QString& summary, bool is_attention) {
@@ -345,19 +352,24 @@ QString ImportPage::suggestedTarget() const {
   return file.absolutePath() + QLatin1Char('/') + stem + QStringLiteral(".ftcal.json");
 }
 
+/// Whether something was read that a file can be made of.
+bool ImportPage::canMake() const { return (read_.recording && read_.recording->table) || read_.calibration; }
+
+void ImportPage::showMake() { make_->setEnabled(canMake() && !making_.busy()); }
+
 void ImportPage::make() {
   const QString path = target_->text();
-  if (path.isEmpty()) return;
+  if (path.isEmpty() || !canMake() || making_.busy()) return;
   if (QFileInfo::exists(path)) {
     workbench_.showMessage(
         {tr("%1 exists already; nothing was written. Choose another name.").arg(path), Severity::kAttention, {}, {}});
     return;
   }
-  make_->setEnabled(false);
   if (read_.recording)
     makeSession(path);
   else
     writeCalibration(path);
+  showMake();
 }
 
 void ImportPage::makeSession(const QString& path) {
@@ -366,7 +378,7 @@ void ImportPage::makeSession(const QString& path) {
         return acquisition::makeSession(path, *recording.table, recording.samples, source);
       },
       [this, path](const Result<void>& made) {
-        make_->setEnabled(true);
+        showMake();
         if (!made) {
           workbench_.showMessage({text(made.error().message), Severity::kDanger, {}, {}});
           return;
@@ -380,7 +392,7 @@ void ImportPage::writeCalibration(const QString& path) {
   making_.run([path, calibration = *read_.calibration](
                   const RunControl&) -> Result<void> { return calibration.save(path.toStdString()); },
               [this, path](const Result<void>& written) {
-                make_->setEnabled(true);
+                showMake();
                 if (!written) {
                   workbench_.showMessage({text(written.error().message), Severity::kDanger, {}, {}});
                   return;

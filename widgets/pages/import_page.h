@@ -29,6 +29,7 @@ class ImportPage : public QWidget {
   Q_OBJECT
  public:
   explicit ImportPage(Workbench& workbench, QWidget* parent = nullptr);
+  /// A session is opened instead.
   void setFile(const QString& path);
 
  private:
@@ -63,6 +64,8 @@ class ImportPage : public QWidget {
   void onRead(Result<Read> result);
   void showRecording(const importers::Import& recording);
   void tell(const QString& summary, bool is_attention);
+  bool canMake() const;
+  void showMake();
   void make();
   void makeSession(const QString& path);
   void writeCalibration(const QString& path);

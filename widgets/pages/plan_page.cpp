@@ -7,7 +7,9 @@
 #include <QFormLayout>
 #include <QHBoxLayout>
 #include <QLabel>
+#include <QLineEdit>
 #include <QPushButton>
+#include <QRegularExpressionValidator>
 #include <QScrollArea>
 #include <QSpinBox>
 #include <QSplitter>
@@ -16,7 +18,9 @@
 #include <limits>
 #include <set>
 
+#include "acquisition/plan/plan_text.h"
 #include "calib/evaluation/orientation/planned_orientations.h"
+#include "widgets/forms/length_box.h"
 #include "widgets/forms/number_box.h"
 #include "widgets/style/unit_texts.h"
 #include "widgets/style/units.h"
@@ -29,7 +33,6 @@ constexpr std::array kAxes{"x", "y", "z"};
 constexpr int kFormWidth = 360;
 constexpr int kScrollBarWidth = 14;
 constexpr int kMaxCount = 40;
-constexpr int kMaxSeed = std::numeric_limits<int>::max();
 // A practised operator carries the jig to the next mark and lets it settle in about this time.
 constexpr double kWidest_m = 30.0;  ///< What tables are refused for too.
 constexpr double kSecondsPerPlacement = 15.0;
@@ -71,15 +74,13 @@ PlanPage::PlanPage(Workbench& workbench, QWidget* parent)
   splitter->setSizes({940, kFormWidth});
   layout->addWidget(splitter);
   connect(&workbench_, &Workbench::sessionChanged, this, [this] { showPlan(workbench_.plan()); });
+  connect(&workbench_, &Workbench::takeLengthKnown, this, &PlanPage::showTakeLength);
   onChanged();
 }
 
-QDoubleSpinBox* PlanPage::makeLength(const QString& name, double metres) {
-  auto* box = new NumberBox(this);
-  box->setDecimals(enteredDecimals(shown_unit_));
-  box->setRange(-100000.0, 100000.0);
+LengthBox* PlanPage::makeLength(const QString& name, double metres) {
+  auto* box = new LengthBox(metres, shown_unit_, this);
   box->setAccessibleName(name);
-  box->setValue(metres / metresPer(shown_unit_));
   connect(box, &QDoubleSpinBox::valueChanged, this, &PlanPage::onChanged);
   return box;
 }
@@ -115,6 +116,7 @@ QWidget* PlanPage::makeForm() {
   }
   pipe_foot_ = makeLength(tr("Height of the pipes' feet"), start.pipe_base_m);
   unit_ = new QComboBox(this);
+  unit_->setObjectName(QStringLiteral("placingUnit"));
   for (LengthUnit unit : {LengthUnit::kMetre, LengthUnit::kMillimetre, LengthUnit::kFoot, LengthUnit::kInch})
     unit_->addItem(unitSymbol(unit), static_cast<int>(unit));
   unit_->setCurrentIndex(static_cast<int>(shown_unit_));
@@ -129,10 +131,11 @@ QWidget* PlanPage::makeForm() {
   order_->setItemData(1, tr("Tells drift with time from error with place"), Qt::ToolTipRole);
   order_->setAccessibleName(tr("Order"));
   connect(order_, &QComboBox::currentIndexChanged, this, &PlanPage::onChanged);
-  seed_ = makeCount(tr("Seed of the random order"), 1, 0, kMaxSeed);
+  makeSeed(start.seed);
   orientations_ = makeCount(tr("Sensor orientations at each place"), 1, 1, acquisition::kMaxOrientations);
   orientations_->setObjectName(QStringLiteral("orientations"));
   reseat_ = makeCount(tr("Times each place is seated anew"), 1, 1, 8);
+  reseat_->setObjectName(QStringLiteral("seatings"));
   samples_ = makeCount(tr("Samples at each place"), 60, 1, 10000);
   samples_->setObjectName(QStringLiteral("samplesPerNode"));
   amount_ = new NumberBox(this);
@@ -148,6 +151,13 @@ QWidget* PlanPage::makeForm() {
                          "readings counted in"),
                       Qt::ToolTipRole);
   until_->setAccessibleName(tr("What a take is counted in"));
+  // What is typed counts when it is whole: the open session takes it over.
+  samples_->setKeyboardTracking(false);
+  amount_->setKeyboardTracking(false);
+  connect(samples_, &QSpinBox::valueChanged, this, &PlanPage::onTakeLength);
+  connect(amount_, &QDoubleSpinBox::valueChanged, this, &PlanPage::onTakeLength);
+  for (QWidget* box : {static_cast<QWidget*>(samples_), static_cast<QWidget*>(amount_)})
+    box->setToolTip(tr("Of the open session too, from its next take on"));
   connect(until_, &QComboBox::currentIndexChanged, this, &PlanPage::onUntil);
   onUntil();
   makeAtTimeLimit();
@@ -203,47 +213,58 @@ QWidget* PlanPage::makeForm() {
   return panel;
 }
 
+void PlanPage::makeSeed(std::uint64_t seed) {
+  seed_ = new QLineEdit(QString::number(seed), this);
+  seed_->setObjectName(QStringLiteral("seed"));
+  seed_->setAccessibleName(tr("Seed of the random order"));
+  // A box for numbers would end at 31 bits, and change the seed of a plan that has one of 64.
+  seed_->setValidator(new QRegularExpressionValidator(QRegularExpression(QStringLiteral("[0-9]*")), seed_));
+  connect(seed_, &QLineEdit::textEdited, this, &PlanPage::onChanged);
+}
+
 acquisition::Plan PlanPage::plan() const {
   acquisition::Plan plan;
-  const double unit_m = metresPer(shown_unit_);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     plan.counts[axis] = counts_[axis]->value();
-    plan.pitch_m[static_cast<Eigen::Index>(axis)] = pitch_[axis]->value() * unit_m;
+    plan.pitch_m[static_cast<Eigen::Index>(axis)] = pitch_[axis]->metres();
   }
   if (!default_origin_->isChecked())
-    plan.origin_m = Eigen::Vector3d(origin_[0]->value(), origin_[1]->value(), origin_[2]->value()) * unit_m;
+    plan.origin_m = Eigen::Vector3d(origin_[0]->metres(), origin_[1]->metres(), origin_[2]->metres());
   plan.order = order_->currentIndex() == 0 ? acquisition::PlanOrder::kSerpentine : acquisition::PlanOrder::kRandom;
-  plan.seed = static_cast<std::uint64_t>(seed_->value());
+  plan.seed = seed_->text().toULongLong();
   plan.orientations = orientations_->value();
   plan.reseat = reseat_->value();
-  plan.pipe_base_m = pipe_foot_->value() * unit_m;
+  plan.pipe_base_m = pipe_foot_->metres();
   plan.explicit_places = explicit_places_;
   return plan;
 }
 
 void PlanPage::onUnit() {
   const auto unit = static_cast<LengthUnit>(unit_->currentData().toInt());
-  const double ratio = metresPer(shown_unit_) / metresPer(unit);
   shown_unit_ = unit;
   setPlacingUnit(unit);
-  for (const auto& boxes : {std::vector<QDoubleSpinBox*>(pitch_.begin(), pitch_.end()),
-                            std::vector<QDoubleSpinBox*>(origin_.begin(), origin_.end()),
-                            {pipe_foot_}}) {
-    for (QDoubleSpinBox* box : boxes) {
-      const QSignalBlocker quiet(box);
-      const double value = box->value() * ratio;
-      box->setDecimals(enteredDecimals(unit));
-      box->setValue(value);
-    }
-  }
+  for (const auto& boxes : {pitch_, origin_})
+    for (LengthBox* box : boxes) box->setUnit(unit);
+  pipe_foot_->setUnit(unit);
   room_->setLengthUnit(unit);
   onChanged();
+}
+
+QString PlanPage::problemOf(const acquisition::Plan& now) const {
+  bool is_seed = false;
+  seed_->text().toULongLong(&is_seed);
+  if (!is_seed && now.order == acquisition::PlanOrder::kRandom)
+    return tr("The seed must be a whole number from 0 to %1.").arg(std::numeric_limits<std::uint64_t>::max());
+  const QString pitch = pitchProblem(now);
+  if (!pitch.isEmpty()) return pitch;
+  const Result<void> size = acquisition::checkPlanSize(now, tr("This plan").toStdString());
+  return size ? QString() : QString::fromStdString(size.error().message + ".");
 }
 
 QString PlanPage::pitchProblem(const acquisition::Plan& now) const {
   if (!now.explicit_places.empty()) return {};
   for (std::size_t axis = 0; axis < 3; ++axis)
-    if (pitch_[axis]->value() <= 0.0)
+    if (now.pitch_m[static_cast<Eigen::Index>(axis)] <= 0.0)
       return tr("The pitch along %1 is 0: the places would stand on each other. Enter a distance above 0.")
           .arg(QLatin1String(kAxes[axis]));
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -261,16 +282,14 @@ void PlanPage::onChanged() {
   if (filling_) return;
   const acquisition::Plan now = plan();
   enableFields(now);
-  const QString problem = pitchProblem(now);
+  const QString problem = problemOf(now);
   problem_->setText(problem);
   problem_->setVisible(!problem.isEmpty());
   create_->setEnabled(problem.isEmpty());
   if (!problem.isEmpty()) return summary_->clear();
   const Eigen::Vector3d first_m = origin_m(now);
-  for (std::size_t axis = 0; axis < 3 && !now.origin_m; ++axis) {
-    const QSignalBlocker quiet(origin_[axis]);
-    origin_[axis]->setValue(first_m[static_cast<Eigen::Index>(axis)] / metresPer(shown_unit_));
-  }
+  for (std::size_t axis = 0; axis < 3 && !now.origin_m; ++axis)
+    origin_[axis]->setMetres(first_m[static_cast<Eigen::Index>(axis)]);
   const std::vector<PlannedPlace> planned = places(now);
   room_->setPlaces(planned);
   room_->setTransmitter(Pose{});
@@ -335,14 +354,37 @@ void PlanPage::onUntil() {
     amount_->setRange(0.001, 100.0);
     amount_->setValue(0.1);
   }
-  if (summary_) onChanged();
+  if (!summary_) return;
+  onChanged();
+  onTakeLength();
+}
+
+void PlanPage::onTakeLength() {
+  if (!filling_) workbench_.setTakeLength(takeLength());
+}
+
+void PlanPage::showTakeLength(const acquisition::TakeLength& length) {
+  filling_ = true;
+  until_->setCurrentIndex(static_cast<int>(length.until));
+  if (length.until == acquisition::TakeLength::Until::kSamples) {
+    const int samples = static_cast<int>(length.amount);
+    samples_->setMaximum(std::max(samples_->maximum(), samples));
+    samples_->setValue(samples);
+  } else {
+    amount_->setValue(length.amount / takeUnit());
+  }
+  filling_ = false;
+  onChanged();
+}
+
+double PlanPage::takeUnit() const {
+  return until_->currentIndex() == static_cast<int>(acquisition::TakeLength::Until::kStandardError) ? 1e-3 : 1.0;
 }
 
 acquisition::TakeLength PlanPage::takeLength() const {
   const auto until = static_cast<acquisition::TakeLength::Until>(until_->currentIndex());
   if (until == acquisition::TakeLength::Until::kSamples) return {until, static_cast<double>(samples_->value())};
-  const double unit = until == acquisition::TakeLength::Until::kStandardError ? 1e-3 : 1.0;
-  return {until, unit * amount_->value()};
+  return {until, takeUnit() * amount_->value()};
 }
 
 void PlanPage::loadPlanFile() {
@@ -358,22 +400,21 @@ void PlanPage::loadPlanFile() {
 
 void PlanPage::showPlan(const acquisition::Plan& plan) {
   filling_ = true;
-  const double unit_m = metresPer(shown_unit_);
   const auto count = [](QSpinBox* box, int value) {
     box->setMaximum(std::max(box->maximum(), value));
     box->setValue(value);
   };
   explicit_places_ = plan.explicit_places;
-  pipe_foot_->setValue(plan.pipe_base_m / unit_m);
+  pipe_foot_->setMetres(plan.pipe_base_m);
   default_origin_->setChecked(!plan.origin_m.has_value());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto row = static_cast<Eigen::Index>(axis);
     count(counts_[axis], plan.counts[axis]);
-    pitch_[axis]->setValue(plan.pitch_m[row] / unit_m);
-    if (plan.origin_m) origin_[axis]->setValue((*plan.origin_m)[row] / unit_m);
+    pitch_[axis]->setMetres(plan.pitch_m[row]);
+    if (plan.origin_m) origin_[axis]->setMetres((*plan.origin_m)[row]);
   }
   order_->setCurrentIndex(plan.order == acquisition::PlanOrder::kSerpentine ? 0 : 1);
-  seed_->setValue(static_cast<int>(std::min<std::uint64_t>(plan.seed, kMaxSeed)));
+  seed_->setText(QString::number(plan.seed));
   count(orientations_, plan.orientations);
   count(reseat_, plan.reseat);
   filling_ = false;
@@ -381,7 +422,7 @@ void PlanPage::showPlan(const acquisition::Plan& plan) {
 }
 
 void PlanPage::create() {
-  if (!pitchProblem(plan()).isEmpty()) return;
+  if (!problemOf(plan()).isEmpty()) return;
   workbench_.createSession(Workbench::freshSessionPath(QStringLiteral("session")), plan(), takeLength());
 }
 

@@ -11,11 +11,13 @@ class QCheckBox;
 class QComboBox;
 class QDoubleSpinBox;
 class QLabel;
+class QLineEdit;
 class QPushButton;
 class QSpinBox;
 
 namespace fieldtrue::widgets {
 
+class LengthBox;
 class RoomView;
 
 /// Where the jig is to stand: counts, pitch, origin, order, visits; the grid in 3-D, how long it takes, which pipes.
@@ -28,15 +30,20 @@ class PlanPage : public QWidget {
 
  private:
   QWidget* makeForm();
-  QDoubleSpinBox* makeLength(const QString& name, double metres);
+  LengthBox* makeLength(const QString& name, double metres);
+  void makeSeed(std::uint64_t seed);
   void onUnit();
   void onUntil();
+  void onTakeLength();  ///< The open session has it too.
+  void showTakeLength(const acquisition::TakeLength& length);
   acquisition::TakeLength takeLength() const;
+  double takeUnit() const;  ///< In what `amount_` is counted in.
   void makeAtTimeLimit();
   void onChanged();
   void loadPlanFile();
   /// Fills the form; a plan beyond the fields' usual ranges widens them rather than being changed.
   void showPlan(const acquisition::Plan& plan);
+  QString problemOf(const acquisition::Plan& now) const;  ///< Empty where a session can be started with it.
   QString pitchProblem(const acquisition::Plan& now) const;
   void create();
   void enableFields(const acquisition::Plan& now);
@@ -45,12 +52,12 @@ class PlanPage : public QWidget {
   Workbench& workbench_;
   RoomView* room_;
   std::array<QSpinBox*, 3> counts_{};
-  std::array<QDoubleSpinBox*, 3> pitch_{};
-  std::array<QDoubleSpinBox*, 3> origin_{};
+  std::array<LengthBox*, 3> pitch_{};
+  std::array<LengthBox*, 3> origin_{};
   QCheckBox* default_origin_;
   QComboBox* unit_;
   QComboBox* order_;
-  QSpinBox* seed_;
+  QLineEdit* seed_;
   QSpinBox* orientations_;
   QSpinBox* reseat_;
   QSpinBox* samples_;
@@ -59,7 +66,7 @@ class PlanPage : public QWidget {
   QComboBox* at_time_limit_;
   QLabel* summary_ = nullptr;
   QLabel* problem_;
-  QDoubleSpinBox* pipe_foot_;
+  LengthBox* pipe_foot_;
   QPushButton* create_;
   QPushButton* use_grid_;
   LengthUnit shown_unit_;

@@ -160,8 +160,10 @@ std::string toBestText(const evaluation::MethodScore& score, bool is_best) {
   if (is_best) return "best";
   const auto figure = [](double value) { return value < 0.0 ? "-" + errorFigure(-value) : errorFigure(value); };
   const bool as_good = score.rms_to_best_low90 <= 0.0;
-  return (score.rms_to_best < 0.0 ? "" : "+") + figure(score.rms_to_best) + " (" + figure(score.rms_to_best_low90) +
-         " to " + figure(score.rms_to_best_high90) + ")" + (as_good ? ", as good" : "");
+  const std::string difference = (score.rms_to_best < 0.0 ? "" : "+") + figure(score.rms_to_best);
+  if (!std::isfinite(score.rms_to_best_low90)) return difference;
+  return difference + " (" + figure(score.rms_to_best_low90) + " to " + figure(score.rms_to_best_high90) + ")" +
+         (as_good ? ", as good" : "");
 }
 
 std::string truenessText(const evaluation::Comparison& comparison) {

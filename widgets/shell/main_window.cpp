@@ -103,7 +103,7 @@ void MainWindow::dropEvent(QDropEvent* event) {
   const QString path = urls.isEmpty() ? QString() : urls.front().toLocalFile();
   if (path.isEmpty()) return;
   event->acceptProposedAction();
-  if (path.endsWith(QStringLiteral(".fieldtrue"))) {
+  if (path.endsWith(QStringLiteral(".fieldtrue"), Qt::CaseInsensitive)) {
     workbench_->openSession(path);
     return;
   }

@@ -10,7 +10,6 @@
 #include <QUrl>
 #include <algorithm>
 #include <array>
-#include <map>
 #include <utility>
 
 #include "acquisition/devices/trace_file.h"
@@ -20,8 +19,6 @@
 #include "calib/core/json_text.h"
 #include "calib/core/thread_pool.h"
 #include "calib/evaluation/sensor_splits.h"
-#include "calib/recording/unit_slip.h"
-#include "calib/tables/table_sensors.h"
 #include "widgets/style/unit_texts.h"
 #include "widgets/workbench/background.h"
 #include "widgets/workbench/fitted_methods.h"
@@ -30,8 +27,6 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kRecentSessions = 6;
-/// A table with many rows costs the pages time: they are told of its changes no oftener than this for each row.
-constexpr double kTableInterval_ms = 0.05;
 
 }  // namespace
 
@@ -77,6 +72,19 @@ void Workbench::post(void (acquisition::AcquisitionController::*slot)(Arguments.
       Qt::QueuedConnection);
 }
 
+template <class... Arguments, class... Given>
+void Workbench::postToSession(void (acquisition::AcquisitionController::*slot)(Arguments...), Given&&... given) {
+  QMetaObject::invokeMethod(
+      controller_,
+      [controller = controller_, path = session_path_,
+       call = std::bind_front(slot, controller_, std::decay_t<Given>(given)...)] {
+        acquisition::guarded(*controller, [&] {
+          if (controller->status().session->path == path) call();
+        });
+      },
+      Qt::QueuedConnection);
+}
+
 void Workbench::wireController() {
   connect(controller_, &acquisition::AcquisitionController::statusChanged, this, &Workbench::onStatus);
   connect(controller_, &acquisition::AcquisitionController::tablesReady, this, &Workbench::onTables);
@@ -97,6 +105,8 @@ void Workbench::wireController() {
   connect(controller_, &acquisition::AcquisitionController::fitOpened, this, &Workbench::onFitOpened);
   connect(controller_, &acquisition::AcquisitionController::gapOpened, this,
           [this](const QString& text) { kept_gap_ = text; });
+  connect(controller_, &acquisition::AcquisitionController::fitStored, this, &Workbench::onFitStored);
+  connect(controller_, &acquisition::AcquisitionController::takeLengthKnown, this, &Workbench::takeLengthKnown);
   connect(controller_, &acquisition::AcquisitionController::nodesStored, this,
           [this](int place, const std::vector<Node>&, const QString& suspicious) { onNodesStored(place, suspicious); });
   connect(controller_, &acquisition::AcquisitionController::takeFailed, this, &Workbench::onTakeFailed);
@@ -201,121 +211,13 @@ void Workbench::onStatus(const acquisition::AcquisitionStatus& status) {
   emit statusChanged(status_);
 }
 
-void Workbench::onTables(const CalibrationTable& table, const SampleTable& samples) {
-  std::map<std::pair<int, int>, PlaceRows*> by_key;
-  for (PlaceRows& place : places_) {
-    place.rows.clear();
-    place.samples.clear();
-    by_key[{place.node, place.visit}] = &place;
-  }
-  loose_samples_.clear();
-  for (const Node& node : table.nodes) {
-    if (const auto at = by_key.find({node.node, node.visit}); at != by_key.end()) at->second->rows.push_back(node);
-  }
-  for (const SampleRow& row : samples.rows) {
-    const auto at = by_key.find({row.node, row.visit});
-    if (row.node < 0) {
-      loose_samples_.push_back(row);
-    } else if (at != by_key.end()) {
-      at->second->samples.push_back(row.sample);
-    }
-  }
-  table_.metadata = table.metadata;
-  changeTable();
-}
-
-void Workbench::onPlace(int place, const std::vector<Node>& nodes, const std::vector<Sample>& samples) {
-  if (static_cast<std::size_t>(place) >= places_.size()) return;
-  places_[static_cast<std::size_t>(place)].rows = nodes;
-  places_[static_cast<std::size_t>(place)].samples = samples;
-  changeTable();
-}
-
-void Workbench::changeTable() {
-  table_is_stale_ = true;
-  ++rows_version_;
-  refusal_.clear();
-  if (!table_timer_.isActive()) {
-    table_timer_.start(static_cast<int>(kTableInterval_ms * static_cast<double>(places_.size())));
-  }
-}
-
-const CalibrationTable& Workbench::table() const {
-  if (!table_is_stale_) return table_;
-  table_is_stale_ = false;
-  table_.nodes.clear();
-  for (const PlaceRows& place : places_)
-    for (const Node& row : place.rows)
-      if (!chosen_sensor_ || row.sensor == *chosen_sensor_) table_.nodes.push_back(row);
-  return table_;
-}
-
-CalibrationTable Workbench::recordedTable() const {
-  CalibrationTable all{table_.metadata, {}};
-  for (const PlaceRows& place : places_) all.nodes.insert(all.nodes.end(), place.rows.begin(), place.rows.end());
-  return all;
-}
-
-std::vector<int> Workbench::sensors() const { return sensorsOf(recordedTable()); }
-
-void Workbench::chooseSensor(std::optional<int> sensor) {
-  if (chosen_sensor_ == sensor) return;
-  comparison_jobs_.stop();
-  chosen_sensor_ = sensor;
-  refusal_.clear();
-  endCondition(QStringLiteral("session/table"));
-  comparison_.reset();
-  table_is_stale_ = true;
-  ++rows_version_;
-  emit comparisonChanged();
-  emit tableChanged();
-}
-
-bool Workbench::mayUse(const CalibrationTable& table, const std::function<void()>& then) {
-  refusal_.clear();
-  endCondition(QStringLiteral("session/table"));
-  if (const auto units = recording::checkUnits(table); !units && !uses_any_units_) {
-    refuse(units.error().message, tr("Use anyway"), [this, then, path = session_path_] {
-      if (path != session_path_) return;
-      uses_any_units_ = true;
-      refusal_.clear();
-      emit tableChanged();
-      if (then) then();
-    });
-  }
-  return refusal_.isEmpty();
-}
-
-void Workbench::refuse(const std::string& why, const QString& action_label, std::function<void()> action) {
-  refusal_ = QString::fromStdString(why) + QLatin1Char('.');
-  refusal_[0] = refusal_[0].toUpper();
-  showMessage({refusal_, Severity::kAttention, action_label, std::move(action), QStringLiteral("session/table")});
-}
-
-SampleTable Workbench::samples() const {
-  SampleTable all{table_.metadata, {}};
-  for (const PlaceRows& place : places_) {
-    for (const Sample& sample : place.samples) all.rows.push_back({place.node, place.visit, sample});
-  }
-  all.rows.insert(all.rows.end(), loose_samples_.begin(), loose_samples_.end());
-  return all;
-}
-
-SampleTable Workbench::samplesAt(int node) const {
-  SampleTable some{table_.metadata, {}};
-  for (const PlaceRows& place : places_) {
-    if (place.node != node) continue;
-    for (const Sample& sample : place.samples) some.rows.push_back({place.node, place.visit, sample});
-  }
-  return some;
-}
-
 void Workbench::onSessionOpened(const QString& path, const QString& page, const QString& plan_json) {
   if (path == session_path_) {  // It was open all along.
     emit pageRequested(page == QStringLiteral("start") ? QStringLiteral("acquire") : page);
     return;
   }
   stopComparing();
+  stopFitting();
   session_path_ = path;
   table_ = {};
   table_is_stale_ = false;
@@ -325,6 +227,7 @@ void Workbench::onSessionOpened(const QString& path, const QString& page, const 
   refusal_.clear();
   comparison_.reset();
   corrector_.reset();
+  corrector_is_kept_.reset();
   kept_gap_.clear();
   spoken_of_.clear();
   endCondition(QStringLiteral("session"));
@@ -351,6 +254,13 @@ void Workbench::onFitOpened(const QString& ftcal_text) {
     return;
   }
   corrector_ = std::move(*loaded);
+  corrector_is_kept_ = true;
+  emit correctorChanged();
+}
+
+void Workbench::onFitStored(bool is_stored) {
+  if (!corrector_) return;
+  corrector_is_kept_ = is_stored;
   emit correctorChanged();
 }
 
@@ -421,12 +331,15 @@ void Workbench::setSetup(const Setup& stated) { post(&acquisition::AcquisitionCo
 
 void Workbench::createSession(const QString& path, const acquisition::Plan& plan,
                               const acquisition::TakeLength& length) {
-  post(&acquisition::AcquisitionController::setTakeLength, length);
-  post(&acquisition::AcquisitionController::openSession, path, QString::fromStdString(toJson(plan).dump()));
+  post(&acquisition::AcquisitionController::openSession, path, QString::fromStdString(toJson(plan).dump()), length);
 }
 
 void Workbench::openSession(const QString& path) {
-  post(&acquisition::AcquisitionController::openSession, path, QString());
+  post(&acquisition::AcquisitionController::openSession, path, QString(), std::optional<acquisition::TakeLength>());
+}
+
+void Workbench::setTakeLength(const acquisition::TakeLength& length) {
+  if (sessionIsOpen()) postToSession(&acquisition::AcquisitionController::setTakeLength, length);
 }
 
 void Workbench::take() { post(&acquisition::AcquisitionController::take); }
@@ -498,17 +411,25 @@ void Workbench::fit(const calibration::CorrectorChoice& choice, calibration::Ali
       return;
     }
     corrector_ = std::move(*result);
+    corrector_is_kept_.reset();
     const calibration::CorrectorChoice& fitted = corrector_->choice();
-    post(&acquisition::AcquisitionController::storeFit,
-         QString::fromStdString(fitted.position_id + " + " + fitted.orientation_id),
-         QString::fromStdString(corrector_->toText()));
+    postToSession(&acquisition::AcquisitionController::storeFit,
+                  QString::fromStdString(fitted.position_id + " + " + fitted.orientation_id),
+                  QString::fromStdString(corrector_->toText()));
     emit correctorChanged();
   });
   emit fittingChanged();
 }
 
+void Workbench::stopFitting() {
+  if (!isFitting()) return;
+  fit_jobs_.stop();
+  emit fittingChanged();
+}
+
 void Workbench::goToPage(const QString& page) {
-  if (sessionIsOpen()) post(&acquisition::AcquisitionController::setSessionState, QStringLiteral("page"), page);
+  if (sessionIsOpen())
+    postToSession(&acquisition::AcquisitionController::setSessionState, QStringLiteral("page"), page);
   emit pageRequested(page);
 }
 
@@ -530,7 +451,7 @@ void Workbench::setGapReport(std::optional<gap::GapReport> report) {
 void Workbench::keepGap(const QString& text) {
   if (!sessionIsOpen() || text == kept_gap_) return;
   kept_gap_ = text;
-  post(&acquisition::AcquisitionController::setSessionState, QStringLiteral("gap"), text);
+  postToSession(&acquisition::AcquisitionController::setSessionState, QStringLiteral("gap"), text);
 }
 
 void Workbench::showMessage(const Message& message) { emit messageShown(message); }

@@ -64,6 +64,8 @@ class Workbench : public QObject {
   const QString& sessionPath() const { return session_path_; }
   const std::optional<evaluation::Comparison>& comparison() const { return comparison_; }
   const std::optional<calibration::Corrector>& corrector() const { return corrector_; }
+  /// Whether the session keeps the calibration; none while that is not known yet.
+  std::optional<bool> correctorIsKept() const { return corrector_is_kept_; }
   /// Whether the calibration was fitted on the rows the session has now.
   bool correctorIsCurrent() const;
   /// False for a calibration that leaves position and orientation as they are.
@@ -100,6 +102,8 @@ class Workbench : public QObject {
   void setSetup(const Setup& stated);  ///< AcquisitionController::setSetup.
   void createSession(const QString& path, const acquisition::Plan& plan, const acquisition::TakeLength& length = {});
   void openSession(const QString& path);
+  /// Of the open session, from its next take on; nothing where none is open.
+  void setTakeLength(const acquisition::TakeLength& length);
   void take();
   void keepTake();
   void waitLonger();
@@ -140,11 +144,13 @@ class Workbench : public QObject {
  signals:
   void statusChanged(const fieldtrue::acquisition::AcquisitionStatus& status);
   void signalReady(const fieldtrue::acquisition::SignalSnapshot& snapshot);
-  void sessionChanged();     ///< Another session is open.
+  void sessionChanged();  ///< Another session is open.
+  /// AcquisitionController::takeLengthKnown.
+  void takeLengthKnown(const fieldtrue::acquisition::TakeLength& length);
   void tableChanged();       ///< Nodes were stored or taken back.
   void comparisonChanged();  ///< A comparison started, ended or failed.
   void comparisonProgress(double fraction);
-  void correctorChanged();
+  void correctorChanged();  ///< There is another one, or it is known whether the session keeps it.
   void gapReportChanged();
   void fittingChanged();  ///< A fit of the session's calibration began or ended.
   void pageRequested(const QString& page);
@@ -167,11 +173,16 @@ class Workbench : public QObject {
   QString nameOf(int place) const;
   void onTrace(const std::shared_ptr<const acquisition::Trace>& trace);
   void onFitOpened(const QString& ftcal_text);
+  void onFitStored(bool is_stored);
+  void stopFitting();
   void onTables(const CalibrationTable& table, const SampleTable& samples);
   void onPlace(int place, const std::vector<Node>& nodes, const std::vector<Sample>& samples);
   void changeTable();
   template <class... Arguments, class... Given>
   void post(void (acquisition::AcquisitionController::*slot)(Arguments...), Given&&... given);
+  /// The same, but nothing where another session is open by then.
+  template <class... Arguments, class... Given>
+  void postToSession(void (acquisition::AcquisitionController::*slot)(Arguments...), Given&&... given);
 
   QThread thread_;
   acquisition::AcquisitionController* controller_ = nullptr;
@@ -195,6 +206,7 @@ class Workbench : public QObject {
   QTimer table_timer_;
   std::optional<evaluation::Comparison> comparison_;
   std::optional<calibration::Corrector> corrector_;
+  std::optional<bool> corrector_is_kept_;
   std::optional<gap::GapReport> gap_report_;
   QString kept_gap_;
   BackgroundJobs comparison_jobs_{this};

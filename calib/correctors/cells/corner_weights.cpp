@@ -187,7 +187,10 @@ WeightRule weightRuleFrom(const JsonReader& json) {
   rule.kind = found->kind;
   rule.length_unit_m = json["length_unit_m"].number();
   if (!(rule.length_unit_m > 0.0)) json["length_unit_m"].refuse("above 0");
-  if (const JsonReader d_max = json["d_max_m"]; d_max.raw() != "auto") rule.d_max_m = d_max.number();
+  if (const JsonReader d_max = json["d_max_m"]; d_max.raw() != "auto") {
+    rule.d_max_m = d_max.number();
+    if (!(*rule.d_max_m > 0.0)) d_max.refuse("auto or a length above 0");
+  }
   return rule;
 }
 

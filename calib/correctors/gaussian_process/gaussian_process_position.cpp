@@ -93,6 +93,8 @@ std::unique_ptr<PositionModel> readGaussianProcessPosition(const JsonReader& par
   RadialField field = RadialField::fromJson(parameters);
   const GaussianProcessScales scales{parameters["length_m"].vector3(), parameters["signal_sd_m"].number(),
                                      parameters["nugget_sd_m"].number()};
+  if (!(scales.length_m.head(field.frame().dimension).minCoeff() > 0.0))
+    parameters["length_m"].refuse("three lengths above 0");
   const auto stored_m2 = parameters["noise_m2"].numbers();
   if (stored_m2.size() != field.centers_m().size()) parameters["noise_m2"].refuse("one number for each centre");
   const Eigen::VectorXd noise_m2 =

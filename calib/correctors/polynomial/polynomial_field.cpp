@@ -182,6 +182,7 @@ PolynomialField PolynomialField::fromJson(const JsonReader& json) {
   field.center_m_ = json["center_m"].vector3();
   field.axes_ = json["axes"].matrix3();
   field.scale_m_ = json["scale_m"].vector3();
+  if (!(field.scale_m_.minCoeff() > 0.0)) json["scale_m"].refuse("three lengths above 0");
   const Eigen::Index n_terms = termCount(field.dimension_, field.degree_);
   field.coefficients_ = json["coefficients"].matrix(3);
   field.inverse_root_ = json["inverse_root"].matrix(n_terms);

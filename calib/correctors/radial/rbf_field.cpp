@@ -85,6 +85,8 @@ FieldFrame FieldFrame::fromJson(const JsonReader& json) {
   frame.axes = json["axes"].matrix3();
   frame.per_m = json["per_m"].vector3();
   frame.dimension = static_cast<int>(json["dimension"].integer(2, 3));
+  if (!(frame.per_m.head(frame.dimension).minCoeff() > 0.0) || frame.per_m.z() < 0.0)
+    json["per_m"].refuse("a number above 0 for each axis of the field");
   return frame;
 }
 
@@ -191,7 +193,9 @@ RadialField RadialField::fromJson(const JsonReader& json) {
     json.fail("needs as many coefficients as centres and a tail of the frame's dimension.");
   std::vector<Eigen::Vector3d> centers_m;
   for (Eigen::Index i = 0; i < centers.rows(); ++i) centers_m.emplace_back(centers.row(i).transpose());
-  return RadialField(*kernel, json["shape_squared"].number(), frame, centers_m, solution);
+  const double c2 = json["shape_squared"].number();
+  if (!(c2 >= 0.0)) json["shape_squared"].refuse("0 or above");
+  return RadialField(*kernel, c2, frame, centers_m, solution);
 }
 
 Eigen::VectorXd placeNoise_m2(const FitData& data, const Places& places) {

@@ -68,9 +68,9 @@ struct Reach {
   double beyond(double share) const { return t * (1.0 + share / std::sqrt(n_carrying)); }
 };
 
-/// Places less the coefficients of the fit.
+/// True positions less the coefficients of the fit.
 double freePlaces(std::size_t n_places, const FitFreedom& freedom) {
-  return std::max(1.0, static_cast<double>(n_places) * (1.0 - freedom.coefficients_a_place));
+  return std::max(1.0, static_cast<double>(n_places) * (freedom.positions_a_place - freedom.coefficients_a_place));
 }
 
 /// @param relative what each place contributes, in units of the mean square
@@ -123,6 +123,7 @@ Interval rmsInterval90(std::span<const double> errors, const FitFreedom& freedom
 PairedGain pairedGain(std::span<const double> before, std::span<const double> after, const FitFreedom& freedom) {
   FT_CHECK(before.size() == after.size() && !before.empty());
   const double gain = gainOf(sumOfSquares(before), sumOfSquares(after));
+  if (before.size() < 2) return {gain, std::nan(""), std::nan("")};
   const std::vector<double> of_before = relativeSquares(before), of_after = relativeSquares(after);
   const std::vector<double> relative = differences(of_after, of_before);
   const double sd = sdOfMean(relative, freedom);
@@ -134,16 +135,19 @@ PairedGain pairedGain(std::span<const double> before, std::span<const double> af
   return {gain, 1.0 - (1.0 - gain) * std::sqrt(most), 1.0 - (1.0 - gain) * std::sqrt(least)};
 }
 
-PairedDifference pairedDifference(std::span<const double> errors, std::span<const double> of_best) {
+PairedDifference pairedDifference(std::span<const double> errors, std::span<const double> of_best,
+                                  double positions_a_place) {
   FT_CHECK(errors.size() == of_best.size() && !errors.empty());
   const double rms = rootMeanSquare(errors), best_rms = rootMeanSquare(of_best);
+  if (errors.size() < 2) return {rms - best_rms, std::nan(""), std::nan("")};
+  const FitFreedom freedom{.positions_a_place = positions_a_place};
   std::vector<double> relative = relativeSquares(errors);
   std::vector<double> best_relative = relativeSquares(of_best);
-  const Reach reach = reach90(differences(relative, best_relative), {});
+  const Reach reach = reach90(differences(relative, best_relative), freedom);
   // d RMS = RMS/2 d log(mean square).
   for (double& value : relative) value *= 0.5 * rms;
   for (double& value : best_relative) value *= 0.5 * best_rms;
-  const double half = reach.beyond(kAround) * sdOfMean(differences(relative, best_relative), {});
+  const double half = reach.beyond(kAround) * sdOfMean(differences(relative, best_relative), freedom);
   return {rms - best_rms, rms - best_rms - half, rms - best_rms + half};
 }
 

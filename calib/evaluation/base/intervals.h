@@ -10,7 +10,7 @@ namespace fieldtrue::evaluation {
 /// places cannot draw a tail that the table does not hold. So the interval is one of Student's t on the logarithm of
 /// the mean square, with the degrees of freedom that the concentration of the squares leaves:
 ///
-///   m   = places less the coefficients of the fit
+///   m   = places, those at one true position counted once, less the coefficients of the fit
 ///   c   = SD of the squares / their mean        n_e = m / (1 + c^2), the places that carry the mean square
 ///   t   = 95 % point of Student's t with max(1, n_e / 2) degrees of freedom
 ///   log mean square: from -t c/sqrt(m) to +t c/sqrt(m) (1 + 1.2/sqrt(n_e))
@@ -33,6 +33,7 @@ double rootMeanSquare(std::span<const double> values);
 struct FitFreedom {
   double coefficients_a_place = 0.0;  ///< Coefficients an axis over places fitted; at most 1. @see PositionModel
   bool is_tuned = false;              ///< @see CorrectionMethod::tunes
+  double positions_a_place = 1.0;     ///< Below 1 where places of several sensors share true positions.
 };
 
 /// 90 % interval of the RMS of places' errors; not a number for one place, which tells nothing of others.
@@ -43,7 +44,8 @@ Interval rmsInterval90(std::span<const double> errors, const FitFreedom& freedom
 /// squares is at least that seen times exp(-t c / sqrt(m) (1 + 1.2/sqrt(n_e))). It is at most the largest r for which
 /// mean(after^2 - r before^2) lies within T of zero, in its SDs, where T is 1.75 times the 95 % point of Student's t of
 /// m - 1 degrees, and no more than that seen times exp(T c / sqrt(m)): Fieller's r grows without bound where few places
-/// carry the error before. c is widened by 1.3 for a tuned method, and for Fieller's r T is.
+/// carry the error before. c is widened by 1.3 for a tuned method, and for Fieller's r T is. Of one place the ends are
+/// not numbers.
 /// @source Fieller 1954 for the second
 struct PairedGain {
   double gain = 0.0;
@@ -62,8 +64,9 @@ struct PairedDifference {
   double high90 = 0.0;
 };
 
-/// @param errors, of_best of the same places, same order and unit
-PairedDifference pairedDifference(std::span<const double> errors, std::span<const double> of_best);
+/// @param errors, of_best of the same places, same order and unit; of one place the ends are not numbers
+PairedDifference pairedDifference(std::span<const double> errors, std::span<const double> of_best,
+                                  double positions_a_place = 1.0);
 
 /// The place whose removal lowers the gain most.
 std::size_t worstPlace(std::span<const double> before, std::span<const double> after);

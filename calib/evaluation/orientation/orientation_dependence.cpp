@@ -60,8 +60,8 @@ std::string tooFewText(const OrientationRows& rows, PosePart part, int n_places)
          " depends on how the sensor is held cannot be told: it needs at least 3 orientations at 20 places, and there "
          "are " +
          countText(static_cast<std::size_t>(n_places), "place", "places") + " with 3 or more (" +
-         countText(rows.n_groups, "orientation", "orientations") + " in all at " +
-         countText(rows.n_places, "place", "places") + ").";
+         (rows.has_more_groups ? "at least " : "") + countText(rows.n_groups, "orientation", "orientations") +
+         " in all at " + countText(rows.n_places, "place", "places") + ").";
 }
 
 }  // namespace

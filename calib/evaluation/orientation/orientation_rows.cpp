@@ -29,7 +29,8 @@ void groupOrientations(OrientationRows& rows) {
     }
     rows.n_groups = g + 1;
     next = static_cast<std::size_t>(std::max_element(nearest_rad.begin(), nearest_rad.end()) - nearest_rad.begin());
-    if (nearest_rad[next] <= kAlike_rad) break;
+    rows.has_more_groups = nearest_rad[next] > kAlike_rad;
+    if (!rows.has_more_groups) break;
   }
 }
 

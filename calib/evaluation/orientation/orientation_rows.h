@@ -33,7 +33,8 @@ struct OrientationRows {
   std::vector<std::size_t> group;  ///< Of orientations that are alike.
   std::size_t n_places = 0;
   std::size_t n_groups = 0;
-  int dimension = 3;  ///< Of the true positions.
+  bool has_more_groups = false;  ///< There are more orientations than are told apart.
+  int dimension = 3;             ///< Of the true positions.
 
   std::size_t size() const { return node.size(); }
 };

@@ -497,6 +497,34 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(bench.failures.size(), 1);
   }
 
+  void eachSessionKeepsTheLengthOfItsTakes() {
+    const QString first = folder_.newPath(), second = folder_.newPath();
+    Bench bench(first);
+    TakeLength known;
+    connect(&bench.controller, &AcquisitionController::takeLengthKnown, this,
+            [&known](const TakeLength& length) { known = length; });
+    const TakeLength half_second{TakeLength::Until::kSeconds, 0.5};
+    bench.controller.setTakeLength(half_second);
+    bench.controller.setTakeLength({TakeLength::Until::kSamples, 0});
+    QCOMPARE(known, half_second);
+    const QString plan = QString::fromStdString(toJson(planOf({2, 1, 1})).dump());
+    bench.controller.openSession(second, plan);
+    QCOMPARE(known, TakeLength());
+    bench.takeHere();
+    QCOMPARE(bench.nodes.back().n_used, 60);
+    bench.controller.openSession(first, {});
+    QCOMPARE(known, half_second);
+    bench.takeHere();
+    QCOMPARE(bench.nodes.back().n_used, 61);
+    // One that cannot be made changes nothing of the session that stays open.
+    bench.controller.openSession(second, plan, TakeLength{TakeLength::Until::kSamples, 5});
+    bench.takeHere();
+    QCOMPARE(bench.nodes.back().n_used, 61);
+    bench.controller.openSession(folder_.newPath(), plan, TakeLength{TakeLength::Until::kSamples, 25});
+    bench.takeHere();
+    QCOMPARE(bench.nodes.back().n_used, 25);
+  }
+
  private:
   void wholePlan(bool automatic) {
     Bench bench(folder_.newPath());

@@ -222,6 +222,32 @@ class CorrectorFileTest : public QObject {
     QVERIFY(loaded.error().message.find('\n') == std::string::npos);
   }
 
+  void aScaleThatIsNotAboveZeroIsRefused_data() {
+    QTest::addColumn<QByteArray>("position");
+    QTest::addColumn<QByteArray>("orientation");
+    QTest::addColumn<QByteArray>("pointer");  // of the number, within the file
+    const auto row = [](const char* position, const char* orientation, const char* pointer) {
+      QTest::newRow(pointer) << QByteArray(position) << QByteArray(orientation) << QByteArray(pointer);
+    };
+    row("affine", "none", "/position/parameters/scale_m/0");
+    row("none", "polynomial_quaternion:degree=2", "/orientation/parameters/vector_part/scale_m/0");
+    row("rbf:smoothing=0", "none", "/position/parameters/frame/per_m/1");
+    row("gaussian_process", "none", "/position/parameters/length_m/2");
+  }
+  void aScaleThatIsNotAboveZeroIsRefused() {
+    QFETCH(QByteArray, position);
+    QFETCH(QByteArray, orientation);
+    QFETCH(QByteArray, pointer);
+    const std::string text = fitted(position.toStdString(), orientation.toStdString()).toText();
+    const json::json_pointer scale(pointer.toStdString());
+    for (const double value : {0.0, -0.3}) {
+      const auto loaded =
+          Corrector::fromText(rewritten(text, [&](json& j) { j.at(scale) = value; }), "room.ftcal.json");
+      QVERIFY(!loaded && loaded.error().code == ErrorCode::kBadInput);
+      FT_VERIFY_MATCH(holdsAll(loaded.error().message, {"room.ftcal.json", "above 0"}));
+    }
+  }
+
   void missingFilesAndFoldersAreSaid() {
     const auto loaded = Corrector::load("/nowhere/room.ftcal.json");
     QVERIFY(!loaded && loaded.error().code == ErrorCode::kIo);

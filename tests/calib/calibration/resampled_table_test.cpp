@@ -142,6 +142,28 @@ class ResampledTableTest : public QObject {
     for (const Node& node : resampled->table.nodes) QVERIFY(!node.has_orientation);
   }
 
+  /// Every row twice under another number: no place is foretold by its own repetition.
+  void aRepeatedPlaceIsOnePlace() {
+    SyntheticOptions options;
+    options.smooth_distortion_m = 0.02;
+    const CalibrationTable once = syntheticTable(options);
+    CalibrationTable twice = once;
+    for (Node node : once.nodes) {
+      node.node += 1000;
+      twice.nodes.push_back(node);
+    }
+    const auto method = how(correctors::RegridMethod::kBriggs);
+    const auto expected = resampleTable(once, grid(), method, AlignMode::kRigid);
+    const auto resampled = resampleTable(twice, grid(), method, AlignMode::kRigid);
+    FT_VERIFY_OK(expected);
+    FT_VERIFY_OK(resampled);
+    QCOMPARE(resampled->error.n_scored, expected->error.n_scored);
+    QVERIFY(expected->error.rms_mm > 0.1);
+    FT_VERIFY_MATCH(near(resampled->error.rms_mm, expected->error.rms_mm, 1e-9));
+    FT_VERIFY_MATCH(holdsAll(resampled->note, {"100 places", "one place"}));
+    QVERIFY(expected->note.empty());
+  }
+
   void whatCannotBeDoneIsSaid() {
     std::vector<PlannedPlace> far_away = grid();
     for (PlannedPlace& place : far_away) place.reference_from_sensor.position_m.x() += 10.0;

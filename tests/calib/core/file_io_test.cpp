@@ -1,13 +1,17 @@
 #include "calib/core/file_io.h"
 
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <QTemporaryDir>
 #include <QTest>
 #include <charconv>
 #include <cmath>
 #include <csignal>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 
@@ -40,6 +44,25 @@ class FileSizeLimit {
  private:
   rlimit before_{};
 };
+
+/// The bytes of any file, a session's too.
+std::string bytesOf(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Whether a second program finds the file locked.
+bool isLockedForOthers(const std::filesystem::path& path) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    struct flock lock {};
+    lock.l_type = F_WRLCK;
+    const int file = ::open(path.c_str(), O_RDWR);
+    ::_exit(::fcntl(file, F_SETLK, &lock) == 0 ? 0 : 1);
+  }
+  int status = 0;
+  return ::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 1;
+}
 
 std::size_t filesIn(const std::filesystem::path& folder) {
   return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
@@ -126,13 +149,51 @@ class FileIoTest : public QObject {
     std::filesystem::create_symlink("day.fieldtrue", link);
     FT_VERIFY_OK(writeText(path_, database));
     for (const auto& path : {session, link, path_}) {
-      const auto before = readFile(path);
+      const std::string before = bytesOf(path);
       const auto written = writeText(path, "new");
       QVERIFY(!written);
       FT_VERIFY_MATCH(holdsAll(written.error().message,
                                {QByteArray::fromStdString(path.string()), "it is a session", "unchanged"}));
-      QCOMPARE(*readFile(path), *before);
+      QCOMPARE(bytesOf(path), before);
     }
+  }
+
+  void sessionsAreNotRead_data() {
+    QTest::addColumn<QString>("name");
+    QTest::newRow("session") << "open.fieldtrue";
+    QTest::newRow("in capitals") << "open.FIELDTRUE";
+    QTest::newRow("its journal") << "open.fieldtrue-wal";
+    QTest::newRow("a link to it") << "open.csv";
+  }
+  /// A session that this program has locked stays locked, whoever asks for its bytes.
+  void sessionsAreNotRead() {
+    QFETCH(QString, name);
+    const std::filesystem::path path = path_.parent_path() / name.toStdString();
+    const std::filesystem::path session = path_.parent_path() / "linked.fieldtrue";
+    const bool is_link = path.extension() == ".csv";
+    if (is_link) std::filesystem::create_symlink(session.filename(), path);
+    std::ofstream(path) << "a day's work";
+    const int file = ::open(path.c_str(), O_RDWR);
+    struct flock lock {};
+    lock.l_type = F_WRLCK;
+    QCOMPARE(::fcntl(file, F_SETLK, &lock), 0);
+    const auto whole = readFile(path);
+    const auto stream = openForReading(path);
+    QVERIFY(!whole && !stream);
+    QCOMPARE(stream.error().message, whole.error().message);
+    FT_VERIFY_MATCH(
+        holdsAll(whole.error().message, {name.toUtf8(), "it is a session; open it, or use", "tables --session"}));
+    QVERIFY(isLockedForOthers(path));
+    ::close(file);
+    QVERIFY(!isLockedForOthers(path));
+    std::filesystem::remove(path);
+    std::filesystem::remove(session);
+  }
+
+  void anAbsentSessionIsAbsent() {
+    const auto read = readFile(path_.parent_path() / "absent.fieldtrue");
+    QVERIFY(!read && read.error().code == ErrorCode::kIo);
+    FT_VERIFY_MATCH(holdsAll(read.error().message, {"No such file or directory"}));
   }
 
   void badPaths() {

@@ -108,6 +108,18 @@ class GainTestTest : public QObject {
     FT_VERIFY_MATCH(near(stats.rms_high90, std::exp(0.5 * t_sd * (1.0 + 1.2 / std::sqrt(2.0))), 1e-4));
   }
 
+  /// Eight places at four true positions, each seen by two sensors: four, as in the test before.
+  void aTruePositionIsCountedOnce() {
+    std::vector<double> errors;
+    for (int i = 0; i < 8; ++i) errors.push_back(std::sqrt(1.0 + (i % 2 == 0 ? 1.0 : -1.0) * std::sqrt(7.0 / 8.0)));
+    const double t_sd = 6.313752 / std::sqrt(4.0);
+    FT_VERIFY_MATCH(near(errorStats(errors, {.positions_a_place = 0.5}).rms_low90, std::exp(-0.5 * t_sd), 1e-6));
+    const std::vector<double> others(8, 2.0);
+    const PairedDifference all = pairedDifference(errors, others), half = pairedDifference(errors, others, 0.5);
+    QCOMPARE(half.difference, all.difference);
+    QVERIFY(half.high90 - half.low90 > 1.5 * (all.high90 - all.low90));
+  }
+
   /// One place of twenty carries much of the error before: Fieller's bound is far off, or nowhere, and the low end is
   /// that of the logarithm. Squares before are 9 and 1, their mean 1.4; after they are alike, so only those before
   /// vary.
@@ -127,6 +139,11 @@ class GainTestTest : public QObject {
   void oneErrorHasNoInterval() {
     const Interval interval = rmsInterval90(std::vector<double>{2.0});
     QVERIFY(std::isnan(interval.low) && std::isnan(interval.high));
+    const std::vector<double> two = {2.0}, one = {1.0};
+    const PairedGain gain = pairedGain(two, one);
+    QVERIFY(gain.gain == 0.5 && std::isnan(gain.low90) && std::isnan(gain.high90));
+    const PairedDifference difference = pairedDifference(two, one);
+    QVERIFY(difference.difference == 1.0 && std::isnan(difference.low90) && std::isnan(difference.high90));
   }
 
   void indicesAreDrawnEvenly() {
@@ -189,7 +206,9 @@ class GainTestTest : public QObject {
   void twoPlacesAreTooFew() {
     const GainTest test = testGain({1, 2}, {5.0, 5.0}, {0.1, 0.1});
     QVERIFY(test.gain > 0.9 && !test.apply);
+    QVERIFY(std::isnan(test.gain_without_worst_place) && std::isnan(test.low90_without_worst_place));
     QVERIFY(!testGain({}, {}, {}).apply);
+    QVERIFY(!testGain({1}, {5.0}, {0.1}).apply);
   }
 
   void perfectBeforeGainsNothing() {

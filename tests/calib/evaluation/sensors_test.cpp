@@ -5,6 +5,7 @@
 #include <random>
 #include <set>
 
+#include "calib/calibration/coincident_places.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/units.h"
 #include "calib/evaluation/comparison.h"
@@ -265,6 +266,44 @@ class SensorsTest : public QObject {
                                node.reference_from_sensor.position_m)
                                   .squaredNorm();
       FT_VERIFY_MATCH(near(comparison->position.front().place_errors[k], std::sqrt(square_mm2), 1e-6));
+    }
+  }
+
+  void placesShareTruePositions() {
+    std::vector<Node> nodes(6);
+    const auto put = [&](std::size_t row, int node, int sensor, double x_m) {
+      nodes[row].node = node;
+      nodes[row].sensor = sensor;
+      nodes[row].reference_from_sensor.position_m.x() = x_m;
+    };
+    // Two sensors at one place of one number are a place; at two numbers they are halves of one.
+    for (std::size_t row = 0; row < 6; ++row)
+      put(row, static_cast<int>(row / 2), static_cast<int>(row % 2), static_cast<double>(row / 2));
+    QCOMPARE(calibration::positionsAPlace(nodes), 1.0);
+    for (std::size_t row = 0; row < 6; ++row)
+      put(row, static_cast<int>(row), static_cast<int>(row % 2), static_cast<double>(row / 2));
+    QCOMPARE(calibration::positionsAPlace(nodes), 0.5);
+    // A bar of one pitch: of three places the first and the last have one of their two positions for themselves.
+    for (std::size_t row = 0; row < 6; ++row)
+      put(row, static_cast<int>(row / 2), static_cast<int>(row % 2), static_cast<double>(row / 2 + row % 2));
+    FT_VERIFY_MATCH(near(calibration::positionsAPlace(nodes), (0.75 + 0.5 + 0.75) / 3.0, 1e-15));
+  }
+
+  void nothingWorseThanNothingIsBest() {
+    // The second scatters so much that its own correction errs by less than one for both, and by more than none.
+    for (const double noise_m : {0.005, 0.01, 0.02, 0.04}) {
+      ComparisonOptions options;
+      options.position_methods = {parseMethodText("polynomial:degree=2").value(), {"rigid", {}}};
+      options.orientation_methods = {{"none", {}}};
+      options.validation = Validation{ValidationKind::kFolds, 10};
+      const auto comparison = compareMethods(twoSensors({.noise_1_m = 1e-4, .noise_2_m = noise_m}), options);
+      FT_VERIFY_OK(comparison);
+      QVERIFY(comparison->split.has_value());
+      if (isApart(comparison->split)) QVERIFY(comparison->split->separate < comparison->split->before);
+      if (!comparison->best_position_row) continue;
+      QVERIFY(comparison->verdict.position.gain > 0.0);
+      const MethodScore& best = comparison->position[*comparison->best_position_row];
+      if (!isApart(comparison->split)) QCOMPARE(best.rms_to_best, 0.0);
     }
   }
 

@@ -4,6 +4,7 @@
 #include <QTest>
 #include <fstream>
 
+#include "calib/core/file_io.h"
 #include "calib/exporters/export_calibration.h"
 #include "calib/exporters/registry.h"
 #include "tests/support/matchers.h"
@@ -32,6 +33,10 @@ const CalibrationFormat& formatOf(const std::string& id) {
   const CalibrationFormat* format = findCalibrationFormat(id);
   if (format == nullptr) qFatal("no format %s", id.c_str());
   return *format;
+}
+
+void write(const std::filesystem::path& file, std::string_view bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
 }
 
 }  // namespace
@@ -148,6 +153,110 @@ class ImportedCalibrationTest : public QObject {
           << ",0,0,0,,1\n";
     out.close();
     FT_VERIFY_MATCH(holdsAll(importCalibration(formatOf("lattice"), file).error().message, {"point 5", "quaternion"}));
+  }
+
+  void aMatFileCutOffIsRefused() {
+    QTemporaryDir folder;
+    const std::filesystem::path file = folder.filePath("room.mat").toStdString();
+    const CalibrationTable table = syntheticTable();
+    const auto affine = calibration::Corrector::fit(table.nodes, table.metadata, {"affine", {}, "none", {}},
+                                                    calibration::AlignMode::kRigid);
+    FT_VERIFY_OK(affine);
+    FT_VERIFY_OK(exportCalibration(*findExporter("matlab").value(), *affine, {}, file, {}));
+    const std::string whole = readFile(file).value();
+    for (const std::size_t bytes : {whole.size() - 1, std::size_t{145}, std::size_t{130}}) {
+      write(file, std::string_view(whole).substr(0, bytes));
+      const auto imported = importCalibration(formatOf("lattice"), file);
+      QVERIFY(!imported);
+      FT_VERIFY_MATCH(holdsAll(imported.error().message, {"room.mat", "the file is cut off"}));
+      QVERIFY(recogniseCalibration(file) == nullptr);
+    }
+    std::string damaged = whole;
+    // In the packed numbers of the first array, behind the head of 128 bytes and the tag of 8.
+    for (std::size_t at = 146; at < 156; ++at) damaged[at] = static_cast<char>(~whole[at]);
+    write(file, damaged);
+    FT_VERIFY_MATCH(
+        holdsAll(importCalibration(formatOf("lattice"), file).error().message, {"room.mat", "damaged or cut off"}));
+  }
+
+  void aDisplacementThatIsNoneIsRefused_data() {
+    QTest::addColumn<QString>("format");
+    QTest::addColumn<QString>("name");
+    QTest::addColumn<QByteArray>("head");
+    QTest::addColumn<QByteArray>("tail");
+    QTest::addColumn<QByteArray>("number");
+    QTest::addColumn<QByteArray>("says");
+    const QByteArray tfm =
+        "#Insight Transform File V1.0\n#Transform 0\nTransform: DisplacementFieldTransform_double_3_3\nParameters:";
+    const QByteArray tfm_tail = "\nFixedParameters: 2 2 2 0 0 0 1000 1000 1000 1 0 0 0 1 0 0 0 1\n";
+    const QByteArray vti =
+        "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 0 1\"><Piece><PointData>"
+        "<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">";
+    const QByteArray vti_tail = "</DataArray></PointData></Piece></ImageData></VTKFile>";
+    const QByteArray not_finite = "point 5 is not a finite number";
+    QTest::newRow("tfm, nan") << "itk_field"
+                              << "field.tfm" << tfm << tfm_tail << QByteArray("nan") << not_finite;
+    QTest::newRow("tfm, huge") << "itk_field"
+                               << "field.tfm" << tfm << tfm_tail << QByteArray("1e203")
+                               << QByteArray("point 5 is 1e+200 m, more than the 30 m that any tracker reaches");
+    QTest::newRow("tfm, far") << "itk_field"
+                              << "field.tfm" << tfm << tfm_tail << QByteArray("-41000")
+                              << QByteArray("point 5 is 41 m, more than the 30 m");
+    QTest::newRow("vti, nan") << "vtk_field"
+                              << "field.vti" << vti << vti_tail << QByteArray("nan") << not_finite;
+    QTest::newRow("vti, far") << "vtk_field"
+                              << "field.vti" << vti << vti_tail << QByteArray("31")
+                              << QByteArray("numbers were taken as m");
+  }
+
+  void aDisplacementThatIsNoneIsRefused() {
+    QFETCH(const QString, format);
+    QFETCH(const QString, name);
+    QFETCH(const QByteArray, head);
+    QFETCH(const QByteArray, tail);
+    QFETCH(const QByteArray, number);
+    QFETCH(const QByteArray, says);
+    QTemporaryDir folder;
+    const std::filesystem::path file = folder.filePath(name).toStdString();
+    const auto importWith = [&](const QByteArray& one) {
+      QByteArray text = head;
+      for (int point = 0; point < 8; ++point) text += " 0 " + (point == 5 ? one : QByteArray("0")) + " 0";
+      write(file, (text + tail).toStdString());
+      return importCalibration(formatOf(format.toStdString()), file);
+    };
+    FT_VERIFY_OK(importWith("29"));
+    const auto imported = importWith(number);
+    QVERIFY(!imported);
+    FT_VERIFY_MATCH(holdsAll(imported.error().message, {name.toUtf8(), says}));
+  }
+
+  void aLatticeAskewIsRefused() {
+    QTemporaryDir folder;
+    const std::filesystem::path file = folder.filePath("field.vti").toStdString();
+    std::string numbers;
+    for (int number = 0; number < 24; ++number) numbers += " 0";
+    for (const auto& [statement, says] :
+         {std::pair{"Direction=\"1 0.1 0 0 1 0 0 0 1\"", "not at right angles"},
+          std::pair{"Origin=\"0 nan 0\"", "must be finite"}, std::pair{"Spacing=\"1 inf 1\"", "must be finite"}}) {
+      write(file, "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 0 1\" " + std::string(statement) +
+                      "><Piece><PointData><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">" +
+                      numbers + "</DataArray></PointData></Piece></ImageData></VTKFile>");
+      const auto imported = importCalibration(formatOf("vtk_field"), file);
+      QVERIFY(!imported);
+      FT_VERIFY_MATCH(holdsAll(imported.error().message, {"field.vti", says}));
+    }
+  }
+
+  void anAbsentFileIsSaidToBeAbsent() {
+    for (const CalibrationFormat& format : calibrationFormats())
+      for (const std::string& id : format.exporter_ids) {
+        const std::string file = "/nowhere/none" + findExporter(id).value()->extension;
+        const auto imported = importCalibration(format, file);
+        QVERIFY(!imported);
+        QVERIFY2(imported.error().code == ErrorCode::kIo, imported.error().message.c_str());
+        FT_VERIFY_MATCH(holdsAll(imported.error().message,
+                                 {"Cannot read ", QByteArray::fromStdString(file), "No such file or directory"}));
+      }
   }
 
   void itCannotBeFitted() {

@@ -169,11 +169,21 @@ class GapIsolabilityTest : public QObject {
     QVERIFY(allOf(turned->isolability.warnings).find("anew at ten places") == std::string::npos);
   }
 
-  void refusesAHandfulAndStops() {
+  void refusesAHandful_data() {
+    QTest::addColumn<int>("places");
+    for (const int places : {1, 7, 8, 11}) QTest::addRow("%d", places) << places;
+  }
+  void refusesAHandful() {
+    QFETCH(int, places);
     GapPlan few;
-    few.counts = {2, 2, 2};
+    few.counts = {places, 1, 1};
     const auto refused = planCheck(gapPlan(few), nullptr);
     QVERIFY(!refused && refused.error().code == ErrorCode::kTooFewNodes);
+    QCOMPARE(refused.error().message,
+             "A plan is checked with at least 12 places; this one has " + std::to_string(places) + ".");
+  }
+
+  void stops() {
     std::stop_source source;
     source.request_stop();
     RunControl control;

@@ -82,9 +82,10 @@ GapReport someReport() {
   report.rival = {12.5, 30.0, 1.5, 0.5, 0.875, {"gain_drift"}, "A field without a name does as well."};
   report.odds_over_next = 14.5;
   report.isolability = {{{"compact_metal", "closed_loop", 0.31, 1.5}}, {"One orientation only."}};
+  report.not_looked_for = "9 places are too few";
   report.next_measurement = "Turn the sensor.";
   report.next_separates = {"compact_metal", "closed_loop"};
-  report.predictions = {{"compact_metal", 17, 31.0, 12.0, 4.0}};
+  report.predictions = {{"compact_metal", 1, 17, 31.0, 12.0, 4.0}};
   report.replicates = Replicates{50, 41, 0.25, "closed_loop", 10, 7, 2, "Of 50, 41 were named right."};
   report.against = Against{true, 0.0025, 4.5, Eigen::Vector3d(0.25, -0.5, 0.75), "compact_metal"};
   return report;

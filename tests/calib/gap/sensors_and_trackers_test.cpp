@@ -104,6 +104,16 @@ class SensorsAndTrackersTest : public QObject {
     QVERIFY(!isTold(*report, "Sensor 0: "));
   }
 
+  /// The readings of another recording are refused before anything is diagnosed.
+  void samplesOfAnotherRoomAreRefused() {
+    SampleTable samples;
+    recordedIn(gapScene(), gapPlan(), 1, &samples);
+    for (SampleRow& row : samples.rows) row.sample.tracker_from_sensor.position_m.y() += 0.3;
+    const auto report = diagnose(recordedIn(gapScene(), gapPlan()), &samples, nullptr);
+    QVERIFY(!report && report.error().code == ErrorCode::kBadInput);
+    FT_VERIFY_MATCH(holdsAll(report.error().message, {"The samples are not those of this table", "80 of 80 places"}));
+  }
+
   /// Of a tracker whose transmitter is no dipole nothing is claimed by the physics of dipoles: the same readings have a
   /// cause, or only a place.
   void noDipoleNoMetal() {

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <set>
 
+#include "calib/importers/column_guess.h"
 #include "calib/importers/importer.h"
 #include "calib/importers/registry.h"
 #include "tests/support/matchers.h"
@@ -73,6 +74,22 @@ class ImporterContractTest : public QObject {
     const auto import = readWith("empty.dat");
     QVERIFY(!import && import.error().code == ErrorCode::kBadInput);
     FT_VERIFY_MATCH(holdsAll(import.error().message, {"empty.dat"}));
+  }
+
+  void sessionIsRefused_data() { addRows(); }
+  void sessionIsRefused() {
+    writeFile("day.fieldtrue", "1,2,3\n");
+    const auto import = readWith("day.fieldtrue");
+    QVERIFY(!import && import.error().code == ErrorCode::kBadInput);
+    FT_VERIFY_MATCH(holdsAll(import.error().message, {"day.fieldtrue: it is a session; open it"}));
+  }
+
+  void sessionIsOfNoFormat() {
+    writeFile("day.fieldtrue", "1,2,3\n4,5,6\n");
+    QVERIFY(recogniseRecording(pathTo("day.fieldtrue")) == nullptr);
+    const auto guess = guessColumns(pathTo("day.fieldtrue"));
+    QVERIFY(!guess);
+    FT_VERIFY_MATCH(holdsAll(guess.error().message, {"day.fieldtrue: it is a session", "tables --session"}));
   }
 
   void foreignText_data() { addRows(); }

@@ -147,6 +147,13 @@ class TableErrorsTest : public QObject {
                                          << QByteArray("line 2, column role: the file ends before the role");
     QTest::newRow("open quote") << head + "\n\"1,1,2,3,4,5,6\n" << QByteArray("line 2: a quoted field is not closed");
     QTest::newRow("UTF-16") << QByteArray("\xFF\xFEn\0o\0d\0e\0", 10) << QByteArray("line 1: this is not UTF-8 text");
+    QTest::newRow("Latin-1") << "# frame: jig\n# setup.room: caf\xE9\n" + head + row
+                             << QByteArray("line 2: this is not UTF-8 text");
+    QTest::newRow("Latin-1 key") << "# caf\xE9: 1\n" + head + row << QByteArray("line 1: this is not UTF-8 text");
+    QTest::newRow("half a UTF-16 pair") << "# note: \xED\xA0\x80\n" + head + row
+                                        << QByteArray("line 1: this is not UTF-8 text");
+    QTest::newRow("longer than need be") << "# note: \xC0\xAF\n" + head + row
+                                         << QByteArray("line 1: this is not UTF-8 text");
     QTest::newRow("repeated key, default visit given")
         << head + ",visit\n1,1,2,3,4,5,6,1\n1,1,2,3,4,5,6,1\n"
         << QByteArray("line 3, column node: node 1, sensor 0, visit 1 stands already in line 2");
@@ -170,6 +177,14 @@ class TableErrorsTest : public QObject {
     QVERIFY(!reading);
     QVERIFY(reading.error().code == ErrorCode::kBadInput);
     FT_VERIFY_MATCH(holdsAll(reading.error().message, {"bad.nodes.csv", says}));
+  }
+
+  void metadataOfAllLengthsIsRead() {
+    const std::string text = "caf\xC3\xA9 \xE2\x82\xAC \xED\x9F\xBF \xF0\x9F\xA7\xB2 \xF4\x8F\xBF\xBF";
+    const auto reading =
+        badNodesOf("# setup.room: " + text + "\nnode,x_true_m,y_true_m,z_true_m,x_m,y_m,z_m\n1,1,2,3,4,5,6\n");
+    FT_VERIFY_OK(reading);
+    QVERIFY(factOf(reading->table.metadata.setup, "room") == text);
   }
 
   void badSamples_data() {

@@ -116,6 +116,22 @@ class DifferencePageTest : public WindowDriver {
                               kWaitMs);
   }
 
+  void anotherFileLeavesNothingOfTheOld() {
+    auto* second = find<QLineEdit>("differenceSecond");
+    compare("before.ftcal.json", "after.ftcal.json");
+    QTRY_COMPARE_WITH_TIMEOUT(find<QLabel>("differenceHeadline")->text(), QStringLiteral("The field changed"), kWaitMs);
+    second->setText(folder_.filePath("before.ftcal.json"));
+    QCOMPARE(find<QLabel>("differenceHeadline")->text(), QStringLiteral("What changed?"));
+    QVERIFY(find<FieldView>("differenceField")->field().arrows.empty());
+    // Nor does what was asked of the old answer beside the new.
+    compare("before.ftcal.json", "after.ftcal.json");
+    second->setText(folder_.filePath("before.ftcal.json"));
+    QCOMPARE(find<QPushButton>("differenceRun")->text(), QStringLiteral("Tell what changed"));
+    QThreadPool::globalInstance()->waitForDone();
+    QCoreApplication::processEvents();
+    QCOMPARE(find<QLabel>("differenceHeadline")->text(), QStringLiteral("What changed?"));
+  }
+
   void whereEachSensorHasACorrectionOneIsChosen() {
     write("both_before.ftcal.json", ofTwoSensors(3, 0.0), "2026-03-02", true);
     write("both_after.ftcal.json", ofTwoSensors(5, 0.03), "2026-09-14", true);

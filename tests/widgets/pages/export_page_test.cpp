@@ -92,10 +92,44 @@ class ExportPageTest : public WindowDriver {
     click("exportWrite");
     QVERIFY(find<QPushButton>("exportStop")->isVisible() && !find<QPushButton>("exportWrite")->isEnabled());
     click("exportStop");
-    QVERIFY(!find<QPushButton>("exportStop")->isVisible() && find<QPushButton>("exportWrite")->isEnabled());
-    QThreadPool::globalInstance()->waitForDone();
-    for (const QString& name : names("stopped")) QVERIFY2(!name.contains(QStringLiteral("tmp")), qPrintable(name));
+    // What became of the files is told when it is known.
+    QVERIFY(!find<QPushButton>("exportStop")->isEnabled() && !find<QPushButton>("exportWrite")->isEnabled());
+    QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("exportWrite")->isEnabled(), kWaitMs);
+    QVERIFY(!find<QPushButton>("exportStop")->isVisible());
+    for (const QString& name : names("stopped")) QVERIFY2(!name.contains(QStringLiteral("part")), qPrintable(name));
     QVERIFY(names("stopped").size() < 2);
+    QVERIFY(isSaid(names("stopped").isEmpty() ? "Stopped: nothing was written" : "Stopped: 1 of 2 files written to"));
+  }
+
+  /// A table is written in one go: what is told is whether it is there.
+  void aFileThatIsThereAfterAStopIsTold() {
+    tick({"(.nodes.csv)"});
+    const QString path = folder_.filePath("late.nodes.csv");
+    type("exportPath", path);
+    click("exportWrite");
+    click("exportStop");
+    QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("exportWrite")->isEnabled(), kWaitMs);
+    QVERIFY(isSaid(QFile::exists(path) ? "Written: " : "Stopped: nothing was written"));
+  }
+
+  void aNameThatWasTypedStaysUntilAnotherTargetIsChosen() {
+    tick({});
+    auto* list = find<QListWidget>("exportList");
+    const int nodes = rowOf("(.nodes.csv)");
+    list->setCurrentRow(nodes);
+    auto* path = find<QLineEdit>("exportPath");
+    QCOMPARE(path->text(), folder_.filePath("lab.nodes.csv"));
+    const QString mine = folder_.filePath("mine.csv");
+    type("exportPath", mine);
+    Workbench& workbench = window_->workbench();
+    emit workbench.tableChanged();
+    emit workbench.comparisonChanged();
+    emit workbench.correctorChanged();
+    QCOMPARE(path->text(), mine);
+    list->setCurrentRow(rowOf("(.samples.csv)"));
+    QCOMPARE(path->text(), folder_.filePath("lab.samples.csv"));
+    list->setCurrentRow(nodes);
+    QCOMPARE(path->text(), folder_.filePath("lab.nodes.csv"));
   }
 
  private:
@@ -129,6 +163,13 @@ class ExportPageTest : public WindowDriver {
                                       [&](const char* word) { return item->text().contains(QLatin1String(word)); });
       item->setCheckState(wanted ? Qt::Checked : Qt::Unchecked);
     }
+  }
+
+  int rowOf(const char* words) {
+    auto* list = find<QListWidget>("exportList");
+    int row = 0;
+    while (row < list->count() && !list->item(row)->text().contains(QLatin1String(words))) ++row;
+    return row;
   }
 
   void type(const char* name, const QString& text) {

@@ -10,6 +10,7 @@
 #include <QThreadPool>
 #include <QUrl>
 
+#include "acquisition/session/imported_session.h"
 #include "acquisition/session/session_store.h"
 #include "calib/exporters/export_calibration.h"
 #include "calib/exporters/registry.h"
@@ -116,6 +117,36 @@ class ImportPageTest : public WindowDriver {
     QCOMPARE(QFileInfo(target).lastModified(), written);
   }
 
+  void whatWasMadeMeanwhileOffersNothingMore() {
+    const QString target = folder_.filePath("meanwhile.ftcal.json");
+    drop(folder_.filePath("theirs.vti"));
+    QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("importMake")->isEnabled(), kWaitMs);
+    find<QLineEdit>("importTarget")->setText(target);
+    click("importMake");
+    window_->workbench().importFile({});
+    QVERIFY(!find<QPushButton>("importMake")->isEnabled());
+    QTRY_VERIFY_WITH_TIMEOUT(isSaid("meanwhile.ftcal.json"), kWaitMs);
+    QVERIFY(QFileInfo::exists(target));
+    QVERIFY(!find<QPushButton>("importMake")->isEnabled());
+    FT_VERIFY_MATCH(holdsAll(told("importSummary"), {"Choose a file"}));
+  }
+
+  /// To read the file of an open session would drop the lock on it.
+  void aSessionIsOpenedAndNotRead() {
+    const QString path = folder_.filePath("day.FIELDTRUE");
+    FT_VERIFY_OK(acquisition::makeSession(path, recorded(), {}, "day.csv"));
+    window_->workbench().importFile(path);
+    QVERIFY(find<QLineEdit>("importFile")->text().isEmpty());
+    QVERIFY(!find<QPushButton>("importMake")->isEnabled());
+    QTRY_COMPARE_WITH_TIMEOUT(window_->workbench().sessionPath(), path, kWaitMs);
+    window_->workbench().importFile(path);
+    FT_VERIFY_MATCH(holdsAll(told("importSummary"), {"day.FIELDTRUE is the session that is open"}));
+    // Dropped on the window it does not come to this page.
+    find<QLineEdit>("importFile")->setText(QStringLiteral("theirs.csv"));
+    drop(path);
+    QCOMPARE(find<QLineEdit>("importFile")->text(), QStringLiteral("theirs.csv"));
+  }
+
   void whatIsNoFileIsSaid() {
     drop(folder_.filePath("absent.txt"));
     QTRY_VERIFY_WITH_TIMEOUT(told("importSummary").find("absent.txt") != std::string::npos, kWaitMs);
@@ -152,6 +183,12 @@ class ImportPageTest : public WindowDriver {
   void choose(const char* column, const char* role) {
     auto* choice = find<QComboBox>(column);
     choice->setCurrentIndex(choice->findData(QString::fromLatin1(role)));
+  }
+
+  bool isSaid(const char* words) {
+    const auto labels = find<QWidget>("messageLine")->findChildren<QLabel*>();
+    return std::any_of(labels.begin(), labels.end(),
+                       [&](const QLabel* label) { return label->text().contains(QLatin1String(words)); });
   }
 
   std::string told(const char* label) { return find<QLabel>(label)->text().toStdString(); }

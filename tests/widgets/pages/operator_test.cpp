@@ -458,6 +458,12 @@ void OperatorTest::aTakeLastsAsThePlanSays() {
   // Half a second at 120 a second, both ends; a busy machine moves arrivals.
   QVERIFY2(std::abs(table.nodes[0].n_used + table.nodes[0].n_rejected - 61) <= 4,
            qPrintable(QString::number(table.nodes[0].n_used)));
+  // The boxes are of the open session: what is changed there counts for its next take.
+  QCOMPARE(find<QComboBox>("takeUntil")->currentIndex(), 1);
+  QCOMPARE(find<QDoubleSpinBox>("takeAmount")->value(), 0.5);
+  find<QComboBox>("takeUntil")->setCurrentIndex(0);
+  find<QSpinBox>("samplesPerNode")->setValue(25);
+  QTRY_COMPARE(window_->workbench().status().wanted, 25);
 }
 
 }  // namespace fieldtrue::widgets

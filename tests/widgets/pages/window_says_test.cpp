@@ -332,6 +332,7 @@ void WindowSaysTest::nothingIsFittedBeforeResultsStand() {
   QVERIFY(fit->isEnabled());
   click("fit");
   QTRY_VERIFY_WITH_TIMEOUT(workbench().corrector().has_value(), kWaitMs);
+  QTRY_VERIFY_WITH_TIMEOUT(text("fitted").contains(QStringLiteral("Kept in the session, ready to export")), kWaitMs);
   click("step_export");
   QVERIFY2(text("calibrationSummary").startsWith(QStringLiteral("Calibration: Affine for position")),
            qPrintable(text("calibrationSummary")));
