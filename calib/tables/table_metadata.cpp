@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "calib/core/file_io.h"
@@ -120,30 +121,17 @@ std::string oneLine(std::string text) {
   return text;
 }
 
-/// Of the UTF-8 character at the start of a text; 0 where there is none.
-/// @source RFC 3629, section 4
-std::size_t characterBytes(std::string_view text) {
-  const auto byte = [text](std::size_t at) { return static_cast<unsigned char>(text[at]); };
-  const unsigned char first = byte(0);
-  if (first < 0x80) return 1;
-  if (first < 0xC2 || first > 0xF4) return 0;
-  const std::size_t n = first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
-  if (text.size() < n) return 0;
-  for (std::size_t at = 1; at < n; ++at)
-    if ((byte(at) & 0xC0U) != 0x80U) return 0;
-  // Longer than need be, halves of UTF-16 pairs, beyond the last character.
-  const bool is_none = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xED && byte(1) > 0x9F) ||
-                       (first == 0xF0 && byte(1) < 0x90) || (first == 0xF4 && byte(1) > 0x8F);
-  return is_none ? 0 : n;
+bool isUtf8(const std::string& text) {
+  try {
+    return !nlohmann::json(text).dump().empty();
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
 }
 
-bool isUtf8(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t n = characterBytes(text);
-    if (n == 0) return false;
-    text.remove_prefix(n);
-  }
-  return true;
+/// "t.nodes.csv, line 3"
+std::string whereOf(const CsvReader& reader, const CsvReader::MetadataLine& line) {
+  return reader.name() + ", line " + std::to_string(line.line);
 }
 
 std::string valueText(double value) { return formatNumber(value); }
@@ -155,12 +143,12 @@ Result<TableMetadata> parseMetadata(const CsvReader& reader) {
   TableMetadata metadata;
   std::set<std::string> seen;
   for (const CsvReader::MetadataLine& line : reader.metadata()) {
-    const std::string where = reader.name() + ", line " + std::to_string(line.line);
     if (!isUtf8(line.key) || !isUtf8(line.value))
-      return fail(ErrorCode::kBadInput, where + ": " + std::string(kNotUtf8));
+      return fail(ErrorCode::kBadInput, whereOf(reader, line) + ": " + std::string(kNotUtf8));
     const bool is_repeated = !seen.insert(line.key).second && !metadata.other.contains(line.key);
     const std::string wrong = is_repeated ? "it is given twice" : store(metadata, line.key, line.value);
-    if (!wrong.empty()) return fail(ErrorCode::kBadInput, where + ", metadata " + line.key + ": " + wrong);
+    if (!wrong.empty())
+      return fail(ErrorCode::kBadInput, whereOf(reader, line) + ", metadata " + line.key + ": " + wrong);
   }
   return metadata;
 }

@@ -271,21 +271,19 @@ class SensorsTest : public QObject {
 
   void placesShareTruePositions() {
     std::vector<Node> nodes(6);
-    const auto put = [&](std::size_t row, int node, int sensor, double x_m) {
+    const auto put = [&](std::size_t row, int node, int sensor, std::size_t metres) {
       nodes[row].node = node;
       nodes[row].sensor = sensor;
-      nodes[row].reference_from_sensor.position_m.x() = x_m;
+      nodes[row].reference_from_sensor.position_m.x() = static_cast<double>(metres);
     };
     // Two sensors at one place of one number are a place; at two numbers they are halves of one.
-    for (std::size_t row = 0; row < 6; ++row)
-      put(row, static_cast<int>(row / 2), static_cast<int>(row % 2), static_cast<double>(row / 2));
+    for (std::size_t row = 0; row < 6; ++row) put(row, static_cast<int>(row / 2), static_cast<int>(row % 2), row / 2);
     QCOMPARE(calibration::positionsAPlace(nodes), 1.0);
-    for (std::size_t row = 0; row < 6; ++row)
-      put(row, static_cast<int>(row), static_cast<int>(row % 2), static_cast<double>(row / 2));
+    for (std::size_t row = 0; row < 6; ++row) put(row, static_cast<int>(row), static_cast<int>(row % 2), row / 2);
     QCOMPARE(calibration::positionsAPlace(nodes), 0.5);
     // A bar of one pitch: of three places the first and the last have one of their two positions for themselves.
     for (std::size_t row = 0; row < 6; ++row)
-      put(row, static_cast<int>(row / 2), static_cast<int>(row % 2), static_cast<double>(row / 2 + row % 2));
+      put(row, static_cast<int>(row / 2), static_cast<int>(row % 2), row / 2 + row % 2);
     FT_VERIFY_MATCH(near(calibration::positionsAPlace(nodes), (0.75 + 0.5 + 0.75) / 3.0, 1e-15));
   }
 
