@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/mirrored_sensors.h"
@@ -32,7 +33,7 @@ std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, doubl
 /// To the best, or to no correction where none beats it.
 void tellDistanceToBest(std::vector<MethodScore>& scores, std::optional<std::size_t> best_row,
                         const std::vector<double>& before) {
-  tellDistanceTo(best_row ? std::vector<double>(scores[*best_row].place_errors) : before, scores);
+  tellDistanceTo(best_row ? std::as_const(scores)[*best_row].place_errors : before, scores);
 }
 
 std::string intervalText(const GainTest& test) {
