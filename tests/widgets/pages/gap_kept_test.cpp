@@ -9,6 +9,7 @@
 #include "tests/support/matchers.h"
 #include "tests/widgets/gap_fixture.h"
 #include "tests/widgets/pages/window_driver.h"
+#include "tests/widgets/session_fixture.h"
 #include "tests/widgets/window_test.h"
 #include "widgets/pages/gap_page.h"
 #include "widgets/pages/kept_gap.h"
@@ -25,8 +26,7 @@ class GapKeptTest : public QObject {
  private slots:
   void initTestCase() {
     QVERIFY(folder_.isValid());
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    keepIn(folder_);
     applyTheme(*qApp, false);
     room_ = roomWithSteel();
     for (const char* name : {"room", "other"})

@@ -19,6 +19,7 @@
 #include "tests/support/matchers.h"
 #include "tests/widgets/gap_fixture.h"
 #include "tests/widgets/pages/window_driver.h"
+#include "tests/widgets/session_fixture.h"
 #include "tests/widgets/window_test.h"
 #include "widgets/figures/gap_field.h"
 #include "widgets/shell/main_window.h"
@@ -101,8 +102,7 @@ class GapPageTest : public QObject {
 
 void GapPageTest::initTestCase() {
   QVERIFY(folder_.isValid());
-  qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-  qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+  keepIn(folder_);
   applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
   room_ = roomWithSteel();
   workbench_ = std::make_unique<Workbench>();

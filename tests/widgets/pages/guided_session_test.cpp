@@ -27,6 +27,7 @@
 
 #include "calib/tables/table_io.h"
 #include "tests/widgets/pages/window_driver.h"
+#include "tests/widgets/session_fixture.h"
 #include "widgets/compare/curve_panel.h"
 #include "widgets/compare/method_panel.h"
 #include "widgets/pages/gap_page.h"
@@ -79,8 +80,7 @@ class GuidedSessionTest : public testing::WindowDriver {
 
 void GuidedSessionTest::initTestCase() {
   QVERIFY(folder_.isValid());
-  qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-  qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+  testing::keepIn(folder_);
   artefacts_ = qEnvironmentVariable("FIELDTRUE_ARTEFACTS", QStringLiteral("artefacts"));
   QVERIFY(QDir().mkpath(artefacts_));
   applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));

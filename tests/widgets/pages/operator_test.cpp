@@ -24,6 +24,7 @@
 #include "acquisition/emulators/pty_endpoint.h"
 #include "acquisition/plan/place_state.h"
 #include "tests/widgets/pages/window_driver.h"
+#include "tests/widgets/session_fixture.h"
 #include "widgets/shell/main_window.h"
 #include "widgets/shell/message_line.h"
 #include "widgets/style/theme.h"
@@ -127,8 +128,7 @@ class OperatorTest : public testing::WindowDriver {
 
 void OperatorTest::initTestCase() {
   QVERIFY(folder_.isValid());
-  qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-  qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+  testing::keepIn(folder_);
   applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
 }
 

@@ -18,6 +18,7 @@
 #include "calib/calibration/alignment.h"
 #include "tests/support/matchers.h"
 #include "tests/widgets/pages/window_driver.h"
+#include "tests/widgets/session_fixture.h"
 #include "widgets/pages/gap_page.h"
 #include "widgets/shell/main_window.h"
 #include "widgets/shell/message_line.h"
@@ -65,8 +66,7 @@ class RefusedTablesTest : public testing::WindowDriver {
  private slots:
   void initTestCase() {
     QVERIFY(folder_.isValid());
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    keepIn(folder_);
     applyTheme(*qApp, false);
     record(folder_.filePath("mm.fieldtrue"), {1000.0, false});
     record(folder_.filePath("two.fieldtrue"), {1.0, true});

@@ -6,6 +6,7 @@
 #include <QThreadPool>
 #include <memory>
 
+#include "tests/widgets/session_fixture.h"
 #include "tests/widgets/window_test.h"
 #include "widgets/shell/main_window.h"
 #include "widgets/style/theme.h"
@@ -33,8 +34,7 @@ class WindowDriver : public QObject {
   void click(const char* name) { QTest::mouseClick(find<QWidget>(name), Qt::LeftButton); }
   /// The window, with settings and sessions in the test's own folder.
   void showWindow() {
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    keepIn(folder_);
     widgets::applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
     window_ = std::make_unique<widgets::MainWindow>();
     window_->resize(1280, 800);

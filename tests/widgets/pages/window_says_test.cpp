@@ -28,6 +28,7 @@
 #include "calib/exporters/registry.h"
 #include "calib/tables/table_io.h"
 #include "tests/widgets/pages/window_driver.h"
+#include "tests/widgets/session_fixture.h"
 #include "widgets/report/report.h"
 #include "widgets/shell/main_window.h"
 #include "widgets/style/theme.h"
@@ -124,8 +125,7 @@ class WindowSaysTest : public testing::WindowDriver {
 
 void WindowSaysTest::initTestCase() {
   QVERIFY(folder_.isValid());
-  qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-  qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+  testing::keepIn(folder_);
   applyTheme(*qApp, qEnvironmentVariableIsSet("FIELDTRUE_DARK"));
 }
 

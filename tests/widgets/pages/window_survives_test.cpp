@@ -16,6 +16,7 @@
 #include "tests/support/silent_port.h"
 #include "tests/support/synthetic.h"
 #include "tests/widgets/pages/window_driver.h"
+#include "tests/widgets/session_fixture.h"
 #include "tests/widgets/window_test.h"
 #include "widgets/pages/compare_page.h"
 #include "widgets/pages/gap_page.h"
@@ -54,35 +55,14 @@ class WindowSurvivesTest : public QObject {
   /// A session with every place of a bent room taken.
   QString makeSession(const QString& name, std::array<int, 3> counts) {
     const QString path = folder_.filePath(name);
-    testing::SyntheticOptions options;
-    options.counts = counts;
-    options.smooth_distortion_m = 0.02;
-    const CalibrationTable table = testing::syntheticTable(options);
-    acquisition::Plan plan;
-    plan.counts = counts;
-    plan.pitch_m = options.pitch_m;
-    plan.origin_m = options.origin_m;
-    auto store = acquisition::SessionStore::create(path, plan, table.metadata);
-    if (!store) qFatal("%s", store.error().message.c_str());
-    for (std::size_t place = 0; place < store->places().size(); ++place) {
-      const Pose pose = store->places()[place].reference_from_sensor;
-      NodeStatistics statistics;
-      statistics.mean = testing::syntheticReading(options, pose);
-      statistics.covariance_m2 = 1e-8 * Eigen::Matrix3d::Identity();
-      statistics.n_used = 2;
-      statistics.n_effective = 2.0;
-      std::vector<Sample> samples(2);
-      for (Sample& sample : samples) sample.tracker_from_sensor = statistics.mean;
-      if (!store->storeTake(place, {{samples, statistics}}, {})) qFatal("not stored");
-    }
+    makeTakenSession(path, counts);
     return path;
   }
 
  private slots:
   void initTestCase() {
     QVERIFY(folder_.isValid());
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    keepIn(folder_);
     applyTheme(*qApp, false);
   }
   void cleanup() {

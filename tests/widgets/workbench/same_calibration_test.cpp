@@ -8,6 +8,7 @@
 #include "tests/app/cli_program.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
+#include "tests/widgets/session_fixture.h"
 #include "widgets/pages/export_targets.h"
 #include "widgets/workbench/workbench.h"
 
@@ -24,8 +25,7 @@ class SameCalibrationTest : public QObject {
 
  private slots:
   void initTestCase() {
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    keepIn(folder_);
     FT_VERIFY_STATUS(runCli({"acquire", "--device", "simulated:speed=50,travel_s=0.5", "--plan",
                              "grid:4x3x3@0.2:orientations=2", "--auto", "--samples-per-node", "12", "--session",
                              at("s.fieldtrue"), "--setup", "transmitter_serial=TX 17"}),

@@ -10,6 +10,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/synthetic.h"
 #include "tests/support/test_main.h"
+#include "tests/widgets/session_fixture.h"
 #include "widgets/workbench/workbench.h"
 
 using namespace fieldtrue;
@@ -53,25 +54,7 @@ class SessionChangeTest : public QObject {
   /// A session with every place of a bent room taken.
   QString makeSession(const QString& name) {
     const QString path = folder_.filePath(name);
-    SyntheticOptions options;
-    options.counts = {3, 3, 2};
-    options.smooth_distortion_m = 0.02;
-    acquisition::Plan plan;
-    plan.counts = options.counts;
-    plan.pitch_m = options.pitch_m;
-    plan.origin_m = options.origin_m;
-    auto store = acquisition::SessionStore::create(path, plan, syntheticTable(options).metadata);
-    if (!store) qFatal("%s", store.error().message.c_str());
-    for (std::size_t place = 0; place < store->places().size(); ++place) {
-      NodeStatistics statistics;
-      statistics.mean = syntheticReading(options, store->places()[place].reference_from_sensor);
-      statistics.covariance_m2 = 1e-8 * Eigen::Matrix3d::Identity();
-      statistics.n_used = 2;
-      statistics.n_effective = 2.0;
-      std::vector<Sample> samples(2);
-      for (Sample& sample : samples) sample.tracker_from_sensor = statistics.mean;
-      if (!store->storeTake(place, {{samples, statistics}}, {})) qFatal("not stored");
-    }
+    makeTakenSession(path, {3, 3, 2});
     return path;
   }
 
@@ -91,8 +74,7 @@ class SessionChangeTest : public QObject {
  private slots:
   void initTestCase() {
     QVERIFY(folder_.isValid());
-    qputenv("XDG_DATA_HOME", folder_.path().toUtf8());
-    qputenv("XDG_CONFIG_HOME", folder_.path().toUtf8());
+    keepIn(folder_);
   }
   void cleanup() { QThreadPool::globalInstance()->waitForDone(); }
 
