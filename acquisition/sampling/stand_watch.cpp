@@ -19,10 +19,16 @@ void StandWatch::setTaken(const Pose& tracker_from_sensor) {
   taken_ = true;
 }
 
+void StandWatch::setStopped(const std::optional<Pose>& tracker_from_sensor) {
+  forget();
+  stand_ = tracker_from_sensor;
+  taken_ = stopped_ = true;
+}
+
 void StandWatch::forget() {
   stand_.reset();
   recent_.clear();
-  taken_ = left_ = false;
+  taken_ = left_ = stopped_ = false;
 }
 
 void StandWatch::add(const Sample& sample, bool still) {

@@ -105,9 +105,11 @@ void AcquisitionController::take() {
 }
 
 void AcquisitionController::cancelTake() {
-  const bool has_something_to_stop = impl_->take.runs() || !impl_->take.failure.isEmpty();
+  const bool runs = impl_->take.runs();
+  const bool has_something_to_stop = runs || !impl_->take.failure.isEmpty();
   impl_->take.forgetFailure();
   impl_->stopTake();
+  if (runs) impl_->take.stayStopped(impl_->tracker.live);
   if (!has_something_to_stop && impl_->places.isRetake()) impl_->setCurrent(impl_->places.next());
   impl_->views.tellSoon();
 }

@@ -105,11 +105,11 @@ enum class RemarkKind {
 ///
 /// Automatic mode takes when the sensor stands still near the current place (frame relation known), or has stood still
 /// for 0.7 s after having moved since the last take (not known yet; 3 s when it was found standing at the very start).
-/// The same stand is never taken twice by itself: it must be moved or lifted, or the take asked for. After a take that
-/// could not be stored none begins by itself before a person asks for something. A tracker that ran and is lost is
-/// started again, at growing intervals, until it is back or another is connected (setReconnects). Lives in one worker
-/// thread (or in the main thread of the command line); all calls are slots, all answers are signals carrying whole
-/// values.
+/// The same stand is never taken twice by itself: it must be moved or lifted, or the take asked for; nor is one whose
+/// take was stopped. After a take that could not be stored none begins by itself before a person asks for something. A
+/// tracker that ran and is lost is started again, at growing intervals, until it is back or another is connected
+/// (setReconnects). Lives in one worker thread (or in the main thread of the command line); all calls are slots, all
+/// answers are signals carrying whole values.
 class AcquisitionController : public QObject {
   Q_OBJECT
  public:
@@ -141,7 +141,9 @@ class AcquisitionController : public QObject {
   /// Starts collecting at the current place (space bar, Page Down). Where the takes done tell that the sensor stands
   /// elsewhere, it is refused once; asked for again within a few seconds it is taken, and marked.
   void take();
-  void cancelTake();  ///< Where none runs, a place that was to be retaken is left as it is.
+  /// None begins by itself before the jig has moved away. Where none runs, a place that was to be retaken is left as it
+  /// is.
+  void cancelTake();
   void keepTake();    ///< Of a take that is held: what it has is stored, and marked.
   void waitLonger();  ///< The same: it goes on, for as long again.
   void takeAgain();   ///< The same: it begins anew.

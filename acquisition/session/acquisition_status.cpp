@@ -131,7 +131,10 @@ QString AcquisitionController::Impl::reason(bool* attention) const {
 }
 
 QString AcquisitionController::Impl::waitingReason() const {
-  if (take.automatic && take.isWhereTaken()) return QStringLiteral("move the sensor here; or press space");
+  if (take.automatic && take.isWhereTaken()) {
+    return take.stand.wasStopped() ? QStringLiteral("stopped: lift the sensor and set it down again; or press space")
+                                   : QStringLiteral("move the sensor here; or press space");
+  }
   if (!take.stillness.still()) return QString::fromStdString(take.stillness.reason());
   if (take.automatic) {
     return places.isElsewhere(tracker.live)

@@ -49,6 +49,10 @@ void RunningTake::forgetFailure() {
   not_stored = false;
 }
 
+void RunningTake::stayStopped(const std::optional<Sample>& live) {
+  stand.setStopped(live && isGood(*live) ? std::optional(live->tracker_from_sensor) : std::nullopt);
+}
+
 bool RunningTake::watch(const Sample& sample, bool has_session) {
   stillness.add(sample);
   const bool look = !looked_at_s || std::abs(sample.time_s - *looked_at_s) >= kLookEvery_s;

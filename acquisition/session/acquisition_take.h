@@ -27,6 +27,7 @@ struct RunningTake {
   TakeState add(const Sample& sample, bool is_judged);
   bool mayMove() const;  ///< The jig, by its leading sensor: it is not seen to rest, though that could be seen.
   void forgetFailure();
+  void stayStopped(const std::optional<Sample>& live);  ///< None begins by itself before the jig has moved away.
   /// Follows how the sensor stands. @return whether stillness is to be judged anew with this sample
   bool watch(const Sample& sample, bool has_session);
   /// It has stood still for long enough, and not where it was taken last, for a take by itself.
