@@ -13,6 +13,7 @@ namespace fieldtrue::acquisition {
 struct AcquisitionController::Impl {
   static constexpr const char* kDefaultRig = "wooden jig";
   static constexpr const char* kTakeLengthState = "take_length";
+  static constexpr const char* kClockState = "clock_began";
 
   Impl(AcquisitionController* owner, const SamplerOptions& options);
   ~Impl() { tracker.cut(); }
@@ -26,6 +27,8 @@ struct AcquisitionController::Impl {
   void beginStream();
   void guide();
   double sessionTime_s(double device_time_s);
+  /// When the clock of the session was at 0: kept with it from its first reading on.
+  QDateTime clockBegan();
   /// What the tracker says of itself, and a person of the set-up.
   TableMetadata said() const;
   void correctSetup(const Setup& stated);
@@ -107,6 +110,7 @@ struct AcquisitionController::Impl {
   AcquisitionController* owner;
   std::function<QDateTime()> now = [] { return QDateTime::currentDateTimeUtc(); };
   std::optional<SessionStore> store;
+  std::optional<QDateTime> clock_began;  ///< None before it was asked for.
   LooseReadings loose;
   bool loose_refused = false;  ///< The newest loose readings could not be written; said once.
   /// The tracker or set-up that records now, where the session was begun with another.

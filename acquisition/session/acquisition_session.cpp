@@ -100,6 +100,7 @@ void AcquisitionController::Impl::useTakeLength(const TakeLength& length) {
 void AcquisitionController::Impl::close() {
   stopTake();
   store.reset();
+  clock_began.reset();
   loose = LooseReadings();
   loose_refused = false;
   other_tracker.reset();

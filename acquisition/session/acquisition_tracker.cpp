@@ -226,15 +226,28 @@ void AcquisitionController::Impl::checkSilence() {
   views.tellSoon();
 }
 
+QDateTime AcquisitionController::Impl::clockBegan() {
+  if (clock_began) return *clock_began;
+  const auto kept = store->state(kClockState);
+  const auto newest = store->newestSample_s();
+  const bool is_kept = told(kept) && !kept->empty();
+  if (is_kept) clock_began = QDateTime::fromString(QString::fromStdString(*kept), Qt::ISODateWithMs);
+  if (is_kept && clock_began->isValid()) return *clock_began;
+  // Sessions with readings of which it is not kept counted from when they were made.
+  clock_began = newest && *newest ? store->created() : now();
+  told(store->setState(kClockState, clock_began->toString(Qt::ISODateWithMs).toStdString()));
+  return *clock_began;
+}
+
 double AcquisitionController::Impl::sessionTime_s(double device_time_s) {
   if (!store) return device_time_s;
   if (!tracker.time_offset_s) {
     const auto newest = store->newestSample_s();
     told(newest);
-    const double wall_s = 1e-3 * static_cast<double>(store->created().msecsTo(now()));
+    const double wall_s = 1e-3 * static_cast<double>(clockBegan().msecsTo(now()));
     // A session that goes on keeps its clock, across reconnections and days, and never steps back.
-    const double begin_s = newest && newest->has_value() ? std::max(wall_s, newest->value() + 1.0) : 0.0;
-    tracker.time_offset_s = begin_s - device_time_s;
+    const double least_s = newest && newest->has_value() ? newest->value() + 1.0 : 0.0;
+    tracker.time_offset_s = std::max(wall_s, least_s) - device_time_s;
   }
   return device_time_s + *tracker.time_offset_s;
 }

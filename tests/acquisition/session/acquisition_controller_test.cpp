@@ -416,6 +416,47 @@ class AcquisitionControllerTest : public QObject {
     QVERIFY2(begins_s >= resumed_s && begins_s < resumed_s + 3.0, qPrintable(QString::number(begins_s)));
   }
 
+  void theClockCountsFromTheFirstReading_data() {
+    QTest::addColumn<bool>("reopens");
+    QTest::addColumn<bool>("is_kept");
+    QTest::addColumn<double>("resumed_s");
+    QTest::newRow("reconnected") << false << true << 60.0;
+    QTest::newRow("reopened") << true << true << 60.0;
+    QTest::newRow("reopened, without what is kept now") << true << false << 660.0;
+  }
+  /// The session was made ten minutes before its first reading; it goes on a minute after that.
+  void theClockCountsFromTheFirstReading() {
+    QFETCH(bool, reopens);
+    QFETCH(bool, is_kept);
+    QFETCH(double, resumed_s);
+    const QString path = folder_.newPath();
+    std::vector<Node> nodes;
+    {
+      Bench bench(path);
+      bench.now = bench.now.addSecs(600);
+      bench.takeHere();
+      if (!is_kept) bench.controller.setSessionState("clock_began", {});
+      if (!reopens) {
+        bench.now = bench.now.addSecs(60);
+        bench.tracker->lose();
+        bench.tracker->comeBack();
+        bench.takeHere();
+      }
+      QVERIFY(bench.failures.isEmpty());
+      nodes = bench.nodes;
+    }
+    if (reopens) {
+      Bench bench(path, {}, false, 660.0);
+      bench.takeHere();
+      nodes.insert(nodes.end(), bench.nodes.begin(), bench.nodes.end());
+    }
+    QCOMPARE(nodes.size(), std::size_t{2});
+    // A take begins 1.4 s after its tracker: carried for 0.8 s, at rest for 0.6 s.
+    QVERIFY2(std::abs(*nodes[0].t_start_s - 1.4) < 0.1, qPrintable(QString::number(*nodes[0].t_start_s)));
+    const double after_s = *nodes[1].t_start_s - resumed_s;
+    QVERIFY2(std::abs(after_s - 1.4) < 0.1, qPrintable(QString::number(*nodes[1].t_start_s)));
+  }
+
   void metadataComesFromTheDevice() {
     Bench bench(folder_.newPath());
     bench.readTables();
