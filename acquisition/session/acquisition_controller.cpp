@@ -162,6 +162,8 @@ void AcquisitionController::setReconnects(bool reconnects) { impl_->tracker.reco
 
 void AcquisitionController::setSetup(const Setup& stated) { impl_->correctSetup(stated); }
 
+void AcquisitionController::setSetupOfTracker(const Setup& stated) { impl_->setSetupOfTracker(stated); }
+
 void AcquisitionController::setTakeLength(const TakeLength& length) {
   if (!impl_->store) return;
   if (impl_->keepTakeLength(length)) {

@@ -166,6 +166,8 @@ class AcquisitionController : public QObject {
   /// What a person knows of the set-up, kept with the session. Said while a session is open it corrects what was said
   /// before; a session that is opened later and was begun with another set-up tells so.
   void setSetup(const fieldtrue::Setup& stated);
+  /// The same of the tracker that is connected next: what it does not state stays as the open session has it.
+  void setSetupOfTracker(const fieldtrue::Setup& stated);
   void requestSignal();                                            ///< Answers with signalReady.
   void requestTrace();                                             ///< Answers with traceReady, or failed.
   void setSessionState(const QString& key, const QString& value);  ///< SessionStore::setState.

@@ -32,6 +32,8 @@ struct AcquisitionController::Impl {
   /// What the tracker says of itself, and a person of the set-up.
   TableMetadata said() const;
   void correctSetup(const Setup& stated);
+  void setSetupOfTracker(const Setup& stated);
+  void keepSetup(const Setup& setup);  ///< In the open session.
   void mergeMetadata();
   /// Sets other_tracker where the session was begun with another one; before the first take that one is forgotten.
   void compareTrackers(TableMetadata& known, const TableMetadata& said);

@@ -323,12 +323,28 @@ TableMetadata AcquisitionController::Impl::said() const {
 
 void AcquisitionController::Impl::correctSetup(const Setup& stated) {
   const Setup before = std::exchange(stated_setup, stated);
-  if (!store || store->isReadOnly() || before == stated) return;
-  TableMetadata metadata = store->metadata();
+  if (!store) return;
+  Setup setup = store->metadata().setup;
   for (const SetupFact& fact : setupFacts()) {
     const auto was = factOf(before, fact.key), is = factOf(stated, fact.key);
-    if (was != is) told(state(metadata.setup, fact.key, is.value_or("")));
+    if (was != is) told(state(setup, fact.key, is.value_or("")));
   }
+  keepSetup(setup);
+}
+
+void AcquisitionController::Impl::setSetupOfTracker(const Setup& stated) {
+  const Setup before = std::exchange(stated_setup, stated);
+  if (!store) return;
+  Setup setup = store->metadata().setup;
+  for (const auto& [key, value] : stated)
+    if (factOf(before, key) != value) setup[key] = value;
+  keepSetup(setup);
+}
+
+void AcquisitionController::Impl::keepSetup(const Setup& setup) {
+  TableMetadata metadata = store->metadata();
+  if (store->isReadOnly() || metadata.setup == setup) return;
+  metadata.setup = setup;
   if (told(store->setMetadata(metadata))) emit owner->metadataChanged(metadata);
 }
 

@@ -145,7 +145,7 @@ ConnectPage::ConnectPage(Workbench& workbench, QWidget* parent) : QWidget(parent
     if (isInUse(workbench_.status())) {
       workbench_.disconnectDevice();
     } else {
-      tellSetup();
+      workbench_.setSetupOfTracker(statedSetup());
       workbench_.connectDevice(deviceText(), scenePath());
     }
   });
@@ -265,28 +265,31 @@ QWidget* ConnectPage::makeSetup() {
     setup_facts_.push_back(field);
     connect(field, &QLineEdit::editingFinished, this, [this, field, key] {
       QSettings().setValue(key, field->text().trimmed());
-      tellSetup();
+      // A field that is hidden loses the focus: nothing is taken back by that.
+      if (!isSimulated()) workbench_.setSetup(statedSetup());
     });
   }
   return fields;
 }
 
-void ConnectPage::tellSetup() {
+bool ConnectPage::isSimulated() const { return kind_->currentIndex() == 0; }
+
+Setup ConnectPage::statedSetup() const {
   Setup setup;
-  const bool simulated = kind_->currentIndex() == 0;
+  if (isSimulated()) return setup;
   std::size_t next = 0;
   for (const SetupFact& fact : setupFacts()) {
     if (!fact.is_asked) continue;
-    const auto stated = state(setup, fact.key, simulated ? "" : setup_facts_[next]->text().toStdString());
+    const auto stated = state(setup, fact.key, setup_facts_[next]->text().toStdString());
     FT_CHECK(stated.has_value());
     ++next;
   }
-  workbench_.setSetup(setup);
+  return setup;
 }
 
 void ConnectPage::onKind() {
   const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
-  const bool simulated = kind_->currentIndex() == 0;
+  const bool simulated = isSimulated();
   kind_help_->setText(simulated ? tr("A simulated tracker in a simulated room; a virtual operator carries the jig.")
                                 : QString::fromStdString(kind.address_help));
   for (QWidget* widget :
@@ -323,7 +326,7 @@ QString ConnectPage::deviceText() const {
   const acquisition::DeviceKind& kind = acquisition::deviceKinds()[static_cast<std::size_t>(kind_->currentIndex())];
   const QString settings = changedSettings(kind.settings, settings_->values());
   // Settings follow an address behind a comma; the simulated tracker has none.
-  const bool simulated = kind_->currentIndex() == 0;
+  const bool simulated = isSimulated();
   QString text = QString::fromStdString(kind.id);
   if (!simulated) {
     // The whole of what the command line takes may stand there too.
@@ -346,7 +349,7 @@ void ConnectPage::chooseScene() {
 
 QString ConnectPage::scenePath() const {
   const QString chosen = scene_->currentData().toString();
-  if (kind_->currentIndex() != 0 || chosen.isEmpty()) return {};
+  if (!isSimulated() || chosen.isEmpty()) return {};
   return chosen.contains(QLatin1Char('/')) ? chosen : Workbench::builtInScene(chosen);
 }
 

@@ -39,7 +39,8 @@ class ConnectPage : public QWidget {
   void chooseScene();
   QString scenePath() const;
   QWidget* makeSetup();
-  void tellSetup();
+  bool isSimulated() const;   ///< The tracker that is chosen.
+  Setup statedSetup() const;  ///< Of that tracker: of a simulated one nothing.
 
   Workbench& workbench_;
   QComboBox* kind_;

@@ -329,6 +329,10 @@ void Workbench::onTrace(const std::shared_ptr<const acquisition::Trace>& trace) 
 
 void Workbench::setSetup(const Setup& stated) { post(&acquisition::AcquisitionController::setSetup, stated); }
 
+void Workbench::setSetupOfTracker(const Setup& stated) {
+  post(&acquisition::AcquisitionController::setSetupOfTracker, stated);
+}
+
 void Workbench::createSession(const QString& path, const acquisition::Plan& plan,
                               const acquisition::TakeLength& length) {
   post(&acquisition::AcquisitionController::openSession, path, QString::fromStdString(toJson(plan).dump()), length);

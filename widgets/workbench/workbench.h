@@ -99,7 +99,8 @@ class Workbench : public QObject {
   /// Writes the last bytes of the tracker's line into a new file beside the session, or in the folder of sessions; a
   /// message says where, or why not.
   void saveTrace();
-  void setSetup(const Setup& stated);  ///< AcquisitionController::setSetup.
+  void setSetup(const Setup& stated);           ///< AcquisitionController::setSetup.
+  void setSetupOfTracker(const Setup& stated);  ///< AcquisitionController::setSetupOfTracker.
   void createSession(const QString& path, const acquisition::Plan& plan, const acquisition::TakeLength& length = {});
   void openSession(const QString& path);
   /// Of the open session, from its next take on; nothing where none is open.

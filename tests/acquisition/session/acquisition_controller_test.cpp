@@ -465,6 +465,25 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(*bench.table.metadata.date, std::string("2024-02-29"));
   }
 
+  void aTrackerThatStatesNothingTakesNothingBack() {
+    Bench bench(folder_.newPath());
+    const auto setup = [&bench] {
+      bench.readTables();
+      return bench.table.metadata.setup;
+    };
+    bench.controller.setSetup({{"room", "Lab 9"}, {"sensor_serial", "S7"}});
+    bench.controller.setSetupOfTracker({});
+    QCOMPARE(setup(), (Setup{{"room", "Lab 9"}, {"sensor_serial", "S7"}}));
+    bench.controller.setSetupOfTracker({{"sensor_serial", "S8"}});
+    QCOMPARE(setup(), (Setup{{"room", "Lab 9"}, {"sensor_serial", "S8"}}));
+    // A person takes back what was said.
+    bench.controller.setSetup({});
+    QCOMPARE(setup(), (Setup{{"room", "Lab 9"}}));
+    bench.controller.openSession(folder_.newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
+    QCOMPARE(setup(), Setup());
+    QVERIFY2(bench.failures.isEmpty(), qPrintable(bench.failures.join(' ')));
+  }
+
   void badSessionsAreToldAndTheOpenOneStays() {
     const QString path = folder_.newPath();
     Bench bench(path);

@@ -2,6 +2,7 @@
 
 #include <QComboBox>
 #include <QDoubleSpinBox>
+#include <QLineEdit>
 #include <QTest>
 
 #include "calib/tables/table_writer.h"
@@ -40,6 +41,29 @@ class ConnectPageTest : public WindowDriver {
     QTRY_VERIFY2_WITH_TIMEOUT(told().startsWith("Playing " + folder_.filePath("room.samples.csv")), qPrintable(told()),
                               kWaitMs);
     picture("2-connect-trace");
+  }
+
+  void theSimulatedTrackerTakesNothingBackThatWasStated() {
+    Workbench& workbench = window_->workbench();
+    workbench.disconnectDevice();
+    QTRY_VERIFY_WITH_TIMEOUT(find<QComboBox>("deviceKind")->isEnabled(), kWaitMs);
+    workbench.createSession(folder_.filePath("stated.fieldtrue"), acquisition::Plan());
+    QTRY_VERIFY_WITH_TIMEOUT(workbench.sessionIsOpen(), kWaitMs);
+    click("step_connect");
+    auto* kind = find<QComboBox>("deviceKind");
+    kind->setCurrentIndex(kind->findData(QStringLiteral("fastrak")));
+    auto* serial = find<QLineEdit>("setup.sensor_serial");
+    serial->setFocus();
+    QTest::keyClicks(serial, QStringLiteral("S7"));
+    QTest::keyClick(serial, Qt::Key_Return);
+    const auto stated = [&](const char* key) {
+      return QString::fromStdString(factOf(workbench.recordedTable().metadata.setup, key).value_or("nothing"));
+    };
+    QTRY_COMPARE_WITH_TIMEOUT(stated("sensor_serial"), QStringLiteral("S7"), kWaitMs);
+    kind->setCurrentIndex(0);
+    click("connectButton");
+    QTRY_COMPARE_WITH_TIMEOUT(stated("tracker_kind"), QStringLiteral("simulated"), kWaitMs);
+    QCOMPARE(stated("sensor_serial"), QStringLiteral("S7"));
   }
 };
 
