@@ -37,6 +37,15 @@ constexpr int kMaxCount = 40;
 constexpr double kWidest_m = 30.0;  ///< What tables are refused for too.
 constexpr double kSecondsPerPlacement = 15.0;
 constexpr double kSamplesPerSecond = 120.0;
+constexpr std::int64_t kBuiltAtOnce = 2000;  ///< Stops that take a few milliseconds.
+
+/// Of a plan whose size was checked.
+std::int64_t stopsOf(const acquisition::Plan& plan) {
+  const std::int64_t places = plan.explicit_places.empty()
+                                  ? std::int64_t{plan.counts[0]} * plan.counts[1] * plan.counts[2]
+                                  : static_cast<std::int64_t>(plan.explicit_places.size());
+  return places * plan.orientations * plan.reseat;
+}
 
 /// About how long a take lasts; one until its mean is known lasts as long as it must.
 double secondsOf(const acquisition::TakeLength& length) {
@@ -286,14 +295,42 @@ void PlanPage::onChanged() {
   problem_->setText(problem);
   problem_->setVisible(!problem.isEmpty());
   create_->setEnabled(problem.isEmpty());
+  building_.stop();
   if (!problem.isEmpty()) return summary_->clear();
   const Eigen::Vector3d first_m = origin_m(now);
   for (std::size_t axis = 0; axis < 3 && !now.origin_m; ++axis)
     origin_[axis]->setMetres(first_m[static_cast<Eigen::Index>(axis)]);
-  const std::vector<PlannedPlace> planned = places(now);
-  room_->setPlaces(planned);
+  build(now);
+}
+
+PlanPage::BuiltPlan PlanPage::built(const acquisition::Plan& plan) {
+  BuiltPlan built{places(plan), 0, {}};
+  std::set<double> levels_m;
+  for (const PlannedPlace& place : built.places)
+    levels_m.insert(std::round(place.reference_from_sensor.position_m.z() * 1000.0) / 1000.0);
+  built.n_levels = levels_m.size();
+  built.orientations = evaluation::plannedOrientations(built.places, Pose{}).text;
+  return built;
+}
+
+void PlanPage::build(const acquisition::Plan& now) {
+  const std::int64_t stops = stopsOf(now);
+  if (stops <= kBuiltAtOnce) return show(now, built(now));
+  summary_->setText(tr("Laying out %1 placements...").arg(stops));
+  auto work = [now](const RunControl& control) -> Result<BuiltPlan> {
+    if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Another plan was asked for");
+    return built(now);
+  };
+  building_.run(std::move(work), [this, now](const Result<BuiltPlan>& result) {
+    if (!result) return summary_->setText(QString::fromStdString(result.error().message));
+    show(now, *result);
+  });
+}
+
+void PlanPage::show(const acquisition::Plan& now, const BuiltPlan& built) {
+  room_->setPlaces(built.places);
   room_->setTransmitter(Pose{});
-  summary_->setText(summary(now, planned));
+  summary_->setText(summary(now, built));
 }
 
 void PlanPage::enableFields(const acquisition::Plan& now) {
@@ -308,20 +345,17 @@ void PlanPage::enableFields(const acquisition::Plan& now) {
   use_grid_->setVisible(!grid);
 }
 
-QString PlanPage::summary(const acquisition::Plan& now, const std::vector<PlannedPlace>& planned) const {
-  std::set<double> levels_m;
-  for (const PlannedPlace& place : planned)
-    levels_m.insert(std::round(place.reference_from_sensor.position_m.z() * 1000.0) / 1000.0);
-  const double minutes = static_cast<double>(planned.size()) * (kSecondsPerPlacement + secondsOf(takeLength())) / 60.0;
+QString PlanPage::summary(const acquisition::Plan& now, const BuiltPlan& built) const {
+  const std::size_t n = built.places.size();
+  const double minutes = static_cast<double>(n) * (kSecondsPerPlacement + secondsOf(takeLength())) / 60.0;
   QString text = tr("%1 on %2, about %3 min for a practised operator.")
-                     .arg(planned.size() == 1 ? tr("1 placement") : tr("%1 placements").arg(planned.size()))
-                     .arg(levels_m.size() == 1 ? tr("1 level") : tr("%1 levels").arg(levels_m.size()))
+                     .arg(n == 1 ? tr("1 placement") : tr("%1 placements").arg(n))
+                     .arg(built.n_levels == 1 ? tr("1 level") : tr("%1 levels").arg(built.n_levels))
                      .arg(std::ceil(minutes), 0, 'f', 0);
   QStringList pipes;
   for (const double length_m : acquisition::pipeLengths_m(now)) pipes << coordinateText(length_m);
   if (!pipes.isEmpty()) text += tr(" Pipes: %1.").arg(pipes.join(QStringLiteral(", ")));
-  const std::string orientations = evaluation::plannedOrientations(planned, Pose{}).text;
-  return text + QStringLiteral("\n\n") + QString::fromStdString(orientations);
+  return text + QStringLiteral("\n\n") + QString::fromStdString(built.orientations);
 }
 
 void PlanPage::makeAtTimeLimit() {

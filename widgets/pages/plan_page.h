@@ -47,7 +47,17 @@ class PlanPage : public QWidget {
   QString pitchProblem(const acquisition::Plan& now) const;
   void create();
   void enableFields(const acquisition::Plan& now);
-  QString summary(const acquisition::Plan& now, const std::vector<PlannedPlace>& planned) const;
+  /// What is told and drawn of a plan.
+  struct BuiltPlan {
+    std::vector<PlannedPlace> places;
+    std::size_t n_levels = 0;
+    std::string orientations;
+  };
+  static BuiltPlan built(const acquisition::Plan& plan);
+  /// At once; beside the window where that would hold it up. The last one asked for is shown.
+  void build(const acquisition::Plan& now);
+  void show(const acquisition::Plan& now, const BuiltPlan& built);
+  QString summary(const acquisition::Plan& now, const BuiltPlan& built) const;
 
   Workbench& workbench_;
   RoomView* room_;
@@ -72,6 +82,7 @@ class PlanPage : public QWidget {
   LengthUnit shown_unit_;
   std::vector<PlannedPlace> explicit_places_;
   bool filling_ = false;
+  BackgroundJobs building_{this};
 };
 
 }  // namespace fieldtrue::widgets

@@ -63,9 +63,14 @@ bool TurnedPlace::isTurned() const { return distinctRotations(q, kAlike_rad).siz
 
 FarthestPlace farthestFrom(const std::vector<TurnedPlace>& places, const std::vector<std::size_t>& some) {
   FarthestPlace farthest;
+  std::vector<bool> is_one(places.size(), false);
+  for (const std::size_t t : some) is_one[t] = true;
   for (std::size_t i = 0; i < places.size(); ++i) {
+    if (is_one[i]) continue;
     double nearest_m = std::numeric_limits<double>::infinity();
-    for (const std::size_t t : some) nearest_m = std::min(nearest_m, (places[i].p_m - places[t].p_m).norm());
+    // Of a plan with very many places: no farther than is known already is all there is to know.
+    for (std::size_t n = 0; n < some.size() && nearest_m > farthest.distance_m; ++n)
+      nearest_m = std::min(nearest_m, (places[i].p_m - places[some[n]].p_m).norm());
     if (nearest_m > farthest.distance_m) farthest = {i, nearest_m};
   }
   return farthest;

@@ -14,7 +14,8 @@
 #include "tests/support/matchers.h"
 #include "tests/widgets/pages/window_driver.h"
 
-/// The page shows a plan in any unit without changing it, and refuses one that is too large before it is built.
+/// The page shows a plan in any unit without changing it, builds a large one beside the window, and refuses one that is
+/// too large before it is built.
 using namespace fieldtrue;
 using namespace fieldtrue::widgets;
 using namespace fieldtrue::testing;
@@ -89,6 +90,38 @@ class PlanPageTest : public WindowDriver {
     find<QSpinBox>("count_y")->setValue(1);
     QCOMPARE(problem(), QString());
     QVERIFY(find<QPushButton>("createSession")->isEnabled());
+  }
+
+  void aLargePlanIsBuiltBesideTheWindow() {
+    const auto summary = [this] { return find<QLabel>("planSummary")->text(); };
+    const auto ended = [] {
+      QThreadPool::globalInstance()->waitForDone();
+      QCoreApplication::sendPostedEvents();
+    };
+    for (const auto& [name, count] :
+         {std::pair("count_z", 1), {"count_x", 40}, {"count_y", 11}, {"orientations", 24}, {"seatings", 8}})
+      find<QSpinBox>(name)->setValue(count);
+    // 40 x 13 x 24 x 8; the last of those asked for is shown.
+    find<QSpinBox>("count_y")->setValue(12);
+    find<QSpinBox>("count_y")->setValue(13);
+    QVERIFY2(summary().startsWith(QStringLiteral("Laying out 99840 placements")), qPrintable(summary()));
+    QVERIFY(find<QPushButton>("createSession")->isEnabled());
+    ended();
+    QVERIFY2(summary().startsWith(QStringLiteral("99840 placements on 1 level, ")), qPrintable(summary()));
+
+    find<QSpinBox>("count_y")->setValue(12);
+    QVERIFY2(summary().startsWith(QStringLiteral("Laying out 92160 placements")), qPrintable(summary()));
+    find<QSpinBox>("count_y")->setValue(40);
+    ended();
+    QVERIFY2(problem().contains(QStringLiteral("more than 100000 stops")) && summary().isEmpty(),
+             qPrintable(summary()));
+
+    find<QSpinBox>("count_y")->setValue(12);
+    for (const char* name : {"orientations", "seatings"}) find<QSpinBox>(name)->setValue(1);
+    const QString small = summary();
+    QVERIFY2(small.startsWith(QStringLiteral("480 placements on 1 level, ")), qPrintable(small));
+    ended();
+    QCOMPARE(summary(), small);
   }
 
  private:
