@@ -19,6 +19,7 @@
 #include "calib/core/json_text.h"
 #include "calib/core/thread_pool.h"
 #include "calib/evaluation/sensor_splits.h"
+#include "calib/tables/table_sensors.h"
 #include "widgets/style/unit_texts.h"
 #include "widgets/workbench/background.h"
 #include "widgets/workbench/fitted_methods.h"
@@ -270,8 +271,11 @@ bool Workbench::correctorIsCurrent() const {
     return a.node == b.node && a.sensor == b.sensor && a.visit == b.visit &&
            a.tracker_from_sensor.position_m == b.tracker_from_sensor.position_m;
   };
-  const std::vector<Node> now = evaluation::fitRowsOf(table());
   const std::vector<Node>& then = corrector_->table().nodes;
+  // Of the sensors that it was fitted to, whichever are shown.
+  const std::vector<int> fitted = sensorsOf(then);
+  std::vector<Node> now = evaluation::fitRowsOf(recordedTable());
+  std::erase_if(now, [&](const Node& node) { return !std::binary_search(fitted.begin(), fitted.end(), node.sensor); });
   return std::equal(now.begin(), now.end(), then.begin(), then.end(), same);
 }
 

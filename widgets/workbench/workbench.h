@@ -66,7 +66,7 @@ class Workbench : public QObject {
   const std::optional<calibration::Corrector>& corrector() const { return corrector_; }
   /// Whether the session keeps the calibration; none while that is not known yet.
   std::optional<bool> correctorIsKept() const { return corrector_is_kept_; }
-  /// Whether the calibration was fitted on the rows the session has now.
+  /// Whether the calibration was fitted on the rows the session has now of the sensors that it was fitted to.
   bool correctorIsCurrent() const;
   /// False for a calibration that leaves position and orientation as they are.
   bool correctorCorrects() const;

@@ -1,4 +1,5 @@
 #include <QComboBox>
+#include <QLabel>
 #include <QLineEdit>
 #include <QListWidget>
 #include <QPushButton>
@@ -67,6 +68,36 @@ class ExportSensorsTest : public WindowDriver {
     const auto written = calibration::Corrector::load(path.toStdString());
     FT_VERIFY_OK(written);
     QCOMPARE(written->sensorsApart().size(), std::size_t{2});
+  }
+
+  void aFitIsHeldAgainstThePlacesOfItsSensors_data() {
+    QTest::addColumn<int>("fitted");
+    QTest::newRow("fitted to one") << 1;
+    QTest::newRow("fitted to both") << -1;
+  }
+  /// Whichever sensor is shown later, the places have not changed; once they have, that is said whichever is shown.
+  void aFitIsHeldAgainstThePlacesOfItsSensors() {
+    QFETCH(int, fitted);
+    click("step_export");
+    Workbench& workbench = window_->workbench();
+    const auto show = [&](int sensor) {
+      workbench.chooseSensor(sensor < 0 ? std::nullopt : std::optional(sensor));
+      return find<QLabel>("calibrationSummary")->text().contains(QStringLiteral("before the session's places changed"));
+    };
+    show(fitted);
+    workbench.fit(calibration::parseCorrectorChoice("polynomial:degree=1", "none").value(),
+                  calibration::AlignMode::kRigid);
+    QVERIFY(workbench.isFitting());
+    QTRY_VERIFY_WITH_TIMEOUT(!workbench.isFitting(), kWaitMs);
+    QCOMPARE(workbench.corrector()->table().nodes.size(), table().nodes.size() / (fitted < 0 ? 1 : 2));
+    for (const int shown : {-1, 0, 1}) QVERIFY2(!show(shown), qPrintable(QString::number(shown)));
+
+    workbench.undo();
+    QTRY_COMPARE_WITH_TIMEOUT(workbench.recordedTable().nodes.size(), table().nodes.size() - 2, kWaitMs);
+    for (const int shown : {-1, 0, 1}) QVERIFY2(show(shown), qPrintable(QString::number(shown)));
+    workbench.redo();
+    QTRY_COMPARE_WITH_TIMEOUT(workbench.recordedTable().nodes.size(), table().nodes.size(), kWaitMs);
+    for (const int shown : {0, 1, -1}) QVERIFY2(!show(shown), qPrintable(QString::number(shown)));
   }
 
  private:
