@@ -72,6 +72,7 @@ Outcome runApply(const ApplyOptions& options, const CommonOptions&) {
                  {"other_sensor", counts.other_sensor}};
   answer.text = std::to_string(counts.all) + " rows written to " + options.out + "; " + std::to_string(counts.outside) +
                 " outside the calibrated region (covered = 0), " + std::to_string(counts.lost) + " without a pose\n";
+  answer.remarks = table.notes();
   if (const std::string remark = remarkOnUnturned(table, *corrector, options.in); !remark.empty())
     answer.remarks.push_back(remark);
   if (counts.other_sensor > 0)

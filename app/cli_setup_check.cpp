@@ -1,15 +1,10 @@
 #include "app/cli_setup_check.h"
 
-#include "calib/core/trimmed.h"
-
 namespace fieldtrue::cli {
 
-void SetupCheck::readHead(std::string_view line) {
-  const std::size_t colon = line.find(':');
-  if (colon == std::string_view::npos) return;
-  const std::string_view key = trimmed(line.substr(1, colon - 1));
+void SetupCheck::readHead(std::string_view key, std::string_view value) {
   // What is no fact of a set-up is somebody else's.
-  if (key.starts_with(kSetupPrefix)) (void)state(head_, key.substr(kSetupPrefix.size()), line.substr(colon + 1));
+  if (key.starts_with(kSetupPrefix)) (void)state(head_, key.substr(kSetupPrefix.size()), value);
 }
 
 SetupMatch SetupCheck::ofRow(std::string_view sensor) {

@@ -16,8 +16,8 @@ class SetupCheck {
  public:
   SetupCheck(Setup calibrated, Setup stated) : calibrated_(std::move(calibrated)), stated_(std::move(stated)) {}
 
-  /// @param line of metadata, "# setup.room: Lab 2", or anything else
-  void readHead(std::string_view line);
+  /// @param key of metadata, "setup.room", or anything else
+  void readHead(std::string_view key, std::string_view value);
 
   /// @param sensor of the row, empty where the table does not tell
   SetupMatch ofRow(std::string_view sensor);

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <ostream>
 #include <utility>
 
 #include "calib/core/file_io.h"
 #include "calib/core/statistics.h"
-#include "calib/core/trimmed.h"
 #include "calib/core/units.h"
+#include "calib/tables/table_metadata.h"
 
 namespace fieldtrue::cli {
 namespace {
@@ -19,22 +18,6 @@ constexpr std::array<const char*, 11> kAppended = {
     "x_corrected_m", "y_corrected_m", "z_corrected_m", "qw_corrected", "qx_corrected",
     "qy_corrected",  "qz_corrected",  "uncertainty_m", "covered",      "nearest_orientation_deg",
     "setup_matches"};
-
-/// The fields of one line; commas inside double quotes do not separate.
-std::vector<std::string_view> splitFields(std::string_view line) {
-  std::vector<std::string_view> fields;
-  std::size_t start = 0;
-  bool quoted = false;
-  for (std::size_t i = 0; i <= line.size(); ++i) {
-    if (i < line.size() && line[i] == '"') quoted = !quoted;
-    if (i < line.size() && (quoted || line[i] != ',')) continue;
-    fields.push_back(line.substr(start, i - start));
-    start = i + 1;
-  }
-  return fields;
-}
-
-constexpr std::string_view kBlankOrQuote = " \t\"";
 
 /// The number of a sensor as a table writes it; none where it is something else.
 std::optional<int> sensorNumber(std::string_view text) {
@@ -54,15 +37,9 @@ std::vector<Eigen::Vector3d> trackedPositions(const calibration::Corrector& corr
   return positions_m;
 }
 
-std::optional<std::size_t> find(const std::vector<std::string>& names, std::string_view name) {
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == name) return i;
-  }
-  return std::nullopt;
-}
-
-bool isBlank(const std::vector<std::string_view>& fields, std::size_t column) {
-  return trimmed(fields[column], kBlankOrQuote).empty();
+bool isMissing(const CsvReader& reader, std::size_t column) {
+  const std::optional<double> value = parseFinite(reader.field(column));
+  return value && isMissingMark(*value);
 }
 
 }  // namespace
@@ -71,132 +48,91 @@ TableCorrector::TableCorrector(const calibration::Corrector& corrector, Setup st
                                std::string name)
     : corrector_(corrector),
       orientations_seen_(corrector.orientationsSeen()),
-      lines_(in, std::move(name)),
+      in_(in),
+      name_(std::move(name)),
       units_(corrector.region(), trackedPositions(corrector)),
       setup_(corrector.setup(), std::move(stated)) {}
 
 Result<void> TableCorrector::run(std::ostream& out) {
+  // Between rows the order of rows and remarks is kept by emptying the batch first.
+  const auto passOver = [this, &out](std::string_view line) {
+    flush(out);
+    out << line << '\n';
+  };
+  auto opened = CsvReader::open(in_, name_, ',', CsvHeader::kLooseRow, passOver);
+  if (!opened) return tl::unexpected(opened.error());
+  reader_.emplace(*std::move(opened));
+  FT_TRY_VOID(takeHeader(out));
   while (true) {
-    const Result<bool> more = lines_.next(line_);
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
-    if (line_.empty() || line_.front() == '#') {
-      // Between rows the order of rows and remarks is kept by emptying the batch first.
-      flush(out);
-      if (!columns_ && !line_.empty()) setup_.readHead(line_);
-      out << line_ << '\n';
-      continue;
-    }
-    const Result<void> taken = columns_ ? takeRow() : takeHeader(out);
-    if (!taken) return taken;
+    FT_TRY(const bool more, reader_->next());
+    if (!more) break;
+    FT_TRY_VOID(takeRow());
     if (rows_.size() == kBatch) flush(out);
   }
-  if (!columns_)
-    return fail(ErrorCode::kBadInput, lines_.name() + " has no header row; columns x_m, y_m, z_m are needed");
   flush(out);
   return {};
 }
 
-tl::unexpected<Error> TableCorrector::bad(const std::string& what) const {
-  return fail(ErrorCode::kBadInput, lines_.name() + " line " + std::to_string(lines_.number()) + what);
+std::vector<std::string> TableCorrector::notes() const {
+  if (!reader_) return {};
+  std::vector<std::string> notes = notesOnMetadata(*reader_);
+  for (const auto& note : {reader_->noteOnLateMetadata(), reader_->noteOnLastLine()})
+    if (note) notes.push_back(*note);
+  return notes;
 }
 
 Result<void> TableCorrector::takeHeader(std::ostream& out) {
-  std::vector<std::string> names;
-  for (const std::string_view field : splitFields(line_)) names.emplace_back(trimmed(field, kBlankOrQuote));
-  for (const std::string& name : names) {
-    if (std::count(names.begin(), names.end(), name) > 1) return bad(": column " + name + " stands there twice");
-  }
+  static constexpr std::array<std::string_view, 3> kPosition = {"x_m", "y_m", "z_m"};
+  static constexpr std::array<std::string_view, 4> kOrientation = {"qw", "qx", "qy", "qz"};
   for (const char* appended : kAppended) {
-    if (find(names, appended)) return bad(": column " + std::string(appended) + " is there already; remove it first");
+    if (!reader_->find(appended)) continue;
+    reader_->failInLine("column " + std::string(appended) + " is there already; remove it first");
+    return tl::unexpected(*reader_->error());
   }
   Columns columns;
-  columns.count = names.size();
-  constexpr std::array kPosition = {"x_m", "y_m", "z_m"};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto index = find(names, kPosition[axis]);
-    if (!index) return bad(": column " + std::string(kPosition[axis]) + " is missing");
-    columns.position[axis] = *index;
-  }
-  const auto orientation = findOrientation(names);
-  if (!orientation) return tl::unexpected(orientation.error());
-  columns.orientation = *orientation;
-  columns.status = find(names, "status");
-  columns.sensor = find(names, "sensor");
-  columns_ = columns;
-  names_ = std::move(names);
-  out << line_;
+  FT_TRY(columns.position, reader_->require(kPosition));
+  FT_TRY(columns.orientation, reader_->group(kOrientation));
+  columns.status = reader_->find("status");
+  columns.sensor = reader_->find("sensor");
+  columns_ = std::move(columns);
+  for (const CsvReader::MetadataLine& line : reader_->metadata()) setup_.readHead(line.key, line.value);
+  out << reader_->text();
   for (const char* appended : kAppended) out << ',' << appended;
   out << '\n';
   return {};
 }
 
-Result<std::optional<std::array<std::size_t, 4>>> TableCorrector::findOrientation(
-    const std::vector<std::string>& names) const {
-  constexpr std::array kOrientation = {"qw", "qx", "qy", "qz"};
-  std::array<std::size_t, 4> indices{};
-  std::string missing;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const auto index = find(names, kOrientation[i]);
-    if (index) indices[i] = *index;
-    if (!index) missing += (missing.empty() ? "" : ", ") + std::string(kOrientation[i]);
-  }
-  if (missing.empty()) return std::optional(indices);
-  if (missing == "qw, qx, qy, qz") return std::optional<std::array<std::size_t, 4>>();
-  return bad(": an orientation needs qw, qx, qy and qz; missing: " + missing);
-}
-
-Result<double> TableCorrector::number(const Fields& fields, std::size_t column) const {
-  std::string_view text = trimmed(fields[column], kBlankOrQuote);
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
-  return bad(", column " + names_[column] + ": '" + std::string(text) + "' is not a finite number");
-}
-
-Result<std::optional<TableCorrector::Reading>> TableCorrector::reading(const Fields& fields) const {
+std::optional<TableCorrector::Reading> TableCorrector::reading() {
   Reading reading;
   bool is_missing = false;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    FT_TRY(const double value_m, number(fields, columns_->position[axis]));
-    reading.pose.position_m[static_cast<Eigen::Index>(axis)] = value_m;
-    is_missing = is_missing || isMissingMark(value_m);
+    const std::size_t column = columns_->position[axis];
+    reading.pose.position_m[static_cast<Eigen::Index>(axis)] = reader_->number(column);
+    is_missing = is_missing || isMissing(*reader_, column);
   }
   const auto& q = columns_->orientation;
-  reading.is_turned =
-      q && !std::all_of(q->begin(), q->end(), [&](std::size_t column) { return isBlank(fields, column); });
-  if (reading.is_turned) {
-    std::array<double, 4> parts{};
-    for (std::size_t i = 0; i < 4; ++i) {
-      FT_TRY(parts[i], number(fields, (*q)[i]));
-      is_missing = is_missing || isMissingMark(parts[i]);
-    }
-    const Eigen::Quaterniond orientation(parts[0], parts[1], parts[2], parts[3]);
-    if (!(orientation.norm() > 1e-6)) return bad(", columns qw to qz: the quaternion is zero");
-    reading.pose.orientation = orientation.normalized();
+  if (q && std::any_of(q->begin(), q->end(), [&](std::size_t column) { return isMissing(*reader_, column); })) {
+    is_missing = true;
+  } else if (const auto orientation = reader_->quaternion(q)) {
+    reading.pose.orientation = orientation->normalized();
+    reading.is_turned = true;
   }
-  return is_missing ? std::nullopt : std::optional(reading);
+  return is_missing || reader_->error() ? std::nullopt : std::optional(reading);
 }
 
 Result<void> TableCorrector::takeRow() {
-  const Fields fields = splitFields(line_);
-  if (fields.size() != columns_->count) {
-    return bad(" has " + std::to_string(fields.size()) + " fields, the header has " + std::to_string(columns_->count) +
-               "; is the file cut off?");
-  }
-  const bool marked = columns_->status && !trimmed(fields[*columns_->status], kBlankOrQuote).empty();
-  const auto read = reading(fields);
+  const bool marked = columns_->status && !reader_->isBlank(*columns_->status);
+  const std::optional<Reading> read = reading();
   // A reading the tracker itself marked may hold anything; it is kept, and corrected only when it is a pose.
-  if (!read && !marked) return tl::unexpected(read.error());
-  const std::string_view sensor =
-      columns_->sensor ? trimmed(fields[*columns_->sensor], kBlankOrQuote) : std::string_view();
-  PendingRow row{line_, std::nullopt, setup_.ofRow(sensor)};
-  if (read && *read) {
+  if (marked) reader_->forgetError();
+  if (reader_->error()) return tl::unexpected(*reader_->error());
+  const std::string_view sensor = columns_->sensor ? reader_->field(*columns_->sensor) : std::string_view();
+  PendingRow row{reader_->text(), std::nullopt, setup_.ofRow(sensor)};
+  if (read) {
     row.pose = poses_.size();
-    if (!marked) units_.add((*read)->pose.position_m);
-    poses_.push_back((*read)->pose);
-    turned_.push_back((*read)->is_turned);
+    if (!marked) units_.add(read->pose.position_m);
+    poses_.push_back(read->pose);
+    turned_.push_back(read->is_turned);
     if (!turned_.back()) ++counts_.unturned;
     sensors_.push_back(sensorNumber(sensor));
     const auto& apart = corrector_.parts().by_sensor;

@@ -13,7 +13,7 @@
 #include "calib/core/error.h"
 #include "calib/core/pose.h"
 #include "calib/recording/unit_slip.h"
-#include "calib/tables/line_reader.h"
+#include "calib/tables/csv_reader.h"
 
 namespace fieldtrue::cli {
 
@@ -41,15 +41,16 @@ class TableCorrector {
   Result<void> checkUnits() const { return units_.check(); }
 
   const RowCounts& counts() const { return counts_; }
+  /// Once the table was run: what its reader noticed.
+  std::vector<std::string> notes() const;
   const std::string& setupDifference() const { return setup_.difference(); }
   bool hasOrientations() const { return columns_ && columns_->orientation; }
 
  private:
   /// Where the columns that matter stand.
   struct Columns {
-    std::size_t count = 0;
-    std::array<std::size_t, 3> position{};
-    std::optional<std::array<std::size_t, 4>> orientation;  ///< w x y z.
+    std::vector<std::size_t> position;
+    std::optional<std::vector<std::size_t>> orientation;  ///< w x y z.
     std::optional<std::size_t> status;
     std::optional<std::size_t> sensor;
   };
@@ -64,14 +65,10 @@ class TableCorrector {
     Pose pose;
     bool is_turned = false;  ///< Its orientation is known.
   };
-  using Fields = std::vector<std::string_view>;
 
-  tl::unexpected<Error> bad(const std::string& what) const;
   Result<void> takeHeader(std::ostream& out);
-  Result<std::optional<std::array<std::size_t, 4>>> findOrientation(const std::vector<std::string>& names) const;
-  Result<double> number(const Fields& fields, std::size_t column) const;
-  /// @return none where the tracker put its mark for a missing reading
-  Result<std::optional<Reading>> reading(const Fields& fields) const;
+  /// @return none where the tracker put its mark for a missing reading, or the reader failed
+  std::optional<Reading> reading();
   Result<void> takeRow();
   void flush(std::ostream& out);
   void writeCorrected(std::ostream& out, const Reading& reading, const Pose& corrected, std::optional<int> sensor);
@@ -79,12 +76,12 @@ class TableCorrector {
 
   const calibration::Corrector& corrector_;
   std::vector<Eigen::Quaterniond> orientations_seen_;
-  LineReader lines_;
+  std::istream& in_;
+  std::string name_;
+  std::optional<CsvReader> reader_;
   recording::ReadingUnits units_;
   SetupCheck setup_;
-  std::string line_;
   std::optional<Columns> columns_;
-  std::vector<std::string> names_;
   std::vector<PendingRow> rows_;
   std::vector<Pose> poses_;
   std::vector<bool> turned_;                 ///< Whether each pose has an orientation.

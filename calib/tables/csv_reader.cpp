@@ -1,6 +1,8 @@
 #include "calib/tables/csv_reader.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -8,6 +10,7 @@
 
 #include "calib/core/file_io.h"
 #include "calib/core/trimmed.h"
+#include "calib/tables/small_letters.h"
 
 namespace fieldtrue {
 
@@ -16,6 +19,8 @@ namespace {
 /// Unit to within this is left as it is, so that what was written reads back to the same bits.
 constexpr double kUnit = 1e-12;
 constexpr double kLargestNormError = 0.05;
+
+constexpr std::string_view kNumbersInHead = "; it holds numbers where the names of the columns must stand";
 
 std::string inQuotes(std::string_view text) {
   constexpr std::size_t kLongest = 40;
@@ -26,6 +31,22 @@ std::string joined(const std::vector<std::string_view>& words) {
   std::string text;
   for (const std::string_view word : words) text += (text.empty() ? "" : ", ") + std::string(word);
   return text;
+}
+
+constexpr std::array<std::string_view, 13> kUnitWords{"",   "m", "mm", "cm",  "um",  "in",    "inch",
+                                                      "ft", "s", "ms", "deg", "rad", "metres"};
+
+/// Whether a column of a head means what a required one does, but for the unit, brackets around it or capitals.
+bool looksLike(std::string_view column, std::string_view required) {
+  const std::string_view stem = required.substr(0, required.rfind('_'));
+  if (column.size() < stem.size()) return false;
+  const auto isSame = [](char a, char b) {
+    return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
+  };
+  if (!std::equal(stem.begin(), stem.end(), column.begin(), isSame)) return false;
+  const std::string_view rest = column.substr(stem.size());
+  if (!rest.empty() && std::isalnum(static_cast<unsigned char>(rest.front()))) return false;
+  return std::find(kUnitWords.begin(), kUnitWords.end(), smallLetters(rest)) != kUnitWords.end();
 }
 
 std::string fieldCount(std::size_t count) { return std::to_string(count) + (count == 1 ? " field" : " fields"); }
@@ -41,8 +62,10 @@ std::optional<double> parseFinite(std::string_view text) {
   return value;
 }
 
-Result<CsvReader> CsvReader::open(std::istream& in, std::string name, char separator, CsvHeader header) {
+Result<CsvReader> CsvReader::open(std::istream& in, std::string name, char separator, CsvHeader header,
+                                  PassedOver passed_over) {
   CsvReader reader(in, std::move(name), separator);
+  reader.passed_over_ = std::move(passed_over);
   FT_TRY_VOID(reader.readHeader(header));
   return reader;
 }
@@ -55,6 +78,10 @@ void CsvReader::failAt(std::size_t column, const std::string& what) {
 
 void CsvReader::failInLine(const std::string& what) {
   if (!error_) error_ = Error{ErrorCode::kBadInput, where() + ": " + what};
+}
+
+void CsvReader::passOver() const {
+  if (passed_over_) passed_over_(line_);
 }
 
 /// The `# key: value` of a comment; none when it holds no mark or no key.
@@ -82,10 +109,14 @@ Result<void> CsvReader::readHeader(CsvHeader header) {
       const std::optional<MetadataLine> metadata = metadataLine(is_comment_header ? '=' : ':');
       const bool is_header = is_comment_header && metadata && metadata->key == "columns";
       if (metadata && !is_header) metadata_.push_back(*metadata);
-      if (!is_header) continue;
-      line_ = metadata->value;
+      if (is_header) line_ = metadata->value;
+      if (!is_header) {
+        passOver();
+        continue;
+      }
     }
     if (!trimmed(line_).empty()) break;
+    passOver();
   }
   if (!splitLine()) return tl::unexpected(*error_);
   if (header == CsvHeader::kNone) {
@@ -106,7 +137,8 @@ Result<void> CsvReader::checkColumns() const {
     }
     if (std::find(columns_.begin(), columns_.begin() + static_cast<std::ptrdiff_t>(i), columns_[i]) !=
         columns_.begin() + static_cast<std::ptrdiff_t>(i)) {
-      return fail(ErrorCode::kBadInput, where() + ": column " + columns_[i] + " comes twice");
+      const std::string remark = parseFinite(columns_[i]) ? std::string(kNumbersInHead) : "";
+      return fail(ErrorCode::kBadInput, where() + ": column " + columns_[i] + " comes twice" + remark);
     }
   }
   return {};
@@ -170,14 +202,13 @@ Result<bool> CsvReader::next() {
   while (true) {
     const Result<bool> more = lines_.next(line_);
     if (!more || !*more) return more;
-    if (line_.starts_with('#')) {
-      const std::optional<MetadataLine> metadata = metadataLine(':');
-      // A key is one word; a remark like "moved at 10:30" is none.
-      if (!metadata || metadata->key.find(' ') != std::string::npos) continue;
-      if (++n_late_metadata_ == 1) late_metadata_ = metadata;
-    } else if (!trimmed(line_).empty()) {
-      break;
-    }
+    const bool is_comment = line_.starts_with('#');
+    if (!is_comment && !trimmed(line_).empty()) break;
+    passOver();
+    const std::optional<MetadataLine> metadata = is_comment ? metadataLine(':') : std::nullopt;
+    // A key is one word; a remark like "moved at 10:30" is none.
+    if (!metadata || metadata->key.find(' ') != std::string::npos) continue;
+    if (++n_late_metadata_ == 1) late_metadata_ = metadata;
   }
   if (!splitLine()) return tl::unexpected(*error_);
   if (fields_.size() == columns_.size()) return true;
@@ -192,6 +223,25 @@ std::optional<std::size_t> CsvReader::find(std::string_view column) const {
   return static_cast<std::size_t>(found - columns_.begin());
 }
 
+std::vector<std::string_view> CsvReader::lookalikes(const std::vector<std::string_view>& missing) const {
+  std::vector<std::string_view> alike;
+  for (const std::string& column : columns_) {
+    const auto isMeant = [&](std::string_view required) { return looksLike(column, required); };
+    if (std::any_of(missing.begin(), missing.end(), isMeant)) alike.push_back(column);
+  }
+  return alike;
+}
+
+/// What may be the reason that required columns are missing; empty when nothing shows.
+std::string CsvReader::remarkOnMissing(const std::vector<std::string_view>& missing) const {
+  if (columns_.size() == 1 && columns_[0].find_first_of(";\t,| ") != std::string::npos)
+    return "; its fields must be separated by commas";
+  if (parseFinite(columns_[0])) return std::string(kNumbersInHead);
+  const std::vector<std::string_view> alike = lookalikes(missing);
+  if (alike.empty()) return {};
+  return "; it has " + joined(alike) + ", but a name must be the same to the letter: it fixes the unit";
+}
+
 Result<std::vector<std::size_t>> CsvReader::require(std::span<const std::string_view> columns) const {
   std::vector<std::size_t> places;
   std::vector<std::string_view> missing;
@@ -201,11 +251,9 @@ Result<std::vector<std::size_t>> CsvReader::require(std::span<const std::string_
     if (!place) missing.push_back(column);
   }
   if (missing.empty()) return places;
-  const bool is_other_separator = columns_.size() == 1 && columns_[0].find_first_of(";\t,") != std::string::npos;
   return fail(ErrorCode::kBadInput, where() + ": the header lacks " +
                                         (missing.size() == 1 ? "the required column " : "the required columns ") +
-                                        joined(missing) +
-                                        (is_other_separator ? "; its fields must be separated by commas" : ""));
+                                        joined(missing) + remarkOnMissing(missing));
 }
 
 Result<std::optional<std::vector<std::size_t>>> CsvReader::group(std::span<const std::string_view> columns) const {
@@ -225,6 +273,11 @@ std::optional<std::string> CsvReader::noteOnLateMetadata() const {
          (n_late_metadata_ > 1 ? " and " + std::to_string(n_late_metadata_ - 1) + " more such lines stand"
                                : " stands") +
          " below the row of column names and counts as a comment; metadata belongs above it";
+}
+
+std::optional<std::string> CsvReader::noteOnLastLine() const {
+  if (lineHasNewline()) return std::nullopt;
+  return name() + ": the last line has no line end; it was taken as whole";
 }
 
 std::vector<std::string> CsvReader::unknown(std::span<const std::string_view> known) const {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <deque>
+#include <functional>
 #include <istream>
 #include <optional>
 #include <span>
@@ -32,6 +33,9 @@ enum class CsvHeader {
 /// The field functions return a harmless value on failure and keep the first failure: look at error() once a row.
 class CsvReader {
  public:
+  /// Called with each line that is no row: comments, metadata and blank lines, from the first line on.
+  using PassedOver = std::function<void(std::string_view line)>;
+
   struct MetadataLine {
     std::string key;
     std::string value;
@@ -43,7 +47,7 @@ class CsvReader {
   /// @param separator a blank also separates by runs of blanks
   /// @error kBadInput when there is no header, a column has no name or a name comes twice; kIo
   static Result<CsvReader> open(std::istream& in, std::string name, char separator = ',',
-                                CsvHeader header = CsvHeader::kRow);
+                                CsvHeader header = CsvHeader::kRow, PassedOver passed_over = {});
   /// From here on numbers may be written with a comma for the point.
   void allowDecimalComma() { decimal_comma_ = true; }
 
@@ -53,6 +57,8 @@ class CsvReader {
   const std::vector<MetadataLine>& metadata() const { return metadata_; }
   /// Once the rows are read: that lines below the header row look like metadata but are comments; none when none do.
   std::optional<std::string> noteOnLateMetadata() const;
+  /// Once the rows are read: that the last line may be cut off; none when it has its line end.
+  std::optional<std::string> noteOnLastLine() const;
   std::optional<std::size_t> find(std::string_view column) const;
   /// @error kBadInput naming the columns that are missing
   Result<std::vector<std::size_t>> require(std::span<const std::string_view> columns) const;
@@ -67,6 +73,8 @@ class CsvReader {
   Result<bool> next();
   int line() const { return lines_.number(); }
   bool lineHasNewline() const { return lines_.hasNewline(); }
+  /// The header or row read last, as it stands in the file.
+  const std::string& text() const { return line_; }
 
   std::string_view field(std::size_t column) const { return fields_[column]; }
   bool isBlank(std::size_t column) const { return fields_[column].empty(); }
@@ -80,12 +88,17 @@ class CsvReader {
   void failAt(std::size_t column, const std::string& what);
   void failInLine(const std::string& what);
   const std::optional<Error>& error() const { return error_; }
+  /// For rows that may hold anything.
+  void forgetError() { error_.reset(); }
 
  private:
   CsvReader(std::istream& in, std::string name, char separator) : lines_(in, std::move(name)), separator_(separator) {}
   Result<void> readHeader(CsvHeader header);
   std::optional<double> finite(std::string_view text) const;
+  void passOver() const;
   std::optional<MetadataLine> metadataLine(char mark) const;
+  std::vector<std::string_view> lookalikes(const std::vector<std::string_view>& missing) const;
+  std::string remarkOnMissing(const std::vector<std::string_view>& missing) const;
   bool splitLine();
   std::string_view takeQuoted(std::size_t& at);
   Result<void> checkColumns() const;
@@ -101,6 +114,7 @@ class CsvReader {
   int n_late_metadata_ = 0;
   std::string line_;
   std::vector<std::string_view> fields_;
+  PassedOver passed_over_;
   std::deque<std::string> unquoted_;  ///< Fields of this line that held doubled quotes.
   std::optional<Error> error_;
 };

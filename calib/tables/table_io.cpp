@@ -282,8 +282,7 @@ std::vector<std::string> notesOn(const CsvReader& reader, const Names& known, bo
   for (std::string& note : notesOnMetadata(reader)) notes.push_back(std::move(note));
   if (const std::optional<std::string> note = reader.noteOnLateMetadata()) notes.push_back(*note);
   if (!has_rotation) notes.push_back(reader.name() + ": there are no columns qw, qx, qy, qz: positions only");
-  if (!reader.lineHasNewline())
-    notes.push_back(reader.name() + ": the last line has no line end; it was taken as whole");
+  if (const std::optional<std::string> note = reader.noteOnLastLine()) notes.push_back(*note);
   return notes;
 }
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "calib/core/file_io.h"
 #include "calib/core/nearest_name.h"
+#include "calib/tables/small_letters.h"
 
 namespace fieldtrue {
 
@@ -90,14 +90,6 @@ const std::vector<std::string_view>& knownKeys() {
   return keys;
 }
 
-/// Letters only, small: Jig-Tolerance_M and jig_tolerance_m are the same.
-std::string letters(std::string_view key) {
-  std::string small;
-  for (const char c : key)
-    if (std::isalpha(static_cast<unsigned char>(c))) small += static_cast<char>(std::tolower(c));
-  return small;
-}
-
 /// The known key that a key looks like: the same with another unit or none, or with up to two slips of the hand.
 std::optional<std::string_view> likelyKey(std::string_view key) {
   std::optional<std::string_view> likely;
@@ -105,8 +97,8 @@ std::optional<std::string_view> likelyKey(std::string_view key) {
   for (const std::string_view known : knownKeys()) {
     const std::size_t unit = known.rfind('_');
     const bool is_other_unit =
-        unit != std::string_view::npos && letters(key).starts_with(letters(known.substr(0, unit)));
-    const std::size_t slips = is_other_unit ? 0 : editDistance(letters(key), letters(known));
+        unit != std::string_view::npos && smallLetters(key).starts_with(smallLetters(known.substr(0, unit)));
+    const std::size_t slips = is_other_unit ? 0 : editDistance(smallLetters(key), smallLetters(known));
     // In four letters two slips make another word.
     if (slips >= fewest || 3 * slips > known.size()) continue;
     fewest = slips;

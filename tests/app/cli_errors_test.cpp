@@ -122,7 +122,7 @@ class CliErrorsTest : public QObject {
     row("apply twice", "apply --calibration @/good.ftcal.json --in @/apply-twice.csv --out @/o.csv", 1,
         {"x_corrected_m", "already"});
     row("apply to nothing", "apply --calibration @/good.ftcal.json --in @/empty.csv --out @/o.csv", 1,
-        {"empty.csv", "header"});
+        {"empty.csv", "is empty", "column names"});
     row("apply to a missing table", "apply --calibration @/good.ftcal.json --in @/none.csv --out @/o.csv", 1,
         {"none.csv"});
     row("no such folder to write to", "simulate --plan grid:2x2x2@0.1 --nodes @/none/o.csv", 1, {"none/o.csv"});
@@ -180,6 +180,77 @@ class CliErrorsTest : public QObject {
       QVERIFY2(!file.startsWith("o.") && !file.contains(".part-"), qPrintable(file + " was left behind"));
     }
     QVERIFY(readWhole(at("good.nodes.csv")).startsWith("#") || readWhole(at("good.nodes.csv")).contains("x_true_m"));
+  }
+
+  void applyExplainsAsFitDoes_data() {
+    QTest::addColumn<QByteArray>("table");
+    QTest::addColumn<QByteArray>("told");  // after the file's name
+    const QByteArray truth = "node,x_true_m,y_true_m,z_true_m,";
+    const QByteArray head = truth + "x_m,y_m,z_m,qw,qx,qy,qz\n";
+    QTest::newRow("columns missing") << truth + "x_m\n0,0,0,0,0.1\n"
+                                     << QByteArray(", line 1: the header lacks the required columns y_m, z_m\n");
+    QTest::newRow("units in the head")
+        << truth + "x_mm,y_mm,z_mm\n0,0,0,0,1,2,3\n"
+        << QByteArray(
+               ", line 1: the header lacks the required columns x_m, y_m, z_m; it has x_mm, y_mm, z_mm, but a "
+               "name must be the same to the letter: it fixes the unit\n");
+    QTest::newRow("semicolons") << (truth + "x_m,y_m,z_m\n").replace(',', ';') << QByteArray("separated by commas\n");
+    QTest::newRow("half an orientation") << truth + "x_m,y_m,z_m,qw,qx,qz\n0,0,0,0,1,2,3,1,0,0\n"
+                                         << QByteArray("qy (qw, qx, qy, qz belong together: all or none)\n");
+    QTest::newRow("text") << head + "0,0,0,0,0.1,left,0.3,1,0,0,0\n"
+                          << QByteArray(", line 2, column y_m: 'left' is not a finite number\n");
+    QTest::newRow("blank") << head + "0,0,0,0,0.1,,0.3,1,0,0,0\n"
+                           << QByteArray(", line 2, column y_m: the field is blank, a number is needed\n");
+    QTest::newRow("no rotation") << head + "0,0,0,0,0.1,0.2,0.3,2,0,0,0\n"
+                                 << QByteArray(", column qw: the quaternion has length 2, a rotation has length 1\n");
+    QTest::newRow("open quote") << head + "\"0,0,0,0,0.1,0.2,0.3,1,0,0,0\n"
+                                << QByteArray(", line 2: a quoted field is not closed\n");
+    QTest::newRow("cut off") << head + "0,0,0,0,0.1,0."
+                             << QByteArray(
+                                    ", line 2: the row has 6 fields, the header has 11 columns; the file ends "
+                                    "in the middle of this row\n");
+    QTest::newRow("UTF-16") << QByteArray("\xFF\xFEn\0o\0d\0e\0", 10) << QByteArray("line 1: this is not UTF-8 text");
+    QTest::newRow("empty") << QByteArray() << QByteArray(" is empty; it needs a row of column names\n");
+    QTest::newRow("only remarks") << QByteArray("# frame: jig\n")
+                                  << QByteArray(" has no header row; it needs a row of column names\n");
+  }
+  void applyExplainsAsFitDoes() {
+    QFETCH(QByteArray, table);
+    QFETCH(QByteArray, told);
+    QVERIFY(writeWhole(at("explained.csv"), table));
+    const auto fromName = [](const CliRun& run) { return run.err.mid(run.err.indexOf("explained.csv")); };
+    const CliRun fit =
+        runCli({"fit", "--nodes", at("explained.csv"), "--position", "affine", "--out", at("o.ftcal.json")});
+    const CliRun apply =
+        runCli({"apply", "--calibration", at("good.ftcal.json"), "--in", at("explained.csv"), "--out", at("o.csv")});
+    FT_VERIFY_STATUS(fit, 1);
+    FT_VERIFY_STATUS(apply, 1);
+    QVERIFY2(apply.err.contains(told), apply.err.constData());
+    QCOMPARE(fromName(apply), fromName(fit));
+    QVERIFY(!QFileInfo::exists(at("o.csv")));
+  }
+
+  void applyTellsOfLinesThatItTookOnTrust() {
+    QVERIFY(writeWhole(at("trust.csv"), "# setup.rom: Lab 2\nx_m,y_m,z_m\n# setup.room: Lab 2\n0.1,0.1,0.1"));
+    const CliRun run = runCli({"apply", "--calibration", at("good.ftcal.json"), "--in", at("trust.csv"), "--out",
+                               at("trusted.csv"), "--force"});
+    FT_VERIFY_STATUS(run, 0);
+    FT_VERIFY_MATCH(holdsAll(run.err.toStdString(), {"is setup.room meant?", "line 3", "metadata belongs above it",
+                                                     "the last line has no line end"}));
+    QVERIFY(readWhole(at("trusted.csv")).contains("\n# setup.room: Lab 2\n0.1,0.1,0.1,"));
+  }
+
+  /// Rows come out while more are still to come: a pipe may hold more than the memory does.
+  void applyReadsFromAPipe() {
+    QProcess shell;
+    shell.start("/bin/sh", {"-c",
+                            "{ echo x_m,y_m,z_m; i=0; while [ $i -lt 9000 ]; do echo 0.1,0.2,0.1; i=$((i+1)); done; } "
+                            "| \"$0\" apply --calibration \"$1\" --in /dev/stdin --force --out /dev/stdout | wc -l",
+                            cliPath(), at("good.ftcal.json")});
+    const CliRun run = finished(shell, 120000);
+    FT_VERIFY_STATUS(run, 0);
+    // Head and rows, and the line that tells what was done.
+    QCOMPARE(run.out.trimmed(), QByteArray("9002"));
   }
 
   void anEmptyNameOrSeedIsRefused_data() {

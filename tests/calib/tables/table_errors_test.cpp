@@ -128,6 +128,15 @@ class TableErrorsTest : public QObject {
                                             "the header lacks the required columns x_true_m, y_true_m, z_true_m");
     QTest::newRow("semicolons") << QByteArray(head).replace(',', ';') + row
                                 << QByteArray("its fields must be separated by commas");
+    QTest::newRow("blanks") << QByteArray(head).replace(',', ' ') + row
+                            << QByteArray("its fields must be separated by commas");
+    QTest::newRow("units in the head") << QByteArray("node,x_true_m,y_true_m,z_true_m,x_mm,y [m],Z_M") + row
+                                       << QByteArray("columns x_m, y_m, z_m; it has x_mm, y [m], Z_M, but a name must");
+    QTest::newRow("no names") << QByteArray("1,2,3,4,5,6,7") + row
+                              << QByteArray("z_m; it holds numbers where the names of the columns must stand");
+    QTest::newRow("no names, a number twice")
+        << QByteArray("1,1,3,4,5,6,7") + row
+        << QByteArray("column 1 comes twice; it holds numbers where the names of the columns must stand");
     QTest::newRow("half a group") << head + ",qw,qx,qz\n1,1,2,3,4,5,6,1,0,0\n"
                                   << QByteArray("column qy (qw, qx, qy, qz belong together: all or none)");
     QTest::newRow("covariance alone") << head + ",cov_xy_m2,cov_xz_m2,cov_yz_m2\n1,1,2,3,4,5,6,0,0,0\n"
