@@ -4,6 +4,7 @@
 #include <limits>
 #include <sstream>
 #include <string_view>
+#include <tuple>
 
 #include "acquisition/plan/plan_text.h"
 #include "calib/calibration/alignment.h"
@@ -48,6 +49,19 @@ Read<void> addMethod(const std::string& text, evaluation::ComparisonOptions& opt
   if (position) options.position_methods.push_back(*position);
   if (orientation) options.orientation_methods.push_back(*orientation);
   return {};
+}
+
+/// The lines of some rows of a table, which stand in its order.
+std::vector<int> linesOf(const std::vector<Node>& rows, const TableReading<CalibrationTable>& reading) {
+  const auto keyOf = [](const Node& node) { return std::tuple(node.node, node.sensor, node.visit); };
+  std::vector<int> lines;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < reading.lines.size() && next < rows.size(); ++i) {
+    if (keyOf(reading.table.nodes[i]) != keyOf(rows[next])) continue;
+    lines.push_back(reading.lines[i]);
+    ++next;
+  }
+  return lines;
 }
 
 }  // namespace
@@ -119,13 +133,14 @@ Read<TableReading<CalibrationTable>> chooseRows(TableReading<CalibrationTable> r
   if (arguments.sensor || sensors == SensorRows::kOne) {
     auto rows = rowsOfSensor(reading.table, arguments.sensor);
     if (!rows) return notPossible(name + ": " + rows.error().message + (arguments.sensor ? "" : ": --sensor N"));
+    reading.lines = linesOf(rows->nodes, reading);
     reading.table = *std::move(rows);
   }
   if (const std::size_t n_used = reading.table.nodes.size(); n_used < n_all) {
     reading.notes.push_back(name + ": " + std::to_string(n_used) + " of " + std::to_string(n_all) +
                             " rows are of sensor " + std::to_string(*arguments.sensor));
   }
-  const Result<void> units = recording::checkUnits(reading.table);
+  const Result<void> units = recording::checkUnits(reading.table, reading.lines);
   if (units) return reading;
   if (!arguments.force) return notPossible(name + ": " + units.error().message + ", or go on with --force");
   reading.notes.push_back(name + ": " + units.error().message + "; used all the same");

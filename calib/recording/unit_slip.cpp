@@ -118,9 +118,32 @@ std::string slipText(const NearestSlip& nearest) {
          nearest.slip.words;
 }
 
+/// "line 7, column x_m", or by the row's key where it is of no file.
+std::string whereOf(const Node& node, std::optional<int> line, Eigen::Index axis) {
+  const std::string column = std::string("column ") + "xyz"[axis] + "_m";
+  if (line) return "line " + std::to_string(*line) + ", " + column;
+  return "node " + std::to_string(node.node) + ", sensor " + std::to_string(node.sensor) + ", visit " +
+         std::to_string(node.visit) + ", " + column;
+}
+
+Result<void> checkReadings(const CalibrationTable& table, std::span<const int> lines) {
+  for (std::size_t i = 0; i < table.nodes.size(); ++i) {
+    const Node& node = table.nodes[i];
+    if (!isUsable(node)) continue;
+    Eigen::Index axis = 0;
+    if (node.tracker_from_sensor.position_m.cwiseAbs().maxCoeff(&axis) <= kTrackerReach_m) continue;
+    const auto line = i < lines.size() ? std::optional(lines[i]) : std::nullopt;
+    return fail(ErrorCode::kBadInput, whereOf(node, line, axis) + ": the reading lies at " +
+                                          threeFigures(node.tracker_from_sensor.position_m[axis]) +
+                                          " m, farther than the " + threeFigures(kTrackerReach_m) +
+                                          " m that any tracker reaches; readings must be in metres");
+  }
+  return {};
+}
+
 }  // namespace
 
-Result<void> checkUnits(const CalibrationTable& table) {
+Result<void> checkUnits(const CalibrationTable& table, std::span<const int> lines) {
   std::vector<Node> nodes;
   std::set<int> places;
   for (const Node& node : table.nodes) {
@@ -128,7 +151,7 @@ Result<void> checkUnits(const CalibrationTable& table) {
     nodes.push_back(node);
     places.insert(node.node);
   }
-  if (places.size() < 2) return {};
+  if (places.size() < 2) return checkReadings(table, lines);
   const double width_m = trueBox_m(nodes).sizes().maxCoeff();
   nodes = representatives(std::move(nodes));
   if (places.size() >= kFewestPlaces && !isPlausible(repairedDistances(nodes, 1.0).ratio())) {
@@ -144,7 +167,7 @@ Result<void> checkUnits(const CalibrationTable& table) {
     return fail(ErrorCode::kBadInput, the_places + "all lie within " + threeFigures(1e3 * width_m) +
                                           " mm of each other; true positions must be in metres");
   }
-  return {};
+  return checkReadings(table, lines);
 }
 
 ReadingUnits::ReadingUnits(const Region& region, std::span<const Eigen::Vector3d> tracked_m) : region_(region) {

@@ -31,9 +31,11 @@ inline constexpr double kTrackerReach_m = 30.0;
 /// Refuses a table whose positions cannot all be metres: places more than 30 m apart or all within 1 mm, or, from four
 /// places on, distances between true places and between their readings (mirrored ones put back) that differ by more
 /// than a factor of two in the median. Only distances count, so that neither an alignment nor mirrored axes, nor a
-/// single bad layer, decide.
-/// @error kBadInput: what was seen, and the nearest slip of units
-Result<void> checkUnits(const CalibrationTable& table);
+/// single bad layer, decide. A single reading that lies farther out than any tracker reaches is refused as well, unless
+/// its row is skipped.
+/// @param lines of the rows in their file, for messages; empty where they are of none
+/// @error kBadInput: what was seen, and the nearest slip of units, or the row and column
+Result<void> checkUnits(const CalibrationTable& table, std::span<const int> lines = {});
 
 /// The same question for readings of unknown truth, one at a time: none lies in the calibrated region enlarged
 /// threefold, but most would after one of the slips. Feet for metres hardly leave the enlarged region, so none in the

@@ -322,6 +322,7 @@ Result<TableReading<CalibrationTable>> readNodeTable(std::istream& in, const std
     if (reader.error()) return;
     keys.add(reader, columns, node);
     reading.table.nodes.push_back(std::move(node));
+    reading.lines.push_back(reader.line());
   });
   if (!metadata) return tl::unexpected(metadata.error());
   reading.table.metadata = *metadata;

@@ -16,6 +16,7 @@ template <class Table>
 struct TableReading {
   Table table;
   std::vector<std::string> notes;
+  std::vector<int> lines = {};  ///< Of each row of a node table in its file; else empty.
 };
 
 /// Reads a node table (`*.nodes.csv`), streaming; columns by name in any order.

@@ -43,6 +43,7 @@ class CliRefusalsTest : public QObject {
     FT_VERIFY_STATUS(
         runCli({"fit", "--nodes", at("good.nodes.csv"), "--position", "affine", "--out", at("good.ftcal.json")}), 0);
     makeSlips(table);
+    makeFarReading(table);
     makeTwoSensors(table);
     makeReadings(table);
     makeDeepFiles();
@@ -98,6 +99,8 @@ class CliRefusalsTest : public QObject {
       if (!QStringList{"fit", "compare", "report", "diagnose"}.contains(name))
         row(qPrintable(name + ", two sensors"), with("two.nodes.csv"),
             {"two.nodes.csv", "sensors 0 and 4", "--sensor N"});
+      row(qPrintable(name + ", a reading far out"), with("far.nodes.csv"),
+          {"far.nodes.csv", line_of_far_, "column x_m", "1e+06 m", "30 m", "metres", "--force"});
       row(qPrintable(name + ", a sensor that is not there"), with("two.nodes.csv --sensor 1"),
           {"two.nodes.csv", "sensor 1", "sensors 0 and 4"});
     }
@@ -130,6 +133,10 @@ class CliRefusalsTest : public QObject {
     };
     const QList<QByteArray> forced{"true-mm.nodes.csv", "1000", "all the same"};
     row("fit", "fit --nodes @/true-mm.nodes.csv --position affine --force --out @/w.json", forced);
+    row("fit a reading far out", "fit --nodes @/far.nodes.csv --position affine --force --out @/w.json",
+        {line_of_far_, "all the same"});
+    row("fit beside a reading far out that is skipped",
+        "fit --nodes @/far-skipped.nodes.csv --position affine --out @/w.json", {});
     row("compare", "compare --nodes @/true-mm.nodes.csv --methods rigid --force", forced);
     row("report", "report --nodes @/true-mm.nodes.csv --methods rigid --force --html @/w.html", forced);
     row("apply", "apply --calibration @/good.ftcal.json --in @/mm.csv --out @/w.csv --force", {"mm.csv", "1000"});
@@ -204,6 +211,15 @@ class CliRefusalsTest : public QObject {
     write("both-mm.nodes.csv", table);
   }
 
+  /// The reading of the last row.
+  void makeFarReading(CalibrationTable table) {
+    table.nodes.back().tracker_from_sensor.position_m.x() = 1e6;
+    write("far.nodes.csv", table);
+    line_of_far_ = "line " + QByteArray::number(readWhole(at("far.nodes.csv")).count('\n'));
+    table.nodes.back().role = NodeRole::kSkipped;
+    write("far-skipped.nodes.csv", table);
+  }
+
   /// A second sensor at every place, turned by 90 degrees in its holder.
   void makeTwoSensors(CalibrationTable table) {
     const Eigen::Quaterniond quarter = rotationFromVector(Eigen::Vector3d(0, 0, 1.5707963267948966));
@@ -263,6 +279,7 @@ class CliRefusalsTest : public QObject {
   }
 
   QTemporaryDir folder_;
+  QByteArray line_of_far_;
 };
 
 FIELDTRUE_TEST(CliRefusalsTest)

@@ -108,7 +108,9 @@ class UnitSlipTest : public QObject {
   }
 
   void theExtentCountsWhereBothAreWrong() {
-    const CalibrationTable table = syntheticTable();  // 0.8 m wide.
+    SyntheticOptions around_transmitter;  // So that readings stay within reach: 0.8 m wide, 0.4 m to either side.
+    around_transmitter.origin_m = {-0.4, -0.4, -0.3};
+    const CalibrationTable table = syntheticTable(around_transmitter);
     const auto wide = checkUnits(scaled(table, 1000.0, 1000.0));
     QVERIFY(!wide);
     FT_VERIFY_MATCH(holdsAll(wide.error().message, {"100 places", "800 m", "30 m"}));
@@ -163,6 +165,31 @@ class UnitSlipTest : public QObject {
     CalibrationTable table = gridTable();
     table.nodes.front().role = NodeRole::kSkipped;
     table.nodes.front().reference_from_sensor.position_m.x() = 500.0;
+    FT_VERIFY_OK(checkUnits(table));
+  }
+
+  void aReadingThatNoTrackerReachesIsNamed() {
+    CalibrationTable table = gridTable();
+    Node& far = table.nodes[5];
+    far.sensor = 2;
+    far.tracker_from_sensor.position_m.y() = -30.0;
+    FT_VERIFY_OK(checkUnits(table));
+    far.tracker_from_sensor.position_m.y() = -1e6;
+    const auto checked = checkUnits(table);
+    QVERIFY(!checked);
+    QCOMPARE(checked.error().code, ErrorCode::kBadInput);
+    QCOMPARE(checked.error().message,
+             std::string("node 5, sensor 2, visit 0, column y_m: the reading lies at -1e+06 m, farther than the 30 m "
+                         "that any tracker reaches; readings must be in metres"));
+    std::vector<int> lines;
+    for (std::size_t i = 0; i < table.nodes.size(); ++i) lines.push_back(static_cast<int>(10 + i));
+    QVERIFY(checkUnits(table, lines).error().message.starts_with("line 15, column y_m: "));
+    CalibrationTable two{table.metadata, {table.nodes[4], far}};
+    QVERIFY(!checkUnits(two));
+    CalibrationTable one{table.metadata, {far}};
+    QVERIFY(!checkUnits(one));
+    // What is flagged is no reading.
+    far.role = NodeRole::kSkipped;
     FT_VERIFY_OK(checkUnits(table));
   }
 
