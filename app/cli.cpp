@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "app/cli_barrier.h"
+#include "calib/core/file_io.h"
 #include "calib/core/memory_limit.h"
 #include "calib/core/thread_pool.h"
 
@@ -225,6 +226,7 @@ int CommandLine::run(int argc, char** argv) {
 }  // namespace fieldtrue::cli
 
 int main(int argc, char** argv) {
+  fieldtrue::outliveFileSizeLimit();
   fieldtrue::keepFreedMemory();
   const fieldtrue::cli::Application application(argc, argv);
   std::setlocale(LC_NUMERIC, "C");  // QCoreApplication takes over the user's, and numbers in files have a point.

@@ -3,6 +3,7 @@
 #include <QTimer>
 #include <clocale>
 
+#include "calib/core/file_io.h"
 #include "calib/core/memory_limit.h"
 #include "widgets/shell/application.h"
 #include "widgets/shell/main_window.h"
@@ -10,6 +11,7 @@
 #include "widgets/views/host/gl_format.h"
 
 int main(int argc, char** argv) {
+  fieldtrue::outliveFileSizeLimit();
   fieldtrue::keepFreedMemory();
   fieldtrue::widgets::setDefaultGlFormat();
   fieldtrue::widgets::Application application(argc, argv);

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <streambuf>
 #include <string_view>
@@ -215,6 +216,8 @@ Result<std::ifstream> openForReading(const std::filesystem::path& path) {
   if (!in) return fail(ErrorCode::kIo, "Cannot read " + path.string() + ": " + reasonText(errno));
   return in;
 }
+
+void outliveFileSizeLimit() { std::signal(SIGXFSZ, SIG_IGN); }
 
 Result<void> writeFileAtomically(const std::filesystem::path& path, const std::function<void(std::ostream&)>& write) {
   std::error_code error;

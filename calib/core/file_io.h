@@ -19,6 +19,10 @@ Result<std::string> readFile(const std::filesystem::path& path);
 /// @error kIo with the system's reason; kBadInput for a session, as above
 Result<std::ifstream> openForReading(const std::filesystem::path& path);
 
+/// Lets a write beyond the largest file that the system allows (`ulimit -f`) fail with a reason; by itself the system
+/// ends the program there, which leaves behind what was written beside. For the first line of main.
+void outliveFileSizeLimit();
+
 /// Writes beside, syncs to disk, renames over: the path holds either the old or the whole new content, never a part.
 /// @param write fills the stream
 /// @error kIo with the system's reason (no such folder, no permission, no space left); the old file is untouched
