@@ -82,8 +82,8 @@ std::string Corrector::toText() const {
                                    : isBaked() || takesOrientation() ? 2
                                                                      : 1)},
       {"software", "Fieldtrue " FIELDTRUE_VERSION},
-      {"direction", "tracker_from_sensor as tracked -> reference_from_sensor as corrected"},
-      {"units", "m, rad; quaternions w x y z"},
+      {"direction", kCalibrationDirection},
+      {"units", kCalibrationUnits},
       {"align", align_ == AlignMode::kRigid ? "rigid" : "none"},
       {"alignment",
        {{"reference_from_tracker", jsonOf(alignment().reference_from_tracker)},

@@ -32,6 +32,21 @@ Alignment alignmentFrom(const JsonReader& from) {
   return alignment;
 }
 
+bool takesPose(const Evaluator::Parts& parts) {
+  return parts.position->takesOrientation() ||
+         std::any_of(parts.by_sensor.begin(), parts.by_sensor.end(),
+                     [](const auto& one) { return one.second.position->takesOrientation(); });
+}
+
+/// The first files did not state it.
+void checkInputs(const JsonReader& content, const Evaluator::Parts& parts) {
+  const auto inputs = content.find("inputs");
+  if (!inputs) return;
+  const std::string needed = takesPose(parts) ? "pose" : "position";
+  if (inputs->oneOf({"position", "pose"}) != needed)
+    inputs->refuse("\"" + needed + "\", which its position part takes");
+}
+
 /// Poses that are corrected together, in memory of their own on the stack.
 constexpr std::size_t kBlock = 256;
 
@@ -76,6 +91,7 @@ Evaluator::Parts evaluatorPartsFrom(const JsonReader& content) {
     static_cast<Correction&>(parts) = correction_from(content);
   }
   parts.alignment = alignmentFrom(content["alignment"]);
+  checkInputs(content, parts);
   return parts;
 }
 
@@ -106,11 +122,7 @@ Result<Evaluator::Parts> Evaluator::partsOf(int sensor) const {
   return alone;
 }
 
-bool Evaluator::takesOrientation() const {
-  return parts_.position->takesOrientation() ||
-         std::any_of(parts_.by_sensor.begin(), parts_.by_sensor.end(),
-                     [](const auto& one) { return one.second.position->takesOrientation(); });
-}
+bool Evaluator::takesOrientation() const { return takesPose(parts_); }
 
 bool Evaluator::turnTakesOrientation() const {
   return parts_.orientation->takesOrientation() ||

@@ -144,6 +144,15 @@ class CorrectorFileTest : public QObject {
     QCOMPARE(QByteArray::fromStdString(loaded->toText()), QByteArray::fromStdString(original.toText()));
   }
 
+  void filesOfTheFirstVersionAreRead() {
+    const Corrector original = fitted("affine", "none");
+    const std::string first = rewritten(original.toText(), [](json& j) {
+      for (const char* key : {"inputs", "orientations_seen", "setup"}) j.erase(key);
+      j["comment"] = "as it was";
+    });
+    FT_VERIFY_OK(Corrector::fromText(first, "first.ftcal.json"));
+  }
+
   void changesOfLayoutDoNoHarm() {
     const std::string text = fitted("affine", "none").toText();
     FT_VERIFY_OK(Corrector::fromText(json::parse(text).dump(2), "indented.ftcal.json"));
@@ -208,6 +217,18 @@ class CorrectorFileTest : public QObject {
                     j["alignment"]["sensor_from_mount_wxyz"] = {0, 0, 0, 0};
                   }),
         ErrorCode::kBadInput, "unit quaternion");
+    row("other units", rewritten(text, [](json& j) { j["units"] = "mm, deg"; }), ErrorCode::kBadInput,
+        "units is \"mm, deg\"; it must be \"m, rad; quaternions w x y z\"");
+    row("no units", rewritten(text, [](json& j) { j.erase("units"); }), ErrorCode::kBadInput, "units is missing");
+    row("other direction", rewritten(text, [](json& j) { j["direction"] = "true -> tracked"; }), ErrorCode::kBadInput,
+        "direction is \"true -> tracked\"; it must be \"tracker_from_sensor as tracked ->");
+    row("inputs of another file", rewritten(text, [](json& j) { j["inputs"] = "pose"; }), ErrorCode::kBadInput,
+        "inputs is \"pose\"; it must be \"position\", which its position part takes");
+    row("no inputs", rewritten(text, [](json& j) { j["inputs"] = "voltages"; }), ErrorCode::kBadInput, "voltages");
+    row("unknown key", rewritten(text, [](json& j) { j["by_sensr"] = json::object(); }), ErrorCode::kBadInput,
+        "by_sensr is not known; did you mean by_sensor?");
+    row("unknown key of a part", rewritten(text, [](json& j) { j["alignment"]["mounts"] = json::object(); }),
+        ErrorCode::kBadInput, "alignment.mounts is not known; did you mean mounts_wxyz?");
     row("bad role", rewritten(text, [](json& j) { j["table"]["nodes"][0]["role"] = "fits"; }), ErrorCode::kBadInput,
         "role");
   }
