@@ -21,6 +21,9 @@ constexpr double kAlongStep_m = 1e-4;
 constexpr int kBisections = 40;
 constexpr int kNewtonSteps = 60;
 constexpr double kInverseTolerance_m = 1e-10;
+/// After so many steps that gained less than a tenth each, there is no way back.
+constexpr int kMostSlowSteps = 8;
+constexpr double kSlow = 0.9;
 constexpr std::size_t kMostDrawsPerProbe = 60;
 
 std::string orientationFact(const ExportOptions& options) {
@@ -102,7 +105,8 @@ Eigen::Vector3d ExportSubject::inverse_m(const Eigen::Vector3d& p_true_m) const 
   const Pose tracker_from_reference = inverse(corrector_.alignment().reference_from_tracker);
   Eigen::Vector3d p_m = tracker_from_reference * p_true_m;
   Eigen::Vector3d left_m = forward_m(p_m) - p_true_m;
-  for (int step = 0; step < kNewtonSteps && left_m.norm() > kInverseTolerance_m; ++step) {
+  int n_slow = 0;
+  for (int step = 0; step < kNewtonSteps && n_slow < kMostSlowSteps && left_m.norm() > kInverseTolerance_m; ++step) {
     Eigen::Matrix3d jacobian;
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3d h_m = kAlongStep_m * Eigen::Vector3d::Unit(axis);
@@ -117,6 +121,7 @@ Eigen::Vector3d ExportSubject::inverse_m(const Eigen::Vector3d& p_true_m) const 
       next_m = forward_m(p_m + share * move_m) - p_true_m;
     }
     if (next_m.norm() >= left_m.norm()) break;
+    n_slow = next_m.norm() > kSlow * left_m.norm() ? n_slow + 1 : 0;
     p_m += share * move_m;
     left_m = next_m;
   }

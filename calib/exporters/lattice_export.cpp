@@ -16,6 +16,9 @@ constexpr std::size_t kBendPoints = 400;
 constexpr double kLeastSteps = 3.0;  ///< Of a lattice along its longest axis.
 constexpr double kMostSteps = 2000.0;
 constexpr double kBendStep = 0.02;  ///< Of the longest side of the box.
+constexpr std::size_t kProbesAtOnce = 1000;
+constexpr double kShareOfWayBack = 0.1;  ///< Of the progress.
+constexpr double kFound_m = 1e-6;        ///< What Newton's method comes to wherever there is a way back.
 
 using Probe = std::pair<Eigen::Vector3d, Eigen::Vector3d>;
 
@@ -25,6 +28,7 @@ struct Extent {
   Eigen::Vector3d size_m() const { return high_m - low_m; }
 };
 
+/// The box of the places, widened by the region's margin.
 Extent extentOf(const ExportSubject& subject, const Eigen::Matrix3d& axes) {
   const std::vector<Eigen::Vector3d> places_m = subject.places_m();
   Extent extent{axes.transpose() * places_m.front(), axes.transpose() * places_m.front()};
@@ -36,6 +40,37 @@ Extent extentOf(const ExportSubject& subject, const Eigen::Matrix3d& axes) {
   extent.low_m.array() -= margin_m;
   extent.high_m.array() += margin_m;
   return extent;
+}
+
+/// The same, and the points of the region: where the map stretches, those of the margin go beyond.
+Extent extentOf(const ExportSubject& subject, const Eigen::Matrix3d& axes, const std::vector<Probe>& probes) {
+  Extent extent = extentOf(subject, axes);
+  for (const auto& [p_m, goes_m] : probes) {
+    extent.low_m = extent.low_m.cwiseMin(axes.transpose() * p_m);
+    extent.high_m = extent.high_m.cwiseMax(axes.transpose() * p_m);
+  }
+  return extent;
+}
+
+LatticePoints latticeIn(const Extent& extent, const Eigen::Matrix3d& axes, const Eigen::Vector3d& pitch_m, int padding,
+                        bool on_multiples) {
+  LatticePoints points;
+  points.axes = axes;
+  points.pitch_m = pitch_m;
+  Eigen::Vector3d first_m;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double pitch = pitch_m[axis];
+    if (on_multiples) {
+      first_m[axis] = pitch * (std::floor(extent.low_m[axis] / pitch) - padding);
+    } else {
+      const double steps = std::ceil(extent.size_m()[axis] / pitch - 1e-9);
+      first_m[axis] = 0.5 * (extent.low_m[axis] + extent.high_m[axis] - steps * pitch) - padding * pitch;
+    }
+    points.counts[static_cast<std::size_t>(axis)] =
+        1 + padding + static_cast<int>(std::ceil((extent.high_m[axis] - first_m[axis]) / pitch - 1e-9));
+  }
+  points.origin_m = axes * first_m;
+  return points;
 }
 
 /// Largest second difference of the map along each axis, as a pitch at which straight lines between points err by what
@@ -82,6 +117,55 @@ std::string lengthText(double length_m) {
   return length_m >= 1e-3 ? shortNumber(1e3 * length_m) + " mm" : shortNumber(1e6 * length_m) + " um";
 }
 
+std::string positionText(const Eigen::Vector3d& p_m) {
+  return "(" + fixedText(p_m.x(), 3) + ", " + fixedText(p_m.y(), 3) + ", " + fixedText(p_m.z(), 3) + ") m";
+}
+
+/// Where the way back from a corrected point leads.
+struct WayBack {
+  Eigen::Vector3d reading_m = Eigen::Vector3d::Zero();
+  double residual_m = 0.0;  ///< Of that reading, corrected, from the point.
+  double off_m = 0.0;       ///< Of that reading from the one that the point came from.
+};
+
+std::string foldText(const Probe& probe, const WayBack& back) {
+  const std::string at = positionText(probe.first), reading = positionText(probe.second);
+  if (!(back.residual_m <= kFound_m))
+    return "from " + at + ", where the reading " + reading + " goes, no way back is found";
+  return "the readings " + reading + " and " + positionText(back.reading_m) + " are both corrected to " + at;
+}
+
+/// How far the way there and back is off at most; the probes of a map from true to measured are turned round one block
+/// after the other, so that a map that cannot be is told within seconds.
+/// @error kUnsupported naming the worst point where a correction folds back; kCancelled
+Result<double> inverseResidual_m(const ExportSubject& subject, const std::vector<Probe>& probes, double allowed_m,
+                                 const RunControl& control) {
+  double residual_m = 0.0;
+  for (std::size_t first = 0; first < probes.size(); first += kProbesAtOnce) {
+    std::vector<WayBack> backs(std::min(kProbesAtOnce, probes.size() - first));
+    control.parallel_for(backs.size(), [&](std::size_t i) {
+      if (control.stop.stop_requested()) return;
+      const auto& [p_true_m, reading_m] = probes[first + i];
+      const Eigen::Vector3d back_m = subject.inverse_m(p_true_m);
+      backs[i] = {back_m, (subject.forward_m(back_m) - p_true_m).norm(), (back_m - reading_m).norm()};
+    });
+    if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
+    const auto n_lost =
+        std::count_if(backs.begin(), backs.end(), [&](const WayBack& back) { return !(back.off_m <= allowed_m); });
+    const auto worst = std::max_element(backs.begin(), backs.end(),
+                                        [](const WayBack& a, const WayBack& b) { return a.off_m < b.off_m; });
+    if (n_lost > 0)
+      return fail(ErrorCode::kUnsupported,
+                  "This correction folds back, so that nothing can be written true-to-measured: " +
+                      foldText(probes[first + static_cast<std::size_t>(worst - backs.begin())], *worst) +
+                      "; so it is at " + std::to_string(n_lost) + " of " + std::to_string(backs.size()) +
+                      " points of the region. Write it measured-to-true, or fit a smoother method or a smaller region");
+    for (const WayBack& back : backs) residual_m = std::max(residual_m, back.residual_m);
+    control.progress(kShareOfWayBack * static_cast<double>(first + backs.size()) / static_cast<double>(probes.size()));
+  }
+  return residual_m;
+}
+
 double deviationOf(const LatticeField& field, const LatticeForm& form, const std::vector<Probe>& probes) {
   const auto mapped_m = [&](const Eigen::Vector3d& p_m) -> std::optional<Eigen::Vector3d> {
     if (form.mapped_m) return form.mapped_m(field, p_m);
@@ -94,24 +178,7 @@ double deviationOf(const LatticeField& field, const LatticeForm& form, const std
 
 LatticePoints latticeAround(const ExportSubject& subject, const Eigen::Matrix3d& axes, const Eigen::Vector3d& pitch_m,
                             int padding, bool on_multiples) {
-  const Extent extent = extentOf(subject, axes);
-  LatticePoints points;
-  points.axes = axes;
-  points.pitch_m = pitch_m;
-  Eigen::Vector3d first_m;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double pitch = pitch_m[axis];
-    if (on_multiples) {
-      first_m[axis] = pitch * (std::floor(extent.low_m[axis] / pitch) - padding);
-    } else {
-      const double steps = std::ceil(extent.size_m()[axis] / pitch - 1e-9);
-      first_m[axis] = 0.5 * (extent.low_m[axis] + extent.high_m[axis] - steps * pitch) - padding * pitch;
-    }
-    points.counts[static_cast<std::size_t>(axis)] =
-        1 + padding + static_cast<int>(std::ceil((extent.high_m[axis] - first_m[axis]) / pitch - 1e-9));
-  }
-  points.origin_m = axes * first_m;
-  return points;
+  return latticeIn(extentOf(subject, axes), axes, pitch_m, padding, on_multiples);
 }
 
 Result<LatticeField> sampleField(const ExportSubject& subject, const LatticePoints& points, const LatticeForm& form,
@@ -181,13 +248,17 @@ Result<Written> writeLattice(const ExportSubject& subject, const ExportOptions& 
                 "This calibration holds nowhere: its places span no volume, so that no lattice "
                 "can be written; record places in several layers");
   const Eigen::Matrix3d axes = form.may_be_turned ? subject.rigAxes() : Eigen::Matrix3d::Identity();
-  const Extent extent = extentOf(subject, axes);
+  double inverse_residual_m = 0.0;
+  if (subject.isInverse()) {
+    FT_TRY(inverse_residual_m, inverseResidual_m(subject, probes, allowed_m, control));
+  }
+  const Extent extent = extentOf(subject, axes, probes);
   Eigen::Vector3d pitch_m = firstPitch_m(subject, extent, axes, probes, kKeptBelow * allowed_m, control);
   LatticeField field;
   double reached_m = HUGE_VAL;
   Eigen::Vector3d reached_pitch_m = pitch_m;
   for (int trial = 0; trial < kMostTrials && !(reached_m <= kKeptBelow * allowed_m); ++trial) {
-    const LatticePoints points = latticeAround(subject, axes, pitch_m, kPadding);
+    const LatticePoints points = latticeIn(extent, axes, pitch_m, kPadding, false);
     const double bytes =
         form.bytes_per_point * static_cast<double>(points.counts[0]) * points.counts[1] * points.counts[2];
     if (bytes > options.max_size_bytes) {
@@ -203,10 +274,14 @@ Result<Written> writeLattice(const ExportSubject& subject, const ExportOptions& 
     }
     FT_TRY(field, sampleField(subject, points, form, control));
     reached_m = deviationOf(field, form, probes);
+    if (!std::isfinite(reached_m))
+      return fail(
+          ErrorCode::kUnsupported,
+          "This calibration does not give a position everywhere in its region, so that no lattice can be written");
     reached_pitch_m = pitch_m;
     const double needed = std::sqrt(kKeptBelow * allowed_m / reached_m);
     if (needed < 1.0) pitch_m *= std::clamp(0.97 * needed, 0.5, 0.9);
-    control.progress(0.8 * (trial + 1) / kMostTrials);
+    control.progress(kShareOfWayBack + 0.7 * (trial + 1) / kMostTrials);
   }
   if (!(reached_m <= allowed_m))
     return fail(ErrorCode::kUnsupported, "A lattice of " + pitchText(reached_pitch_m) + " is still off by up to " +
@@ -218,12 +293,7 @@ Result<Written> writeLattice(const ExportSubject& subject, const ExportOptions& 
   facts.emplace_back("interpolation", "trilinear");
   facts.emplace_back("largest_deviation_um",
                      shortNumber(1e6 * reached_m) + " at " + std::to_string(probes.size()) + " points of the region");
-  if (subject.isInverse()) {
-    double residual_m = 0.0;
-    for (const auto& [p_m, goes_m] : probes)
-      residual_m = std::max(residual_m, (subject.forward_m(subject.inverse_m(p_m)) - p_m).norm());
-    facts.emplace_back("inverse_residual_um", shortNumber(1e6 * residual_m));
-  }
+  if (subject.isInverse()) facts.emplace_back("inverse_residual_um", shortNumber(1e6 * inverse_residual_m));
   facts.emplace_back("beyond",
                      "two steps of padding beyond the places and a quarter of their spacing; what lies there is "
                      "extrapolated");

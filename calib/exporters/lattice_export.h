@@ -21,9 +21,10 @@ struct LatticeForm {
 
 /// Chooses the pitch, samples, writes, reads the file back and compares it with the calibration at 10,000 points. The
 /// pitch along each axis follows the bend of the map along it; all are made finer together until the deviation at the
-/// points is four fifths of what is allowed. Beside the box of the places and the region's margin the lattice has two
-/// steps more.
-/// @error kUnsupported naming pitch and deviation where no lattice of the size allowed is near enough; kIo; kCancelled
+/// points is four fifths of what is allowed. Beside the box of the places, the region's margin and the points
+/// themselves the lattice has two steps more.
+/// @error kUnsupported naming pitch and deviation where no lattice of the size allowed is near enough, or, before
+///        anything is sampled, two readings where a map from true to measured cannot be; kIo; kCancelled
 Result<Written> writeLattice(const ExportSubject& subject, const ExportOptions& options,
                              const std::filesystem::path& path, const LatticeForm& form, const RunControl& control);
 
