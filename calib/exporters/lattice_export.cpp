@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "calib/core/number_text.h"
 
@@ -135,6 +136,24 @@ std::string foldText(const Probe& probe, const WayBack& back) {
   return "the readings " + reading + " and " + positionText(back.reading_m) + " are both corrected to " + at;
 }
 
+/// @error kUnsupported naming the worst point whose way back leads elsewhere
+Result<void> checkWaysBack(std::span<const Probe> probes, const std::vector<WayBack>& backs, double allowed_m) {
+  const auto isLost = [&](const WayBack& back) { return !(back.off_m <= allowed_m); };
+  const auto n_lost = std::count_if(backs.begin(), backs.end(), isLost);
+  if (n_lost == 0) return {};
+  // Two readings for one place say more than none.
+  const auto rank = [&](const WayBack& back) {
+    return std::pair(isLost(back) && back.residual_m <= kFound_m, back.off_m);
+  };
+  const auto worst = std::max_element(backs.begin(), backs.end(),
+                                      [&](const WayBack& a, const WayBack& b) { return rank(a) < rank(b); });
+  return fail(ErrorCode::kUnsupported,
+              "This correction folds back, so that nothing can be written true-to-measured: " +
+                  foldText(probes[static_cast<std::size_t>(worst - backs.begin())], *worst) + "; so it is at " +
+                  std::to_string(n_lost) + " of " + std::to_string(backs.size()) +
+                  " points of the region. Write it measured-to-true, or fit a smoother method or a smaller region");
+}
+
 /// How far the way there and back is off at most; the probes of a map from true to measured are turned round one block
 /// after the other, so that a map that cannot be is told within seconds.
 /// @error kUnsupported naming the worst point where a correction folds back; kCancelled
@@ -150,16 +169,7 @@ Result<double> inverseResidual_m(const ExportSubject& subject, const std::vector
       backs[i] = {back_m, (subject.forward_m(back_m) - p_true_m).norm(), (back_m - reading_m).norm()};
     });
     if (control.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
-    const auto n_lost =
-        std::count_if(backs.begin(), backs.end(), [&](const WayBack& back) { return !(back.off_m <= allowed_m); });
-    const auto worst = std::max_element(backs.begin(), backs.end(),
-                                        [](const WayBack& a, const WayBack& b) { return a.off_m < b.off_m; });
-    if (n_lost > 0)
-      return fail(ErrorCode::kUnsupported,
-                  "This correction folds back, so that nothing can be written true-to-measured: " +
-                      foldText(probes[first + static_cast<std::size_t>(worst - backs.begin())], *worst) +
-                      "; so it is at " + std::to_string(n_lost) + " of " + std::to_string(backs.size()) +
-                      " points of the region. Write it measured-to-true, or fit a smoother method or a smaller region");
+    FT_TRY_VOID(checkWaysBack(std::span(probes).subspan(first, backs.size()), backs, allowed_m));
     for (const WayBack& back : backs) residual_m = std::max(residual_m, back.residual_m);
     control.progress(kShareOfWayBack * static_cast<double>(first + backs.size()) / static_cast<double>(probes.size()));
   }

@@ -83,8 +83,8 @@ class InverseExportTest : public QObject {
     FT_VERIFY_OK(exportCalibration(nrrd, room, forwards, path, {}));
   }
 
-  /// x + 4 x^3 takes 0.44 m, which lies within a quarter of the spacing beyond the last place, to 0.781 m; the places go
-  /// to 0.656 m, their margin is 0.05 m and the two steps beside them 0.024 m each.
+  /// x + 4 x^3 takes 0.44 m, which lies within a quarter of the spacing beyond the last place, to 0.781 m; the places
+  /// go to 0.656 m, their margin is 0.05 m and the two steps beside them 0.024 m each.
   void aRoomThatStretchesBeyondItsPlacesIsWritten() {
     const calibration::Corrector room = cubicRoom("polynomial:degree=3", 4.0);
     QVERIFY(room.covers({0.44, 0.0, 0.0}));
