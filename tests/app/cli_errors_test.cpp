@@ -194,7 +194,8 @@ class CliErrorsTest : public QObject {
         << QByteArray(
                ", line 1: the header lacks the required columns x_m, y_m, z_m; it has x_mm, y_mm, z_mm, but a "
                "name must be the same to the letter: it fixes the unit\n");
-    QTest::newRow("semicolons") << (truth + "x_m,y_m,z_m\n").replace(',', ';') << QByteArray("separated by commas\n");
+    QTest::newRow("semicolons") << QByteArray("node;x_true_m;y_true_m;z_true_m;x_m;y_m;z_m\n0;0;0;0;0;0;0\n")
+                                << QByteArray("; its fields must be separated by commas\n");
     QTest::newRow("half an orientation") << truth + "x_m,y_m,z_m,qw,qx,qz\n0,0,0,0,1,2,3,1,0,0\n"
                                          << QByteArray("qy (qw, qx, qy, qz belong together: all or none)\n");
     QTest::newRow("text") << head + "0,0,0,0,0.1,left,0.3,1,0,0,0\n"
@@ -218,7 +219,6 @@ class CliErrorsTest : public QObject {
     QFETCH(QByteArray, table);
     QFETCH(QByteArray, told);
     QVERIFY(writeWhole(at("explained.csv"), table));
-    const auto fromName = [](const CliRun& run) { return run.err.mid(run.err.indexOf("explained.csv")); };
     const CliRun fit =
         runCli({"fit", "--nodes", at("explained.csv"), "--position", "affine", "--out", at("o.ftcal.json")});
     const CliRun apply =
@@ -226,7 +226,7 @@ class CliErrorsTest : public QObject {
     FT_VERIFY_STATUS(fit, 1);
     FT_VERIFY_STATUS(apply, 1);
     QVERIFY2(apply.err.contains(told), apply.err.constData());
-    QCOMPARE(fromName(apply), fromName(fit));
+    QVERIFY2(fit.err.contains(told), fit.err.constData());
     QVERIFY(!QFileInfo::exists(at("o.csv")));
   }
 
