@@ -1,6 +1,6 @@
-#include <QElapsedTimer>
 #include <QTemporaryDir>
 #include <QTest>
+#include <algorithm>
 #include <atomic>
 
 #include "calib/calibration/alignment.h"
@@ -59,24 +59,20 @@ class InverseExportTest : public QObject {
   void aRoomThatFoldsBackIsToldAtOnce() {
     QFETCH(QString, method);
     const calibration::Corrector room = cubicRoom(method.toStdString(), -4.0);
-    const calibration::Corrector plain = cubicRoom(method.toStdString(), 0.5);
     QTemporaryDir folder;
     const Exporter& nrrd = *findExporter("itk_nrrd").value();
     const std::filesystem::path path = folder.path().toStdString() + "/room.nrrd";
-    QElapsedTimer timer;
-    timer.start();
-    FT_VERIFY_OK(exportCalibration(nrrd, plain, backwards(1e-3), path, {}));
-    const qint64 plain_ms = timer.restart();
-    std::filesystem::remove(path);
-    const auto written = exportCalibration(nrrd, room, backwards(1e-3), path, {});
-    const qint64 folded_ms = timer.elapsed();
+    double farthest = 0.0;
+    RunControl control;
+    control.progress = [&](double fraction) { farthest = std::max(farthest, fraction); };
+    const auto written = exportCalibration(nrrd, room, backwards(1e-3), path, control);
     QVERIFY(!written);
+    QVERIFY2(farthest < 0.1, "told before all ways back were tried, and before anything was sampled");
     QCOMPARE(written.error().code, ErrorCode::kUnsupported);
     FT_VERIFY_MATCH(holdsAll(written.error().message,
                              {"folds back", "are both corrected to", "points of the region", "measured-to-true"}));
     QVERIFY2(written.error().message.find("n/a") == std::string::npos, written.error().message.c_str());
     QVERIFY(!std::filesystem::exists(path));
-    QVERIFY2(folded_ms < 3 * plain_ms + 2000, qPrintable(QString("%1 ms, %2 ms").arg(folded_ms).arg(plain_ms)));
     // Forwards it is a map like any other.
     ExportOptions forwards;
     forwards.max_deviation_m = 5e-3;
