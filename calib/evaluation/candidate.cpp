@@ -71,11 +71,12 @@ FittedCandidate fittedCandidate(std::unique_ptr<Model> owned) {
 }
 
 template <class Model>
-FitWithout fitWithout(std::unique_ptr<correctors::HoldOutFits<Model>> owned) {
+FitsWithout fitsWithout(std::unique_ptr<correctors::HoldOutFits<Model>> owned) {
   const std::shared_ptr<const correctors::HoldOutFits<Model>> fits = std::move(owned);
-  return [fits](std::span<const std::size_t> rows, const Pose& fold_from_data) {
-    return fits->without(rows, fold_from_data).map(fittedCandidate<Model>);
-  };
+  return {[fits](std::span<const std::size_t> rows, const Pose& fold_from_data) {
+            return fits->without(rows, fold_from_data).map(fittedCandidate<Model>);
+          },
+          fits->ownVariance()};
 }
 
 template <class Model>
@@ -88,7 +89,7 @@ Candidate makeCandidate(const correctors::CorrectionMethod<Model>& method, Setti
   candidate.is_tuned = method.tunes(settings);
   if (method.holdsOutExactly(settings) || (method.hold_out && candidate.is_tuned))
     candidate.hold_out = [&method, settings](const correctors::FitData& data, const RunControl& control) {
-      return method.hold_out(data, settings, control).map(fitWithout<Model>);
+      return method.hold_out(data, settings, control).map(fitsWithout<Model>);
     };
   candidate.holds_out = [&method, settings](const correctors::FitData& data) {
     return method.canHoldOut(data, settings);

@@ -28,8 +28,10 @@ struct FittedCandidate {
 };
 
 /// Fits of one candidate that leave rows out. @see HoldOutFits
-using FitWithout =
-    std::function<Result<FittedCandidate>(std::span<const std::size_t> rows, const Pose& fold_from_data)>;
+struct FitsWithout {
+  std::function<Result<FittedCandidate>(std::span<const std::size_t> rows, const Pose& fold_from_data)> fit;
+  double own_variance = 0.0;
+};
 
 /// A method with its settings, of either kind.
 struct Candidate {
@@ -37,7 +39,7 @@ struct Candidate {
   Settings settings;
   bool is_position = true;
   std::function<Result<FittedCandidate>(const correctors::FitData&, const RunControl&)> fit;
-  std::function<Result<FitWithout>(const correctors::FitData&, const RunControl&)>
+  std::function<Result<FitsWithout>(const correctors::FitData&, const RunControl&)>
       hold_out;                                               ///< Empty without a closed form.
   std::function<bool(const correctors::FitData&)> holds_out;  ///< Whether there is one for such data; with hold_out.
   bool is_costly = false;                                     ///< Held out in ten folds at most.

@@ -40,7 +40,9 @@ MethodScore methodScore(const Candidate& candidate, CandidateScores scores, cons
   score.settings = candidate.settings;
   score.skipped = std::move(scores.skipped);
   if (score.skipped) return score;
-  score.freedom = {scores.coefficients_a_place, candidate.is_tuned};
+  score.freedom = {.coefficients_a_place = scores.coefficients_a_place,
+                   .is_tuned = candidate.is_tuned,
+                   .own_variance = scores.own_variance};
   score.sensors = scoresBySensor(scored, scores.held_out, score.freedom);
   score.freedom.positions_a_place = comparison.positions_a_place;
   PlaceScores held_out = gatherByPlace(comparison.places, scored, scores.held_out);

@@ -86,12 +86,13 @@ void refit(Run& run, std::size_t i, std::size_t k, const Fold& fold, const corre
 void runClosedForm(Run& run, std::size_t i, ProgressMeter& meter, double share) {
   const auto fits = run.job.candidates[i].hold_out(run.all_data, run.inner());
   run.scores.candidates[i].closed_form = fits.has_value();
+  if (fits) run.scores.candidates[i].own_variance = fits->own_variance;
   const Pose tracker_from_all = run.all_alignment.reference_from_tracker;
   for (std::size_t k = 0; k < run.job.folds.size() && !run.stopped(); ++k) {
     const Fold& fold = run.job.folds[k];
     const calibration::Alignment& alignment = run.fold_alignments[k];
     if (fits) {
-      const auto model = (*fits)(leftOut(fold), inverse(alignment.reference_from_tracker) * tracker_from_all);
+      const auto model = fits->fit(leftOut(fold), inverse(alignment.reference_from_tracker) * tracker_from_all);
       if (model)
         keepScores(run, i, fold, alignment, *model);
       else

@@ -22,6 +22,7 @@ struct CandidateScores {
   int n_folds = 0;
   bool closed_form = false;
   double coefficients_a_place = 0.0;  ///< @see FitFreedom
+  double own_variance = 0.0;          ///< @see HoldOutFits
   double fit_s = 0.0;
   double eval_ns = 0.0;
   double in_sample_rms = 0.0;

@@ -30,6 +30,10 @@ class HoldOutFits {
   /// @error kDegenerate when the rest does not determine the method
   virtual Result<std::unique_ptr<Model>> without(std::span<const std::size_t> rows,
                                                  const Pose& fold_from_data) const = 0;
+
+  /// How much the fit itself varies with the places of its table: variance of the logarithm of the mean square that it
+  /// leaves at fresh places, from table to table. 0 where the form does not tell.
+  virtual double ownVariance() const { return 0.0; }
 };
 
 /// Where a method comes from. Baselines are looked at beside all others.

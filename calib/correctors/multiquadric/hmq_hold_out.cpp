@@ -36,6 +36,23 @@ class HmqHoldOut : public HoldOutFits<PositionModel> {
         .map([&](MultiquadricField field) { return modelOf(std::move(field)); });
   }
 
+  /// The jackknife over places: by how much the squares left at all others grow as a place is left out with each.
+  double ownVariance() const override {
+    const Eigen::ArrayXd diagonal = inverse_.diagonal();
+    const Eigen::ArrayX3d alpha = alpha_.leftCols<3>();
+    const Eigen::ArrayXd squares = (alpha.colwise() / diagonal).square().rowwise().sum();
+    Eigen::ArrayXd grown(squares.size());
+    for (Eigen::Index j = 0; j < squares.size(); ++j) {
+      const Eigen::ArrayXd column = inverse_.col(j);
+      const Eigen::ArrayX3d numerators = diagonal[j] * alpha - (column.matrix() * alpha.row(j).matrix()).array();
+      Eigen::ArrayXd without_both =
+          (numerators.colwise() / (diagonal * diagonal[j] - column.square())).square().rowwise().sum();
+      without_both[j] = squares[j];
+      grown[j] = without_both.sum() - squares.sum();
+    }
+    return squares.sum() > 0.0 ? (grown - grown.mean()).square().sum() / (squares.sum() * squares.sum()) : 0.0;
+  }
+
  private:
   std::unique_ptr<PositionModel> modelOf(MultiquadricField field) const {
     return std::make_unique<HmqPosition>(std::move(field), problem_.r2.note);

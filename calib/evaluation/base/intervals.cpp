@@ -19,6 +19,8 @@ constexpr double kLeastGain = 1.75;
 /// How much farther than t the upper end of a mean square lies, and both ends of a difference, in 1/sqrt(n_e).
 constexpr double kAbove = 1.2;
 constexpr double kAround = 1.4;
+/// 95 % point of the normal distribution.
+constexpr double kNormalPoint95 = 1.645;
 
 double sumOfSquares(std::span<const double> values) {
   return std::inner_product(values.begin(), values.end(), values.begin(), 0.0);
@@ -84,6 +86,12 @@ double sdOfMean(std::span<const double> values, const FitFreedom& freedom) {
   return widening * std::sqrt(sampleVariance(values) / freePlaces(values.size(), freedom));
 }
 
+/// How far the logarithm of a mean square may be off at least, where the fit itself varies.
+/// @param sd of the logarithm, from how the places differ
+double ownReach(double sd, const FitFreedom& freedom) {
+  return freedom.own_variance > 0.0 ? kNormalPoint95 * std::sqrt(sd * sd + freedom.own_variance) : 0.0;
+}
+
 double covariance(std::span<const double> a, std::span<const double> b) {
   std::vector<double> sum(a.size());
   std::transform(a.begin(), a.end(), b.begin(), sum.begin(), std::plus<>());
@@ -117,7 +125,9 @@ Interval rmsInterval90(std::span<const double> errors, const FitFreedom& freedom
   const std::vector<double> relative = relativeSquares(errors);
   const double sd = sdOfMean(relative, freedom);
   const Reach reach = reach90(relative, freedom);
-  return {rms * std::exp(-0.5 * reach.t * sd), rms * std::exp(0.5 * reach.beyond(kAbove) * sd)};
+  const double least = ownReach(sd, freedom);
+  return {rms * std::exp(-0.5 * std::max(reach.t * sd, least)),
+          rms * std::exp(0.5 * std::max(reach.beyond(kAbove) * sd, least))};
 }
 
 PairedGain pairedGain(std::span<const double> before, std::span<const double> after, const FitFreedom& freedom) {
@@ -130,8 +140,10 @@ PairedGain pairedGain(std::span<const double> before, std::span<const double> af
   const double n_free = freePlaces(before.size(), freedom);
   const double reach = kLeastGain * studentPoint95(n_free - 1.0);
   const double in_places = reach * (freedom.is_tuned ? kTuned : 1.0) / std::sqrt(n_free);
-  const double most = std::min(fiellerRatio(of_after, of_before, in_places).value_or(HUGE_VAL), std::exp(reach * sd));
-  const double least = std::exp(-reach90(relative, freedom).beyond(kAbove) * sd);
+  const double own = ownReach(sd, freedom);
+  const double most = std::max(
+      std::min(fiellerRatio(of_after, of_before, in_places).value_or(HUGE_VAL), std::exp(reach * sd)), std::exp(own));
+  const double least = std::exp(-std::max(reach90(relative, freedom).beyond(kAbove) * sd, own));
   return {gain, 1.0 - (1.0 - gain) * std::sqrt(most), 1.0 - (1.0 - gain) * std::sqrt(least)};
 }
 

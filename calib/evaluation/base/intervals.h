@@ -15,8 +15,9 @@ namespace fieldtrue::evaluation {
 ///   t   = 95 % point of Student's t with max(1, n_e / 2) degrees of freedom
 ///   log mean square: from -t c/sqrt(m) to +t c/sqrt(m) (1 + 1.2/sqrt(n_e))
 ///
-/// c/sqrt(m) is widened by 1.3 for a tuned method, whose choices vary with the places too. What it covers:
-/// tests/studies/interval_coverage.py.
+/// c/sqrt(m) is widened by 1.3 for a tuned method, whose choices vary with the places too. Where it is known by how
+/// much the fit itself varies (`own_variance`), either end is at least 1.645 sqrt(c^2/m + own_variance) away. What it
+/// covers: tests/studies/interval_coverage.py.
 /// @source effective number: Kish 1965, section 11.7; logarithm by the delta method; 1.2 and 1.3 from the study
 struct Interval {
   double low = 0.0;
@@ -34,6 +35,7 @@ struct FitFreedom {
   double coefficients_a_place = 0.0;  ///< Coefficients an axis over places fitted; at most 1. @see PositionModel
   bool is_tuned = false;              ///< @see CorrectionMethod::tunes
   double positions_a_place = 1.0;     ///< Below 1 where places of several sensors share true positions.
+  double own_variance = 0.0;          ///< @see HoldOutFits::ownVariance
 };
 
 /// 90 % interval of the RMS of places' errors; not a number for one place, which tells nothing of others.
@@ -44,8 +46,8 @@ Interval rmsInterval90(std::span<const double> errors, const FitFreedom& freedom
 /// squares is at least that seen times exp(-t c / sqrt(m) (1 + 1.2/sqrt(n_e))). It is at most the largest r for which
 /// mean(after^2 - r before^2) lies within T of zero, in its SDs, where T is 1.75 times the 95 % point of Student's t of
 /// m - 1 degrees, and no more than that seen times exp(T c / sqrt(m)): Fieller's r grows without bound where few places
-/// carry the error before. c is widened by 1.3 for a tuned method, and for Fieller's r T is. Of one place the ends are
-/// not numbers.
+/// carry the error before. c is widened by 1.3 for a tuned method, and for Fieller's r T is; what the fit's own
+/// variance asks for is as above. Of one place the ends are not numbers.
 /// @source Fieller 1954 for the second
 struct PairedGain {
   double gain = 0.0;

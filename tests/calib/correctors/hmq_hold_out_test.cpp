@@ -1,7 +1,9 @@
 #include <QElapsedTimer>
 #include <QTest>
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "calib/core/pose.h"
 #include "calib/correctors/base/method.h"
@@ -108,6 +110,29 @@ class HmqHoldOutTest : public QObject {
     FT_VERIFY_OK(without);
     QVERIFY((*without)->parameters().at("r2_m2") == (*all)->parameters().at("r2_m2"));
     QVERIFY((*without)->parameters().at("centers_m").size() == data.size() - 1);
+  }
+
+  /// By how much the squares left at all others grow as each place is left out with them, from fits anew to the rest.
+  void variesAsFitsWithoutEachPairDo() {
+    const FitData data = fitDataOf(shakenGrid({4, 3, 3}, 0.2, 0.02), wave_m);
+    const auto squareAt = [&](std::size_t at, const std::vector<std::size_t>& left_out) {
+      const auto fit = fitPosition("hmq", rest(data, left_out, Pose())).value();
+      const Eigen::Vector3d& p_m = data.p_tracked_m[at];
+      return (p_m + fit->displacement_m(p_m) - data.p_true_m[at]).squaredNorm();
+    };
+    std::vector<double> alone, grown;
+    for (std::size_t i = 0; i < data.size(); ++i) alone.push_back(squareAt(i, {i}));
+    for (std::size_t j = 0; j < data.size(); ++j) {
+      grown.push_back(0.0);
+      for (std::size_t i = 0; i < data.size(); ++i)
+        if (i != j) grown.back() += squareAt(i, {i, j}) - alone[i];
+    }
+    const double mean = std::accumulate(grown.begin(), grown.end(), 0.0) / static_cast<double>(grown.size());
+    const double sum = std::accumulate(alone.begin(), alone.end(), 0.0);
+    double variance = 0.0;
+    for (const double one : grown) variance += std::pow((one - mean) / sum, 2);
+    QVERIFY(variance > 0.01);
+    FT_VERIFY_MATCH(near(holdOut(data)->ownVariance(), variance, 1e-5 * variance));
   }
 
   void aRestOnOneLineIsRefused() {

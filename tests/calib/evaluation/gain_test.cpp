@@ -83,6 +83,22 @@ class GainTestTest : public QObject {
     FT_VERIFY_MATCH(near(difference.low90, -3.0 - 0.5 * t_sd * 1.7, 1e-6));
   }
 
+  /// The errors of intervalByHand, of a fit whose own variance is three times that of their mean square: 1.644854, the
+  /// 95 % point of the normal distribution by the tables, times twice its SD is farther than t below (2.92), not above
+  /// (2.92 times 1.6). A fit that varies by as much as no place does leaves the interval as it was.
+  void aFitThatVariesItselfIsWiderKnown() {
+    std::vector<double> errors;
+    for (int i = 0; i < 8; ++i) errors.push_back(std::sqrt(1.0 + (i % 2 == 0 ? 1.0 : -1.0) * std::sqrt(7.0 / 8.0)));
+    const double sd = 1.0 / std::sqrt(8.0);
+    const ErrorStats stats = errorStats(errors, {.own_variance = 3.0 / 8.0});
+    FT_VERIFY_MATCH(near(stats.rms_low90, std::exp(-0.5 * 2.0 * 1.644854 * sd), 1e-4));
+    FT_VERIFY_MATCH(near(stats.rms_high90, std::exp(0.5 * 1.6 * 2.919986 * sd), 1e-6));
+    const GainTest gain = testGain(numbered(8), std::vector<double>(8, 4.0), errors, {.own_variance = 15.0 / 8.0});
+    FT_VERIFY_MATCH(near(gain.low90, 1.0 - 0.25 * std::exp(0.5 * 4.0 * 1.644854 * sd), 1e-4));
+    FT_VERIFY_MATCH(near(gain.high90, 1.0 - 0.25 * std::exp(-0.5 * 4.0 * 1.644854 * sd), 1e-4));
+    QCOMPARE(errorStats(errors, {.own_variance = 0.01 / 8.0}).rms_low90, errorStats(errors).rms_low90);
+  }
+
   /// Where both vary: at its low end the gain is just within reach of the paired differences there.
   void lowGainIsFiellers() {
     const std::vector<double> before = {9, 7, 8, 11, 6, 10, 8, 9, 12, 7, 9, 8},
