@@ -18,6 +18,7 @@ ONE_ROOM = ("--rooms", "clean")
 # Script, its arguments, and how many rows of its table hold figures.
 RUNS = [("interval_coverage.py", ("--places", "30", *ONE_ROOM), 12),
         ("uncertainty_coverage.py", ("--places", "60", "--methods", "gaussian_process", *ONE_ROOM), 2),
+        ("multiquadric_spread.py", ("--places", "30", *ONE_ROOM), 2),
         ("automatic_choice.py", ("--places", "40", *ONE_ROOM), 2),
         ("physics_gain.py", ("--places", "30"), 6)]
 
