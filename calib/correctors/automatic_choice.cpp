@@ -15,7 +15,7 @@ namespace fieldtrue::correctors {
 namespace {
 
 constexpr std::size_t kFolds = 5;
-constexpr double kDroppedFrom = 2.0;  ///< Standard errors.
+constexpr double kClearlyWorse = 2.0;  ///< Standard errors.
 constexpr std::size_t kPlacesForFolds = 20;
 constexpr double kLeastGain = 0.05;
 constexpr double kOneSided95 = 1.645;
@@ -72,6 +72,27 @@ double pointsTheRightWay(const InnerScore& score, const InnerScore& other) {
   return variance > 0.0 ? sum / std::sqrt(variance) : 0.0;
 }
 
+/// At how many places, and by how much, one candidate errs less than another, in SDs of chance: Wilcoxon's signed ranks
+/// of the squares' differences, weighted by what each place stands for. A few places that carry the squares carry it no
+/// further than others.
+/// @source Wilcoxon 1945, "Individual comparisons by ranking methods"
+double errsLessMostly(const InnerScore& score, const InnerScore& other) {
+  std::vector<std::size_t> order(score.squares_m2.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto gain_m2 = [&](std::size_t place) { return other.squares_m2[place] - score.squares_m2[place]; };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return std::abs(gain_m2(a)) < std::abs(gain_m2(b)); });
+  double sum = 0.0, variance = 0.0;
+  for (std::size_t rank = 0; rank < order.size(); ++rank) {
+    const double gain = gain_m2(order[rank]);
+    if (gain == 0.0) continue;
+    const double weight = static_cast<double>(rank + 1) * score.shareOf(order[rank]);
+    sum += gain > 0.0 ? weight : -weight;
+    variance += weight * weight;
+  }
+  return variance > 0.0 ? sum / std::sqrt(variance) : 0.0;
+}
+
 using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const std::vector<std::size_t>& held_out)>;
 
 /// How a candidate's models without some rows are made: downdated from one fit, or fitted anew where a fit is tuned.
@@ -93,7 +114,7 @@ Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData&
 /// On the places scored so far.
 bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
   const PairedDifference excess(score, best);
-  return excess.mean > 0.0 && excess.mean > kDroppedFrom * excess.standard_error;
+  return excess.mean > 0.0 && excess.mean > kClearlyWorse * excess.standard_error;
 }
 
 /// RMS over the places alike, whatever part of the region each stands for.
@@ -102,13 +123,13 @@ double rmsOfPlaces_m(const InnerScore& score) {
   return std::sqrt(sum_m2 / static_cast<double>(score.squares_m2.size()));
 }
 
-/// Whether a candidate is better than correcting nothing: by its RMS over the region and over the places alike (those
-/// at the edge stand for little of the region, and err most), and by more than chance.
+/// Whether a candidate is better than correcting nothing: by its RMS over the region, no worse over the places alike
+/// (those at the edge stand for little of the region, and err most), and by more than chance.
 bool isWorthIt(const InnerScore& score, const InnerScore& none) {
   const PairedDifference gain(none, score);
-  const bool is_clear = gain.mean > kOneSided95 * gain.standard_error || pointsTheRightWay(score, none) > kOneSided99;
-  return is_clear && score.rms_m() <= (1.0 - kLeastGain) * none.rms_m() &&
-         rmsOfPlaces_m(score) <= (1.0 - kLeastGain) * rmsOfPlaces_m(none);
+  const bool is_clear = gain.mean > kOneSided95 * gain.standard_error || pointsTheRightWay(score, none) > kOneSided99 ||
+                        errsLessMostly(score, none) > kOneSided99;
+  return is_clear && score.rms_m() <= (1.0 - kLeastGain) * none.rms_m() && rmsOfPlaces_m(score) <= rmsOfPlaces_m(none);
 }
 
 InnerScore skippedScore(std::string why) {
@@ -252,10 +273,12 @@ std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, c
   for (std::size_t i = 1; i < scores.size(); ++i) {
     if (scores[i].skipped) continue;
     const PairedDifference excess(scores[i], scores[best]);
-    if (excess.mean > excess.standard_error) continue;
     const bool is_simpler = candidates[i].complexity < candidates[chosen].complexity;
     const bool is_as_simple = candidates[i].complexity == candidates[chosen].complexity;
-    if (is_simpler || (is_as_simple && PairedDifference(scores[i], scores[chosen]).mean < 0.0)) chosen = i;
+    if (is_simpler && excess.mean <= excess.standard_error) chosen = i;
+    if (is_as_simple && excess.mean <= kClearlyWorse * excess.standard_error &&
+        errsLessMostly(scores[i], scores[chosen]) > 0.0)
+      chosen = i;
   }
   if (isWorthIt(scores[chosen], scores.front())) return chosen;
   return isWorthIt(scores[best], scores.front()) ? best : 0;

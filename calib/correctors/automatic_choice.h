@@ -70,10 +70,12 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
                                                 const InnerFolds& folds, const RunControl& control);
 
 /// The simplest candidate that corrects at all and whose mean squared error exceeds the least by no more than one
-/// standard error of the difference, the better one among equally simple ones. None, which must be the first, where
-/// neither that one nor the best lowers its RMS by 5 % at least and clearly: its mean square by 1.645 standard errors
-/// (one-sided 95 %), or, where a few places carry the squares, by corrections that point to where the places left out
-/// err, by 2.326 SDs of the mean cosine of directions that know nothing (one-sided 99 %).
+/// standard error of the difference. Among equally simple ones that the squares do not tell apart by two, the one that
+/// errs less at most places, by signed ranks: a few places carry the squares. None, which must be the first, where
+/// neither that one nor the one of least square lowers its RMS by 5 % at least and clearly: its mean square by 1.645
+/// standard errors (one-sided 95 %), or, where a few places carry the squares, by corrections that point to where the
+/// places left out err, by 2.326 SDs of the mean cosine of directions that know nothing (one-sided 99 %), or by signed
+/// ranks, by as many SDs.
 /// @source the one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984, section 3.4.3
 std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores);
 
