@@ -218,12 +218,12 @@ class CorrectorFileTest : public QObject {
                   }),
         ErrorCode::kBadInput, "unit quaternion");
     row("other units", rewritten(text, [](json& j) { j["units"] = "mm, deg"; }), ErrorCode::kBadInput,
-        "units is \"mm, deg\"; it must be \"m, rad; quaternions w x y z\"");
+        "units is the text \"mm, deg\"; it must be \"m, rad; quaternions w x y z\"");
     row("no units", rewritten(text, [](json& j) { j.erase("units"); }), ErrorCode::kBadInput, "units is missing");
     row("other direction", rewritten(text, [](json& j) { j["direction"] = "true -> tracked"; }), ErrorCode::kBadInput,
-        "direction is \"true -> tracked\"; it must be \"tracker_from_sensor as tracked ->");
+        "direction is the text \"true -> tracked\"; it must be \"tracker_from_sensor as tracked ->");
     row("inputs of another file", rewritten(text, [](json& j) { j["inputs"] = "pose"; }), ErrorCode::kBadInput,
-        "inputs is \"pose\"; it must be \"position\", which its position part takes");
+        "inputs is the text \"pose\"; it must be \"position\", which its position part takes");
     row("no inputs", rewritten(text, [](json& j) { j["inputs"] = "voltages"; }), ErrorCode::kBadInput, "voltages");
     row("unknown key", rewritten(text, [](json& j) { j["by_sensr"] = json::object(); }), ErrorCode::kBadInput,
         "by_sensr is not known; did you mean by_sensor?");
