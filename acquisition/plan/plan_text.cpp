@@ -152,7 +152,7 @@ Result<Plan> planFromText(const std::string& text) {
 
 }  // namespace
 
-Result<void> checkPlanSize(const Plan& plan, const std::string& name) {
+std::int64_t stopsOf(const Plan& plan) {
   std::int64_t stops = plan.explicit_places.empty() ? static_cast<std::int64_t>(plan.counts[0]) * plan.counts[1]
                                                     : static_cast<std::int64_t>(plan.explicit_places.size());
   // Counts are at most 1e5 each, so the first product cannot overflow; the others are stopped at the limit.
@@ -160,7 +160,11 @@ Result<void> checkPlanSize(const Plan& plan, const std::string& name) {
   for (const std::int64_t factor : {levels, static_cast<std::int64_t>(plan.orientations), std::int64_t{plan.reseat}}) {
     if (stops <= kMaxPlaces) stops *= factor;
   }
-  if (stops > kMaxPlaces) {
+  return stops;
+}
+
+Result<void> checkPlanSize(const Plan& plan, const std::string& name) {
+  if (stopsOf(plan) > kMaxPlaces) {
     return fail(ErrorCode::kBadInput,
                 name + ": more than " + std::to_string(kMaxPlaces) + " stops; use a wider pitch or fewer visits");
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <charconv>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,6 +23,9 @@ std::optional<Number> parseNumber(std::string_view text) {
 
 /// Reads `NXxNYxNZ@PX[xPYxPZ]` into counts and pitch. @error kBadInput
 Result<void> readGridText(std::string_view text, Plan& plan);
+
+/// Places times visits; beyond kMaxPlaces only that it is beyond.
+std::int64_t stopsOf(const Plan& plan);
 
 /// @param name stands in the message
 /// @error kBadInput when the plan has more stops than kMaxPlaces

@@ -240,7 +240,7 @@ class CliErrorsTest : public QObject {
     QVERIFY(readWhole(at("trusted.csv")).contains("\n# setup.room: Lab 2\n0.1,0.1,0.1,"));
   }
 
-  /// Rows come out while more are still to come: a pipe may hold more than the memory does.
+  /// More rows than are corrected together, from what cannot be read twice.
   void applyReadsFromAPipe() {
     QProcess shell;
     shell.start("/bin/sh", {"-c",

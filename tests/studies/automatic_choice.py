@@ -9,7 +9,6 @@ table a line, of the places in the region that the calibration states: the RMS b
 method that errs least there, with RMS(auto) / RMS(best); the last also over the whole box, of which a few places scattered in
 it leave a part outside. Then median and largest of the ratios, and how often `auto` is worse than no correction.
 """
-import argparse
 import json
 import math
 import multiprocessing
@@ -19,7 +18,7 @@ import statistics
 import sys
 import tempfile
 
-from interval_coverage import Misplacing, POOL, drawn_table, fresh_squares_m2, record, write
+from interval_coverage import Misplacing, POOL, drawn_table, fresh_squares_m2, parser_of, record, write
 
 METHODS = ("none", "affine", "polynomial:degree=2", "polynomial:degree=3", "polynomial:degree=4", "hmq", "rbf",
            "rbf:kernel=thin_plate", "bspline", "gaussian_process", "harmonic_field", "tetrahedral")
@@ -63,14 +62,7 @@ def cell(job):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("cli")
-    parser.add_argument("rooms_folder")
-    parser.add_argument("--tables", type=int, default=5)
-    parser.add_argument("--places", default="40,60,120")
-    parser.add_argument("--rooms", default="clean,steel_floor,steel_bar,two_bodies,copper_loop,mixed")
-    parser.add_argument("--processes", type=int, default=os.cpu_count())
-    given = parser.parse_args()
+    given = parser_of(__doc__, 5, "40,60,120").parse_args()
     jobs = [(given.cli, given.rooms_folder, room, heavy, n_places, given.tables) for n_places in map(int, given.places.split(","))
             for room in given.rooms.split(",") for heavy in (False, True)]
     ratios = {"in the stated region": [], "everywhere": []}

@@ -28,6 +28,7 @@ import tempfile
 import typing
 
 EXTENT_M = (2.44, 2.44, 1.83)  # Of the rooms' grid.
+ALL_ROOMS = "clean,steel_floor,steel_bar,two_bodies,copper_loop,mixed"
 POOL = 9000
 # All tables share what the pool and the fresh places err by: a fifth of what a table errs by.
 POOL_A_PLACE = 60
@@ -216,6 +217,18 @@ def holding(tables):
     return held
 
 
+def parser_of(description, tables, places, rooms=ALL_ROOMS):
+    """The words that every study on the rooms takes, with its own defaults."""
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("cli")
+    parser.add_argument("rooms_folder")
+    parser.add_argument("--tables", type=int, default=tables)
+    parser.add_argument("--places", default=places)
+    parser.add_argument("--rooms", default=rooms)
+    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    return parser
+
+
 def cells_of(given, keep):
     return [Cell(given.cli, given.rooms_folder, room, heavy, n_places, given.tables, tuned, keep, given.again)
             for n_places in map(int, given.places.split(",")) for tuned in ((False, True) if n_places == 60 else (False,))
@@ -223,13 +236,7 @@ def cells_of(given, keep):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("cli")
-    parser.add_argument("rooms_folder")
-    parser.add_argument("--tables", type=int, default=400)
-    parser.add_argument("--places", default="30,60,120,567")
-    parser.add_argument("--rooms", default="steel_floor,mixed")
-    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser = parser_of(__doc__, 400, "30,60,120,567", "steel_floor,mixed")
     parser.add_argument("--keep", help="folder of a line a table; a run that was ended goes on from there")
     parser.add_argument("--again", action="store_true",
                         help="judge kept tables anew: the intervals have changed, the fits have not")

@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
 """How much a multiquadric varies with its places, what pairs of places left out tell of that, and what its interval holds.
 
-multiquadric_spread.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 30,60,120,567] [--rooms a,b]
+multiquadric_spread.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 30,60,120,567] [--rooms a,b] [--processes N]
 
 Readings come from rooms as in interval_coverage.py; everything else, Hardy's interpolation, its errors at places left
 out, the jackknife over places and the interval, is written here once more, on numpy. A line a cell: SD over tables of the
 logarithm of the mean square at fresh places and of that at places left out, their correlation, the SD that the jackknife
 gives in the median table, and the share of tables whose 90 % interval holds the truth without it and with it.
 """
-import argparse
 import math
+import multiprocessing
 import random
 import tempfile
 
 import numpy
 from scipy.stats import t as student
 
-from interval_coverage import COLUMNS, FRESH_A_PLACE, FEWEST_FRESH, Misplacing, POOL, POOL_A_PLACE, record
+from interval_coverage import COLUMNS, FRESH_A_PLACE, FEWEST_FRESH, Misplacing, POOL, POOL_A_PLACE, parser_of, record
 
 R2_M2 = 0.01
 NORMAL_POINT_95 = 1.645
@@ -64,7 +64,9 @@ class Table:
         return -max(reach, least) <= off <= max(reach * (1 + 1.2 / math.sqrt(carrying)), least)
 
 
-def cell(cli, rooms, room, heavy, n_places, n_tables):
+def cell(job):
+    """A line of the table."""
+    cli, rooms, room, heavy, n_places, n_tables = job
     n_pool, n_fresh = max(POOL, POOL_A_PLACE * n_places), max(FEWEST_FRESH, FRESH_A_PLACE * n_places)
     with tempfile.TemporaryDirectory() as folder:
         _, rows = record(cli, rooms, room, folder, n_fresh, n_pool)
@@ -82,25 +84,19 @@ def cell(cli, rooms, room, heavy, n_places, n_tables):
     held = [[table.holds(misplaced, own * table.own_variance) for table in tables] for own in (0, 1)]
     told = math.sqrt(numpy.median([table.own_variance for table in tables]))
     alike = numpy.corrcoef(truths, seen)[0, 1] if n_tables > 1 else 0
-    print(f"| {n_places} | {room} | {'gross slips' if heavy else 'calm'} | {n_tables} | {truths.std():.2f} | {seen.std():.2f} | "
-          f"{alike:.2f} | {told:.2f} | {numpy.mean(held[0]):.3f} | {numpy.mean(held[1]):.3f} |", flush=True)
+    return (f"| {n_places} | {room} | {'gross slips' if heavy else 'calm'} | {n_tables} | {truths.std():.2f} | {seen.std():.2f} | "
+            f"{alike:.2f} | {told:.2f} | {numpy.mean(held[0]):.3f} | {numpy.mean(held[1]):.3f} |")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("cli")
-    parser.add_argument("rooms_folder")
-    parser.add_argument("--tables", type=int, default=200)
-    parser.add_argument("--places", default="30,60,120,567")
-    parser.add_argument("--rooms", default="steel_floor,mixed")
-    parser.add_argument("--processes", type=int, default=1, help="as the other studies have it; here always one")
-    given = parser.parse_args()
+    given = parser_of(__doc__, 200, "30,60,120,567", "steel_floor,mixed").parse_args()
+    jobs = [(given.cli, given.rooms_folder, room, heavy, n_places, given.tables) for n_places in map(int, given.places.split(","))
+            for room in given.rooms.split(",") for heavy in (False, True)]
     print("| places | room | placing | tables | SD of the truth | of places left out | correlation | by the jackknife | held without it "
           "| with it |\n|---|---|---|---|---|---|---|---|---|---|")
-    for n_places in map(int, given.places.split(",")):
-        for room in given.rooms.split(","):
-            for heavy in (False, True):
-                cell(given.cli, given.rooms_folder, room, heavy, n_places, given.tables)
+    with multiprocessing.Pool(given.processes) as pool:
+        for line in pool.imap(cell, jobs):
+            print(line, flush=True)
 
 
 if __name__ == "__main__":

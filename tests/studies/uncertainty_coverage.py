@@ -9,7 +9,6 @@ variances of the three axes, so were they alike and Gaussian nine errors in ten 
 of three). Printed, by room and method: the share of errors below that (aim 0.85 to 0.95), of those inside the middle half of the box
 along each axis and of the others apart, and the RMS of what is stated over that of the errors.
 """
-import argparse
 import math
 import multiprocessing
 import os
@@ -17,7 +16,7 @@ import random
 import sys
 import tempfile
 
-from interval_coverage import EXTENT_M, Misplacing, POOL, drawn_table, record, rows_of, run, write
+from interval_coverage import EXTENT_M, Misplacing, POOL, drawn_table, parser_of, record, rows_of, run, write
 
 NINE_IN_TEN = math.sqrt(6.2514 / 3)  # Quantile of chi-square of three over three.
 
@@ -63,14 +62,8 @@ def rms_mm(values_m):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("cli")
-    parser.add_argument("rooms_folder")
-    parser.add_argument("--tables", type=int, default=4)
-    parser.add_argument("--places", default="60,120")
-    parser.add_argument("--rooms", default="clean,steel_floor,steel_bar,two_bodies,copper_loop,mixed")
+    parser = parser_of(__doc__, 4, "60,120")
     parser.add_argument("--methods", default="gaussian_process,harmonic_field")
-    parser.add_argument("--processes", type=int, default=os.cpu_count())
     given = parser.parse_args()
     jobs = [(given.cli, given.rooms_folder, room, heavy, n_places, given.tables, given.methods.split(","))
             for n_places in map(int, given.places.split(",")) for room in given.rooms.split(",") for heavy in (False, True)]

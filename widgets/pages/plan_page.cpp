@@ -39,14 +39,6 @@ constexpr double kSecondsPerPlacement = 15.0;
 constexpr double kSamplesPerSecond = 120.0;
 constexpr std::int64_t kBuiltAtOnce = 2000;  ///< Stops that take a few milliseconds.
 
-/// Of a plan whose size was checked.
-std::int64_t stopsOf(const acquisition::Plan& plan) {
-  const std::int64_t places = plan.explicit_places.empty()
-                                  ? std::int64_t{plan.counts[0]} * plan.counts[1] * plan.counts[2]
-                                  : static_cast<std::int64_t>(plan.explicit_places.size());
-  return places * plan.orientations * plan.reseat;
-}
-
 /// About how long a take lasts; one until its mean is known lasts as long as it must.
 double secondsOf(const acquisition::TakeLength& length) {
   if (length.until == acquisition::TakeLength::Until::kSamples) return length.amount / kSamplesPerSecond;
@@ -314,7 +306,7 @@ PlanPage::BuiltPlan PlanPage::built(const acquisition::Plan& plan) {
 }
 
 void PlanPage::build(const acquisition::Plan& now) {
-  const std::int64_t stops = stopsOf(now);
+  const std::int64_t stops = acquisition::stopsOf(now);
   if (stops <= kBuiltAtOnce) return show(now, built(now));
   summary_->setText(tr("Laying out %1 placements...").arg(stops));
   auto work = [now](const RunControl& control) -> Result<BuiltPlan> {

@@ -1,16 +1,11 @@
 #include "acquisition/session/acquisition_controller.h"
 
-#include <signal.h>
-#include <sys/resource.h>
-
 #include <QElapsedTimer>
-#include <QTemporaryDir>
 #include <QTest>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "acquisition/plan/place_state.h"
-#include "calib/tables/metadata_keys.h"
 #include "tests/acquisition/session/controller_bench.h"
 #include "tests/acquisition/session/session_folder.h"
 #include "tests/support/matchers.h"
@@ -334,156 +329,6 @@ class AcquisitionControllerTest : public QObject {
     QCOMPARE(bench.take_failures, QStringList{"A1, pipe 1: no signal: the tracker reports error k"});
   }
 
-  void cancelledTakeStoresNothing() {
-    Bench bench(folder_.newPath());
-    bench.tracker->setDownAt(bench.placePose(0));
-    bench.controller.take();
-    bench.tracker->stand(0.3);
-    bench.controller.cancelTake();
-    QVERIFY(bench.controller.status().take == TakeState::kIdle);
-    bench.tracker->stand(2.0);
-    QVERIFY(bench.stored.empty() && bench.take_failures.isEmpty());
-  }
-
-  void fullDiskIsToldAndNothingIsLost() {
-    const QString path = folder_.newPath();
-    Bench bench(path);
-    bench.takeHere();
-    signal(SIGXFSZ, SIG_IGN);
-    rlimit before{};
-    getrlimit(RLIMIT_FSIZE, &before);
-    const rlimit none{4096, before.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &none);
-    bench.takeHere();
-    setrlimit(RLIMIT_FSIZE, &before);
-    QCOMPARE(bench.stored, std::vector<int>{0});
-    QCOMPARE(bench.take_failures.size(), 1);
-    QVERIFY2(bench.take_failures[0].startsWith("B1, pipe 1: not stored: "), qPrintable(bench.take_failures[0]));
-    QVERIFY(bench.controller.status().current == 1u);
-    bench.controller.take();
-    bench.tracker->stand(0.51);
-    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
-  }
-
-  void reopeningResumes() {
-    const QString path = folder_.newPath();
-    std::vector<Node> before;
-    {
-      Bench bench(path);
-      for (int i = 0; i < 4; ++i) bench.takeHere();
-      bench.controller.skip();
-      bench.controller.setSessionState("page", "compare");
-      bench.controller.storeFit("hmq", "{}");
-      bench.readTables();
-      before = bench.table.nodes;
-    }
-    Bench bench(path, {}, false);
-    QVERIFY2(bench.failures.isEmpty(), qPrintable(bench.failures.join(' ')));
-    QCOMPARE(bench.opened_page, QString("compare"));
-    QVERIFY(nlohmann::json::parse(bench.opened_plan.toStdString()) == toJson(planOf({3, 3, 2})));
-    const auto status = bench.controller.status();
-    QVERIFY(status.current == 5u && status.recorded->n_done == 4 && status.recorded->n_skipped == 1 &&
-            status.recorded->can_undo);
-    QCOMPARE(status.session->path, path);
-    bench.takeHere();
-    bench.readTables();
-    QCOMPARE(bench.table.nodes.size(), std::size_t{5});
-    for (std::size_t i = 0; i < before.size(); ++i) {
-      FT_VERIFY_MATCH(testing::sameBits(bench.table.nodes[i].tracker_from_sensor, before[i].tracker_from_sensor));
-    }
-    QVERIFY(*bench.table.nodes[4].t_start_s > *bench.table.nodes[3].t_end_s);
-  }
-
-  void clockGoesOnWhileTheSessionIsClosed_data() {
-    QTest::addColumn<double>("after_s");
-    QTest::addColumn<double>("resumed_s");
-    QTest::newRow("two hours later") << 7200.0 << 7200.0;
-    QTest::newRow("a clock set back") << -60.0 << 2.0;
-  }
-  void clockGoesOnWhileTheSessionIsClosed() {
-    QFETCH(double, after_s);
-    QFETCH(double, resumed_s);
-    const QString path = folder_.newPath();
-    {
-      Bench bench(path);
-      bench.takeHere();
-    }
-    Bench bench(path, {}, false, after_s);
-    bench.takeHere();
-    bench.readTables();
-    QCOMPARE(bench.table.nodes.size(), std::size_t{2});
-    const double begins_s = *bench.table.nodes[1].t_start_s;
-    QVERIFY2(begins_s >= resumed_s && begins_s < resumed_s + 3.0, qPrintable(QString::number(begins_s)));
-  }
-
-  void theClockCountsFromTheFirstReading_data() {
-    QTest::addColumn<bool>("reopens");
-    QTest::addColumn<bool>("is_kept");
-    QTest::addColumn<double>("resumed_s");
-    QTest::newRow("reconnected") << false << true << 60.0;
-    QTest::newRow("reopened") << true << true << 60.0;
-    QTest::newRow("reopened, without what is kept now") << true << false << 660.0;
-  }
-  /// The session was made ten minutes before its first reading; it goes on a minute after that.
-  void theClockCountsFromTheFirstReading() {
-    QFETCH(bool, reopens);
-    QFETCH(bool, is_kept);
-    QFETCH(double, resumed_s);
-    const QString path = folder_.newPath();
-    std::vector<Node> nodes;
-    {
-      Bench bench(path);
-      bench.now = bench.now.addSecs(600);
-      bench.takeHere();
-      if (!is_kept) bench.controller.setSessionState("clock_began", {});
-      if (!reopens) {
-        bench.now = bench.now.addSecs(60);
-        bench.tracker->lose();
-        bench.tracker->comeBack();
-        bench.takeHere();
-      }
-      QVERIFY(bench.failures.isEmpty());
-      nodes = bench.nodes;
-    }
-    if (reopens) {
-      Bench bench(path, {}, false, 660.0);
-      bench.takeHere();
-      nodes.insert(nodes.end(), bench.nodes.begin(), bench.nodes.end());
-    }
-    QCOMPARE(nodes.size(), std::size_t{2});
-    // A take begins 1.4 s after its tracker: carried for 0.8 s, at rest for 0.6 s.
-    QVERIFY2(std::abs(*nodes[0].t_start_s - 1.4) < 0.1, qPrintable(QString::number(*nodes[0].t_start_s)));
-    const double after_s = *nodes[1].t_start_s - resumed_s;
-    QVERIFY2(std::abs(after_s - 1.4) < 0.1, qPrintable(QString::number(*nodes[1].t_start_s)));
-  }
-
-  void metadataComesFromTheDevice() {
-    Bench bench(folder_.newPath());
-    bench.readTables();
-    QVERIFY(bench.table.metadata.tracker == "fake" && bench.table.metadata.rate_hz == kRate_hz);
-    QVERIFY(bench.table.metadata.rig == "wooden jig");
-    QCOMPARE(*bench.table.metadata.date, std::string("2024-02-29"));
-  }
-
-  void aTrackerThatStatesNothingTakesNothingBack() {
-    Bench bench(folder_.newPath());
-    const auto setup = [&bench] {
-      bench.readTables();
-      return bench.table.metadata.setup;
-    };
-    bench.controller.setSetup({{"room", "Lab 9"}, {"sensor_serial", "S7"}});
-    bench.controller.setSetupOfTracker({});
-    QCOMPARE(setup(), (Setup{{"room", "Lab 9"}, {"sensor_serial", "S7"}}));
-    bench.controller.setSetupOfTracker({{"sensor_serial", "S8"}});
-    QCOMPARE(setup(), (Setup{{"room", "Lab 9"}, {"sensor_serial", "S8"}}));
-    // A person takes back what was said.
-    bench.controller.setSetup({});
-    QCOMPARE(setup(), (Setup{{"room", "Lab 9"}}));
-    bench.controller.openSession(folder_.newPath(), QString::fromStdString(toJson(planOf({2, 1, 1})).dump()));
-    QCOMPARE(setup(), Setup());
-    QVERIFY2(bench.failures.isEmpty(), qPrintable(bench.failures.join(' ')));
-  }
-
   void badSessionsAreToldAndTheOpenOneStays() {
     const QString path = folder_.newPath();
     Bench bench(path);
@@ -619,75 +464,6 @@ class AcquisitionControllerTest : public QObject {
       bench.tracker->stand(5.0);
       QCOMPARE(bench.stored.size(), std::size_t{18});
     }
-  }
-
-  void anotherTrackerOnTheWayIsTold() {
-    QTemporaryDir folder;
-    const QString path = folder.filePath("two.fieldtrue");
-    {
-      Bench first(path);
-      first.takeHere();
-      QCOMPARE(first.stored.size(), std::size_t{1});
-    }
-    Bench second(path, {}, false);
-    QStringList remarks;
-    QObject::connect(&second.controller, &AcquisitionController::remarked,
-                     [&](const QString& remark) { remarks << remark; });
-    auto other = std::make_unique<testing::FakeTracker>();
-    second.tracker = other.get();
-    other->tracker_name = QStringLiteral("another");
-    second.controller.adoptDevice(std::move(other));
-    QCOMPARE(remarks.size(), 1);
-    QVERIFY2(remarks[0].contains("begun with fake") && remarks[0].contains("of another") &&
-                 remarks[0].contains("one calibration of both is wrong"),
-             qPrintable(remarks[0]));
-    // The table says so as soon as something was taken with it, and not before.
-    second.readTables();
-    QVERIFY(!second.table.metadata.other.contains(kOtherTracker));
-    second.takeHere();
-    QCOMPARE(second.stored.size(), std::size_t{1});
-    second.readTables();
-    QCOMPARE(QString::fromStdString(second.table.metadata.other[kOtherTracker]), QString("another"));
-    QCOMPARE(QString::fromStdString(*second.table.metadata.tracker), QString("fake"));
-  }
-
-  void aTrackerThatComesBackAfterItsSessionWasClosedHarmsNothing() {
-    QTemporaryDir folder;
-    const QString path = folder.filePath("closed.fieldtrue");
-    {
-      Bench first(path);
-      first.takeHere();
-    }
-    Bench second(path, {}, false);
-    auto other = std::make_unique<testing::FakeTracker>();
-    other->tracker_name = QStringLiteral("another");
-    second.controller.adoptDevice(std::move(other));
-    second.controller.closeSession();
-    QStringList remarks;
-    QObject::connect(&second.controller, &AcquisitionController::remarked,
-                     [&](const QString& remark) { remarks << remark; });
-    auto again = std::make_unique<testing::FakeTracker>();
-    again->tracker_name = QStringLiteral("another");
-    second.tracker = again.get();
-    second.controller.adoptDevice(std::move(again));
-    QVERIFY2(remarks.isEmpty(), qPrintable(remarks.join('\n')));
-    QVERIFY(second.controller.status().session->places.empty());
-  }
-
-  void aTrackerBeforeTheFirstTakeIsForgotten() {
-    QTemporaryDir folder;
-    Bench bench(folder.filePath("one.fieldtrue"));
-    QStringList remarks;
-    QObject::connect(&bench.controller, &AcquisitionController::remarked,
-                     [&](const QString& remark) { remarks << remark; });
-    auto other = std::make_unique<testing::FakeTracker>();
-    bench.tracker = other.get();
-    other->tracker_name = QStringLiteral("another");
-    bench.controller.adoptDevice(std::move(other));
-    bench.takeHere();
-    bench.readTables();
-    QCOMPARE(QString::fromStdString(*bench.table.metadata.tracker), QString("another"));
-    QVERIFY2(remarks.isEmpty() && !bench.table.metadata.other.contains(kOtherTracker), qPrintable(remarks.join('\n')));
   }
 };
 

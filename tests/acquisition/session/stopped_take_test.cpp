@@ -40,6 +40,33 @@ class StoppedTakeTest : public QObject {
   testing::SessionFolder folder_;
 
  private slots:
+  void cancelledTakeStoresNothing() {
+    Bench bench(folder_.newPath());
+    bench.tracker->setDownAt(bench.placePose(0));
+    bench.controller.take();
+    bench.tracker->stand(0.3);
+    bench.controller.cancelTake();
+    QVERIFY(bench.controller.status().take == TakeState::kIdle);
+    bench.tracker->stand(2.0);
+    QVERIFY(bench.stored.empty() && bench.take_failures.isEmpty());
+  }
+
+  void fullDiskIsToldAndNothingIsLost() {
+    Bench bench(folder_.newPath());
+    bench.takeHere();
+    {
+      const FullDisk full;
+      bench.takeHere();
+    }
+    QCOMPARE(bench.stored, std::vector<int>{0});
+    QCOMPARE(bench.take_failures.size(), 1);
+    QVERIFY2(bench.take_failures[0].startsWith("B1, pipe 1: not stored: "), qPrintable(bench.take_failures[0]));
+    QVERIFY(bench.controller.status().current == 1u);
+    bench.controller.take();
+    bench.tracker->stand(0.51);
+    QCOMPARE(bench.stored, (std::vector<int>{0, 1}));
+  }
+
   void whatCannotBeStoredIsNotTakenOverAndOver_data() {
     QTest::addColumn<bool>("takes_again");
     QTest::newRow("taken again") << true;

@@ -67,6 +67,12 @@ class HeldTakeWindowTest : public WindowDriver {
     QTest::keyClick(window_.get(), Qt::Key_Escape);
     QTRY_VERIFY(!find<QWidget>("heldTake")->isVisible());
     QCOMPARE(status().recorded->n_done, std::size_t{0});
+    // Where it takes by itself, the operator is told how it goes on.
+    window_->workbench().setAutomatic(true);
+    QTRY_COMPARE(find<QLabel>("bannerReason")->text(),
+                 QString("stopped: lift the sensor and set it down again; or press space"));
+    picture("stopped-take");
+    window_->workbench().setAutomatic(false);
   }
 
   void aKeyAnswers_data() {
