@@ -145,6 +145,7 @@ class HarmonicFieldTest : public QObject {
   void doesNoHarmToAnotherTracker();
   void goesOnBeyondItsBoxWithoutAKink();
   void hasAPlaceForEveryTrackedPosition();
+  void findsThePlaceWhereTheFieldTurns();
   void canBeBaked();
   void isRigidWithoutSources();
   void stops();
@@ -438,6 +439,19 @@ void HarmonicFieldTest::hasAPlaceForEveryTrackedPosition() {
     FT_VERIFY_MATCH(near(field.trackedPosition_m(p_m) - p_m, field.field().trackedPosition_m(held_m) - held_m, 1e-12));
     const Eigen::Vector3d true_m = field.truePosition_m(p_m);
     FT_VERIFY_MATCH(near(field.trackedPosition_m(true_m), p_m, 1e-9));
+  }
+}
+
+// A strong source above the box's end, near which the field turns, so that steps straight from the tracked position go
+// astray: every tracked position of a place in the box has one that is tracked there, to what is called found.
+void HarmonicFieldTest::findsThePlaceWhereTheFieldTurns() {
+  const FieldSource source{{1.8, 0.0, 0.6}, 0.03 * Eigen::Matrix3d::Identity()};
+  const HeldField field(DisturbedField({source}), SoftBox{{0.8, -0.5, -0.4}, {1.8, 0.5, 0.4}, 0.02});
+  RandomGeometry random(14);
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3d p_m(random.between(0.8, 1.8), random.between(-0.5, 0.5), random.between(-0.4, 0.4));
+    const Eigen::Vector3d tracked_m = field.trackedPosition_m(p_m);
+    FT_VERIFY_MATCH(near(field.trackedPosition_m(field.truePosition_m(tracked_m)), tracked_m, 5e-6));
   }
 }
 
