@@ -122,7 +122,7 @@ Eigen::Matrix3d DisturbedField::trackedJacobian(const Eigen::Vector3d& p_true_m)
 }
 
 Eigen::Vector3d DisturbedField::truePosition_m(const Eigen::Vector3d& p_tracked_m) const {
-  return sources_.empty() ? p_tracked_m : inverted(*this, p_tracked_m, {p_tracked_m});
+  return sources_.empty() ? p_tracked_m : inverted(*this, p_tracked_m, {});
 }
 
 Eigen::Vector3d HeldField::heldPosition_m(const Eigen::Vector3d& p_true_m) const {

@@ -29,9 +29,9 @@ class DisturbedField {
   Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m) const;
   /// d tracked / d true, by central differences of 0.1 mm.
   Eigen::Matrix3d trackedJacobian(const Eigen::Vector3d& p_true_m) const;
-  /// The place whose tracked position is the one given, by Broyden's method from there, or Levenberg's and Marquardt's
-  /// where that finds none; where the field folds back and there is none, the place that comes nearest on the way.
-  /// @source Broyden 1965, Mathematics of Computation 19 577 (the "good" update); Marquardt 1963
+  /// The place whose tracked position is the one given, by Broyden's method from there; where the field folds back and
+  /// there is none, the place that comes nearest on the way.
+  /// @source Broyden 1965, Mathematics of Computation 19 577 (the "good" update)
   Eigen::Vector3d truePosition_m(const Eigen::Vector3d& p_tracked_m) const;
 
  private:
@@ -51,7 +51,10 @@ class HeldField {
   /// value.
   Eigen::Vector3d heldPosition_m(const Eigen::Vector3d& p_true_m) const;
   Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m) const;
-  /// As DisturbedField::truePosition_m; the box's centre is a second start of the second method.
+  /// As DisturbedField::truePosition_m; where Broyden's method finds none, by Levenberg's and Marquardt's from the
+  /// tracked position and from the box's centre. While a field is being fitted that would find places far off, behind
+  /// sources that do not stay.
+  /// @source Marquardt 1963, Journal of the Society for Industrial and Applied Mathematics 11 431
   Eigen::Vector3d truePosition_m(const Eigen::Vector3d& p_tracked_m) const;
 
  private:
