@@ -103,7 +103,9 @@ std::string partsOf(const std::vector<AutomaticCandidate>& candidates, const Ble
 
 /// @param blend that was taken in place of the chosen candidate, or null
 std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& candidates,
-                   const std::vector<InnerScore>& scores, std::size_t chosen, const Blend* blend, std::size_t n_folds) {
+                   const std::vector<InnerScore>& scores, const AutomaticDecision& decision, const Blend* blend,
+                   std::size_t n_folds) {
+  const std::size_t chosen = decision.candidate;
   const auto n_scored =
       std::count_if(scores.begin(), scores.end(), [](const InnerScore& score) { return !score.skipped; });
   // Every other model says so itself.
@@ -119,6 +121,8 @@ std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& c
     note += ", since nothing else lowers it clearly";
   else
     note += " against " + inMm(scores.front().rms_m()) + " without correction";
+  if (decision.is_despite_squares)
+    note += ", figures that a few places carry: at most places it errs less, and it moves them the right way";
   return note + "; " + std::to_string(n_scored) + " candidates scored over the same " + std::to_string(n_folds) +
          " folds.";
 }
@@ -154,10 +158,11 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
   const auto folds = innerFolds(data);
   FT_TRY(const auto scored, scoreCandidates(candidates, data, folds, control));
   const std::vector<InnerScore>& scores = scored;
-  const std::size_t chosen = chooseCandidate(candidates, scores);
+  const AutomaticDecision decision = chooseCandidate(candidates, scores);
+  const std::size_t chosen = decision.candidate;
   const AutomaticCandidate& winner = candidates[chosen];
-  std::optional<Blend> blend;
-  if (chosen != 0) blend = blendCandidates(candidates, scores, data, folds);
+  std::optional<Blend> blend;  // Which weighs the squares.
+  if (chosen != 0 && !decision.is_despite_squares) blend = blendCandidates(candidates, scores, data, folds);
   if (blend && !isWorthBlending(blend->score, scores[chosen])) blend.reset();
   RunControl inner = control;
   inner.progress = [](double) {};
@@ -168,7 +173,7 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
       {"method", blend ? kBlend : winner.method->id},
       {"settings", blend ? nlohmann::json::object() : toJson(winner.settings)},
       {"candidates", tableOf(candidates, scores)},
-      {"note", noteOf(data, candidates, scores, chosen, blend ? &*blend : nullptr, folds.rows.size())}};
+      {"note", noteOf(data, candidates, scores, decision, blend ? &*blend : nullptr, folds.rows.size())}};
   return std::make_unique<AutomaticModel>(std::move(model), std::move(table));
 }
 

@@ -15,7 +15,8 @@ namespace {
 constexpr std::size_t kMostMembers = 4;
 constexpr double kLeastWeight = 0.01;
 constexpr double kLeastBlendGain = 0.05;
-constexpr double kRidge = 1e-12;  ///< Of the mean square, so that candidates that are the same can be told apart.
+constexpr double kMostly = 1.645;  ///< SDs of signed ranks: one-sided 95 %.
+constexpr double kRidge = 1e-12;   ///< Of the mean square, so that candidates that are the same can be told apart.
 
 /// Sums of products of the candidates' held-out errors, a place counting once; of skipped ones nothing is used [m2].
 using Gram = Eigen::MatrixXd;
@@ -217,7 +218,7 @@ std::optional<Blend> blendCandidates(const std::vector<AutomaticCandidate>& cand
 }
 
 bool isWorthBlending(const InnerScore& blend, const InnerScore& chosen) {
-  return blend.rms_m() <= (1.0 - kLeastBlendGain) * chosen.rms_m();
+  return blend.rms_m() <= (1.0 - kLeastBlendGain) * chosen.rms_m() && errsLessMostly(blend, chosen) > kMostly;
 }
 
 std::unique_ptr<PositionModel> makeBlend(std::vector<BlendMember> members) {

@@ -20,6 +20,7 @@ constexpr std::size_t kPlacesForFolds = 20;
 constexpr double kLeastGain = 0.05;
 constexpr double kOneSided95 = 1.645;
 constexpr double kOneSided99 = 2.326;
+constexpr double kOneSided999 = 3.09;  ///< Of a dozen candidates that are asked, less than two in a hundred by chance.
 
 /// Mean of a - b over the places, and its standard error; of a candidate that is still being scored, over those that
 /// are.
@@ -72,27 +73,6 @@ double pointsTheRightWay(const InnerScore& score, const InnerScore& other) {
   return variance > 0.0 ? sum / std::sqrt(variance) : 0.0;
 }
 
-/// At how many places, and by how much, one candidate errs less than another, in SDs of chance: Wilcoxon's signed ranks
-/// of the squares' differences, weighted by what each place stands for. A few places that carry the squares carry it no
-/// further than others.
-/// @source Wilcoxon 1945, "Individual comparisons by ranking methods"
-double errsLessMostly(const InnerScore& score, const InnerScore& other) {
-  std::vector<std::size_t> order(score.squares_m2.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto gain_m2 = [&](std::size_t place) { return other.squares_m2[place] - score.squares_m2[place]; };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return std::abs(gain_m2(a)) < std::abs(gain_m2(b)); });
-  double sum = 0.0, variance = 0.0;
-  for (std::size_t rank = 0; rank < order.size(); ++rank) {
-    const double gain = gain_m2(order[rank]);
-    if (gain == 0.0) continue;
-    const double weight = static_cast<double>(rank + 1) * score.shareOf(order[rank]);
-    sum += gain > 0.0 ? weight : -weight;
-    variance += weight * weight;
-  }
-  return variance > 0.0 ? sum / std::sqrt(variance) : 0.0;
-}
-
 using ModelOfFold = std::function<Result<std::unique_ptr<PositionModel>>(const std::vector<std::size_t>& held_out)>;
 
 /// How a candidate's models without some rows are made: downdated from one fit, or fitted anew where a fit is tuned.
@@ -132,6 +112,22 @@ bool isWorthIt(const InnerScore& score, const InnerScore& none) {
   return is_clear && score.rms_m() <= (1.0 - kLeastGain) * none.rms_m() && rmsOfPlaces_m(score) <= rmsOfPlaces_m(none);
 }
 
+/// What the squares do not show to be worse than none, points to where the places left out err, and errs less at most
+/// of them.
+AutomaticDecision chosenDespiteSquares(const std::vector<InnerScore>& scores) {
+  AutomaticDecision chosen;
+  double most = 0.0;
+  for (std::size_t i = 1; i < scores.size(); ++i) {
+    if (scores[i].skipped || pointsTheRightWay(scores[i], scores.front()) <= kOneSided999) continue;
+    const PairedDifference loss(scores[i], scores.front());
+    const double less = errsLessMostly(scores[i], scores.front());
+    if (loss.mean > kOneSided95 * loss.standard_error || less <= most) continue;
+    most = less;
+    chosen = {i, true};
+  }
+  return chosen;
+}
+
 InnerScore skippedScore(std::string why) {
   InnerScore score;
   score.skipped = std::move(why);
@@ -160,6 +156,23 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set) {
     return a.complexity < b.complexity;
   });
   return candidates;
+}
+
+double errsLessMostly(const InnerScore& score, const InnerScore& other) {
+  std::vector<std::size_t> order(score.squares_m2.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto gain_m2 = [&](std::size_t place) { return other.squares_m2[place] - score.squares_m2[place]; };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return std::abs(gain_m2(a)) < std::abs(gain_m2(b)); });
+  double sum = 0.0, variance = 0.0;
+  for (std::size_t rank = 0; rank < order.size(); ++rank) {
+    const double gain = gain_m2(order[rank]);
+    if (gain == 0.0) continue;
+    const double weight = static_cast<double>(rank + 1) * score.shareOf(order[rank]);
+    sum += gain > 0.0 ? weight : -weight;
+    variance += weight * weight;
+  }
+  return variance > 0.0 ? sum / std::sqrt(variance) : 0.0;
 }
 
 std::vector<std::size_t> placeSlots(const FitData& data) {
@@ -263,12 +276,13 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
   return scores;
 }
 
-std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores) {
+AutomaticDecision chooseCandidate(const std::vector<AutomaticCandidate>& candidates,
+                                  const std::vector<InnerScore>& scores) {
   FT_CHECK(candidates.size() == scores.size() && !scores.empty() && !scores.front().skipped);
   std::size_t best = 0;
   for (std::size_t i = 1; i < scores.size(); ++i)
     if (!scores[i].skipped && PairedDifference(scores[i], scores[best]).mean < 0.0) best = i;
-  if (best == 0) return 0;
+  if (best == 0) return chosenDespiteSquares(scores);
   std::size_t chosen = best;
   for (std::size_t i = 1; i < scores.size(); ++i) {
     if (scores[i].skipped) continue;
@@ -280,8 +294,8 @@ std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, c
         errsLessMostly(scores[i], scores[chosen]) > 0.0)
       chosen = i;
   }
-  if (isWorthIt(scores[chosen], scores.front())) return chosen;
-  return isWorthIt(scores[best], scores.front()) ? best : 0;
+  if (isWorthIt(scores[chosen], scores.front())) return {chosen};
+  return isWorthIt(scores[best], scores.front()) ? AutomaticDecision{best} : chosenDespiteSquares(scores);
 }
 
 }  // namespace fieldtrue::correctors

@@ -44,6 +44,12 @@ struct InnerScore {
   double rms_m() const;
 };
 
+/// At how many places, and by how much, one candidate errs less than another, in SDs of chance: Wilcoxon's signed ranks
+/// of the squares' differences, weighted by what each place stands for. A few places that carry the squares carry it no
+/// further than others.
+/// @source Wilcoxon 1945, "Individual comparisons by ranking methods"
+double errsLessMostly(const InnerScore& score, const InnerScore& other);
+
 /// Places as 0, 1, ... in order of first appearance, by row.
 std::vector<std::size_t> placeSlots(const FitData& data);
 
@@ -69,14 +75,23 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
 Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandidate>& candidates, const FitData& data,
                                                 const InnerFolds& folds, const RunControl& control);
 
+/// Which candidate, and how it was told that it is better than none.
+struct AutomaticDecision {
+  std::size_t candidate = 0;
+  bool is_despite_squares = false;  ///< By most places and by directions, while a few places carry the squares.
+};
+
 /// The simplest candidate that corrects at all and whose mean squared error exceeds the least by no more than one
 /// standard error of the difference. Among equally simple ones that the squares do not tell apart by two, the one that
-/// errs less at most places, by signed ranks: a few places carry the squares. None, which must be the first, where
-/// neither that one nor the one of least square lowers its RMS by 5 % at least and clearly: its mean square by 1.645
-/// standard errors (one-sided 95 %), or, where a few places carry the squares, by corrections that point to where the
-/// places left out err, by 2.326 SDs of the mean cosine of directions that know nothing (one-sided 99 %), or by signed
-/// ranks, by as many SDs.
+/// errs less at most places, by signed ranks: a few places carry the squares. It or the one of least square must lower
+/// the RMS by 5 % at least and clearly: the mean square by 1.645 standard errors (one-sided 95 %), or, where a few
+/// places carry the squares, by corrections that point to where the places left out err, by 2.326 SDs of the mean
+/// cosine of directions that know nothing (one-sided 99 %), or by signed ranks, by as many SDs.
+/// Where neither does, and the squares cannot tell a candidate from none (no worse by 1.645 standard errors), one whose
+/// corrections point the right way by 3.09 SDs (one-sided 99.9 %) and that errs less at most places by signed ranks; of
+/// several the one with the most by these. Else none, which must be the first.
 /// @source the one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984, section 3.4.3
-std::size_t chooseCandidate(const std::vector<AutomaticCandidate>& candidates, const std::vector<InnerScore>& scores);
+AutomaticDecision chooseCandidate(const std::vector<AutomaticCandidate>& candidates,
+                                  const std::vector<InnerScore>& scores);
 
 }  // namespace fieldtrue::correctors

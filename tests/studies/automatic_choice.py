@@ -2,12 +2,14 @@
 """What the automatic choice costs against the best method in hindsight, on fresh places.
 
 automatic_choice.py FIELDTRUE-CLI ROOMS-FOLDER [--tables N] [--places 40,60,120] [--rooms a,b,...] [--processes N]
+                    [--draw WORD]
 
-Tables are drawn from rooms as in interval_coverage.py, calm and with gross slips. Every method, and `auto`, is fitted to the
-whole table by `fit` and applied to 3,000 places that the table does not hold; the figures are this script's own. Printed, a
-table a line, of the places in the region that the calibration states: the RMS before, with `auto`, what it chose, and of the
-method that errs least there, with RMS(auto) / RMS(best); the last also over the whole box, of which a few places scattered in
-it leave a part outside. Then median and largest of the ratios, and how often `auto` is worse than no correction.
+Tables are drawn from rooms as in interval_coverage.py, calm and with gross slips; another word draws others. Every method, and
+`auto`, is fitted to the whole table by `fit` and applied to 3,000 places that the table does not hold; the figures are this
+script's own. Printed, a table a line, of the places in the region that the calibration states: the RMS before, with `auto`,
+what it chose, and of the method that errs least there, with RMS(auto) / RMS(best); the last also over the whole box, of which a
+few places scattered in it leave a part outside. Then median and largest of the ratios, and how often `auto` is worse than no
+correction.
 """
 import json
 import math
@@ -35,13 +37,13 @@ def against_best(rms, chosen):
 
 
 def cell(job):
-    cli, rooms, room, heavy, n_places, n_tables = job
+    cli, rooms, word, room, heavy, n_places, n_tables = job
     lines = []
     with tempfile.TemporaryDirectory() as folder:
         head, rows = record(cli, rooms, room, folder)
         fresh, table = os.path.join(folder, "fresh.csv"), os.path.join(folder, "table.nodes.csv")
         write(fresh, head, rows[POOL:])
-        draw, misplacing = random.Random(f"auto {room} {heavy} {n_places}"), Misplacing(heavy)
+        draw, misplacing = random.Random(f"{word} {room} {heavy} {n_places}"), Misplacing(heavy)
         for _ in range(n_tables):
             write(table, head, drawn_table(rows, n_places, draw, misplacing))
             inside, everywhere = {}, {}
@@ -62,9 +64,11 @@ def cell(job):
 
 
 def main():
-    given = parser_of(__doc__, 5, "40,60,120").parse_args()
-    jobs = [(given.cli, given.rooms_folder, room, heavy, n_places, given.tables) for n_places in map(int, given.places.split(","))
-            for room in given.rooms.split(",") for heavy in (False, True)]
+    parser = parser_of(__doc__, 5, "40,60,120")
+    parser.add_argument("--draw", default="auto")
+    given = parser.parse_args()
+    jobs = [(given.cli, given.rooms_folder, given.draw, room, heavy, n_places, given.tables)
+            for n_places in map(int, given.places.split(",")) for room in given.rooms.split(",") for heavy in (False, True)]
     ratios = {"in the stated region": [], "everywhere": []}
     worse = 0
     print("| places | room | placing | share in the region | before, mm | auto, mm | chosen | best, mm | of | auto / best | "

@@ -169,6 +169,18 @@ class AutomaticBlendTest : public QObject {
     QVERIFY(!isWorthBlending(scoreOf(0.00096), scoreOf(0.001)));
   }
 
+  /// Half the error at one place of twenty, and a twentieth more at all others.
+  void itIsNotWorthThemForOnePlaceThatCarriesTheSquares() {
+    const auto scoreOf = [](double most_m, double one_m) {
+      std::vector<Eigen::Vector3d> errors_m = everywhere(20, {most_m, 0.0, 0.0});
+      errors_m.front().x() = one_m;
+      return scoresOf({errors_m}).front();
+    };
+    const InnerScore blend = scoreOf(0.00105, 0.005), alone = scoreOf(0.001, 0.010);
+    QVERIFY(blend.rms_m() < 0.7 * alone.rms_m());
+    QVERIFY(!isWorthBlending(blend, alone));
+  }
+
   void theModelIsTheMeanOfItsMembersAndComesBackToTheBit() {
     const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), [](const Eigen::Vector3d& p) {
       return Eigen::Vector3d(0.02 * p.x() * p.x(), 0.03 * p.x() * p.z(), 0.02 * p.y() * p.y());

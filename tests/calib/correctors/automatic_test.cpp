@@ -80,7 +80,7 @@ class AutomaticTest : public QObject {
       scores[1].squares_m2.push_back(4.0 + excess + (i % 2 == 0 ? scatter : -scatter));
       scores[2].squares_m2.push_back(4.0);
     }
-    QCOMPARE(chooseCandidate(ranked({0, 3, 10}), scores), static_cast<std::size_t>(expected));
+    QCOMPARE(chooseCandidate(ranked({0, 3, 10}), scores).candidate, static_cast<std::size_t>(expected));
   }
 
   void staysWithNoneUnlessTheGainIsClear_data() {
@@ -103,7 +103,7 @@ class AutomaticTest : public QObject {
       scores[0].squares_m2.push_back(1.0 + scatter * (i % 4 == 0 ? std::sqrt(3.0) : -std::sqrt(1.0 / 3.0)));
       scores[1].squares_m2.push_back(left);
     }
-    QCOMPARE(chooseCandidate(ranked({0, 3}), scores), static_cast<std::size_t>(expected));
+    QCOMPARE(chooseCandidate(ranked({0, 3}), scores).candidate, static_cast<std::size_t>(expected));
   }
 
   /// Two places of fifty carry the squares, so the gain is 1.4 standard errors, and half of the others err more; yet
@@ -130,7 +130,7 @@ class AutomaticTest : public QObject {
     }
     for (InnerScore& score : scores)
       for (const Eigen::Vector3d& residual_m : score.residual_m) score.squares_m2.push_back(residual_m.squaredNorm());
-    QCOMPARE(chooseCandidate(ranked({0, 3}), scores), static_cast<std::size_t>(expected));
+    QCOMPARE(chooseCandidate(ranked({0, 3}), scores).candidate, static_cast<std::size_t>(expected));
   }
 
   /// Of fifty places two carry the squares, 400 each before, 300 and 430 after: the mean gains 1.7 with a standard
@@ -154,7 +154,37 @@ class AutomaticTest : public QObject {
       scores[1].squares_m2.push_back(2.0 - gain_m2);
     }
     QVERIFY(scores[1].rms_m() < 0.97 * scores[0].rms_m());
-    QCOMPARE(chooseCandidate(ranked({0, 3}), scores), static_cast<std::size_t>(expected));
+    QCOMPARE(chooseCandidate(ranked({0, 3}), scores).candidate, static_cast<std::size_t>(expected));
+  }
+
+  /// Fifty places; far off ones err by 20 before and by sqrt(500) after, the others by 1 before. Two far off: the mean
+  /// square is more by (2 x 100 - 48 x 0.75) / 50 = 3.3 with a standard error of 2.8, so the squares cannot tell; the
+  /// corrections are 48 of 0.5 towards the truth and two of 2.36 away from it, (24 - 4.7) / sqrt((12 + 11.1) / 3) = 6.9
+  /// SDs of chance. Four: more by 7.3 with 3.9, which is clear. Corrected by 2.1, the others end 1.1 beyond the truth.
+  void mostPlacesDecideWhereSquaresCannot_data() {
+    QTest::addColumn<int>("n_far_off");
+    QTest::addColumn<double>("move");
+    QTest::addColumn<int>("expected");
+    QTest::newRow("squares cannot tell") << 2 << 0.5 << 1;
+    QTest::newRow("clearly worse by squares") << 4 << 0.5 << 0;
+    QTest::newRow("right directions, yet worse at most places") << 2 << 2.1 << 0;
+  }
+  void mostPlacesDecideWhereSquaresCannot() {
+    QFETCH(int, n_far_off);
+    QFETCH(double, move);
+    QFETCH(int, expected);
+    std::vector<InnerScore> scores(2);
+    for (int i = 0; i < 50; ++i) {
+      const bool is_far_off = i < n_far_off;
+      scores[0].residual_m.emplace_back(is_far_off ? 20.0 : 1.0, 0.0, 0.0);
+      scores[1].residual_m.emplace_back(is_far_off ? std::sqrt(500.0) : 1.0 - move, 0.0, 0.0);
+    }
+    for (InnerScore& score : scores)
+      for (const Eigen::Vector3d& residual_m : score.residual_m) score.squares_m2.push_back(residual_m.squaredNorm());
+    QVERIFY(scores[1].rms_m() > scores[0].rms_m());
+    const AutomaticDecision decision = chooseCandidate(ranked({0, 3}), scores);
+    QCOMPARE(decision.candidate, static_cast<std::size_t>(expected));
+    QCOMPARE(decision.is_despite_squares, expected == 1);
   }
 
   /// One that leaves 1 at most of fifty places and 60 at a few, beside an equally simple one that leaves 2 everywhere:
@@ -174,7 +204,7 @@ class AutomaticTest : public QObject {
       scores[1].squares_m2.push_back(i < n_far_off ? 60.0 : 1.0 + 0.001 * i);
       scores[2].squares_m2.push_back(2.0);
     }
-    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores), static_cast<std::size_t>(expected));
+    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores).candidate, static_cast<std::size_t>(expected));
   }
 
   /// 80 places at the edge stand for a fifth of the region, 20 inside for the rest: mean squares of
@@ -187,14 +217,14 @@ class AutomaticTest : public QObject {
       scores[1].squares_m2.push_back(is_edge ? 1.0 : 9.0);
       scores[2].squares_m2.push_back(is_edge ? 16.0 : 1.0);
     }
-    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores), std::size_t{1});
+    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores).candidate, std::size_t{1});
     for (InnerScore& score : scores) {
       score.shares.assign(80, 0.2 / 80.0);
       score.shares.insert(score.shares.end(), 20, 0.8 / 20.0);
     }
     FT_VERIFY_MATCH(near(scores[1].rms_m(), std::sqrt(7.4), 1e-12));
     FT_VERIFY_MATCH(near(scores[2].rms_m(), 2.0, 1e-12));
-    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores), std::size_t{2});
+    QCOMPARE(chooseCandidate(ranked({0, 5, 5}), scores).candidate, std::size_t{2});
   }
 
   void skippedCandidatesAreNeverChosen() {
@@ -202,7 +232,7 @@ class AutomaticTest : public QObject {
     scores[0].squares_m2 = std::vector<double>(50, 1.0);
     scores[1].skipped = "cannot";
     scores[2].squares_m2 = std::vector<double>(50, 0.1);
-    QCOMPARE(chooseCandidate(ranked({0, 1, 2}), scores), std::size_t{2});
+    QCOMPARE(chooseCandidate(ranked({0, 1, 2}), scores).candidate, std::size_t{2});
   }
 
   void foldsHoldEveryRowOnceAndNoPlaceTwice() {
