@@ -13,6 +13,7 @@
 namespace fieldtrue::gap {
 namespace {
 
+constexpr double kFarSurer = 2.0;           ///< Times the log odds, from which what went is told and not what came.
 constexpr std::size_t kRowsForField = 500;  ///< Of the earlier one, to foretell what it would have read.
 
 /// What would have been read at one row, metres or radians beside the alignment, and the variance of each component.
@@ -270,12 +271,19 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
   const std::vector<int> places = placesBefore(*before, *now);
   const Alignments alignments = alignedTogether(*before, *now, places);
   FT_TRY(auto change, changeBetween(*before, *now, alignments, places, now_table.metadata, thresholds, control));
-  if (change.changed || change.isAstray()) return change;
-  // What bent a few places alone and is gone foretells nothing: it is the earlier readings that are astray.
+  if (change.isAstray()) return change;
+  // What stood there and is gone may pass for noise of the earlier recording, and foretells nothing where it bent a few
+  // places alone: asked the other way round, it is the earlier readings that show it.
   auto back = changeBetween(*now, *before, {alignments.now, alignments.before}, placesBefore(*now, *before),
                             before_table.metadata, thresholds, control);
   if (!back && back.error().code == ErrorCode::kCancelled) return tl::unexpected(back.error());
-  if (!back || back->changed || !back->isAstray()) return change;
+  if (!back) return change;
+  // Two were asked: either may be wrong by chance.
+  back->p_value = std::min(1.0, 2.0 * back->p_value);
+  back->changed = back->changed && back->p_value < std::exp(-thresholds.sure_of_change);
+  // What came in shows both ways; what went, clearly only this way.
+  const bool is_far_surer = back->changed && back->p_value < std::pow(change.p_value, kFarSurer);
+  if (change.changed ? !is_far_surer : !back->changed && !back->isAstray()) return change;
   back->is_gone = true;
   back->rig_moved_mm = change.rig_moved_mm;
   back->rig_turned_deg = change.rig_turned_deg;
@@ -310,10 +318,11 @@ std::string astrayText(const RecordingChange& change, const GapReport& report) {
 
 std::string changedText(const RecordingChange& change, const GapReport& report) {
   std::string text = "The field changed since the earlier recording (" + howSure(change.p_value) + ")";
+  if (change.is_gone) text += ": something is gone";
   if (change.hottest_m)
     text += ", most near (" + shown(change.hottest_m->x()) + ", " + shown(change.hottest_m->y()) + ", " +
             shown(change.hottest_m->z()) + ") m";
-  return text + ". " + report.text;
+  return text + (change.is_gone ? ". Of what stood there: " : ". ") + report.text;
 }
 
 void addRigMoved(const RecordingChange& change, const identify::Thresholds& thresholds, GapReport& report) {

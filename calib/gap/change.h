@@ -26,8 +26,9 @@ struct RecordingChange {
   /// corner alone is no smooth field.
   double astray_p_value = 1.0;
   bool isAstray() const { return astray_p_value < 1e-3; }
-  /// Whether it is the earlier readings that are astray, of what the later recording tells: what bent a few places and
-  /// is gone. The rows and their alignment are the earlier ones', the table diagnosed says what stood there.
+  /// Whether it is the earlier readings that show another field, or are astray, of what the later recording tells: what
+  /// stood there and is gone. The rows and their alignment are the earlier ones', the table diagnosed says what stood
+  /// there; p_value is of both questions.
   bool is_gone = false;
   int places = 0;  ///< Of the later recording, where the earlier one knows the field.
   int places_left_out = 0;

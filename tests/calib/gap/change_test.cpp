@@ -80,6 +80,20 @@ class ChangeTest : public QObject {
     }
   }
 
+  /// The same body carried out of a room that holds nothing else: what the earlier recording alone shows is no noise of
+  /// its own, and stood where it stood.
+  void whatWentIsNamed() {
+    const simulation::Scene before = roomWith({effect("compact_metal", kCarriedIn)});
+    for (const auto& plan : {gapPlan(), otherPlaces()}) {
+      const auto report = since(recordedIn(before, gapPlan(), 1), recordedIn(roomWith({}), plan, 2));
+      FT_VERIFY_OK(report);
+      QVERIFY2(report->against->changed && report->against->p_value < 0.01, report->text.c_str());
+      QVERIFY2(report->text.find("something is gone") != std::string::npos, report->text.c_str());
+      QCOMPARE(report->against->effect, std::string("compact_metal"));
+      FT_VERIFY_MATCH(near(*report->against->location_m, {1.3, 0.5, 0.3}, 0.15));
+    }
+  }
+
   /// What no smooth field is may still be none of placing.
   void whatScattersIsNotNothing() {
     const CalibrationTable before = recordedIn(gapScene(), gapPlan(), 1);
