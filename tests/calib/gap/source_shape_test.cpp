@@ -93,7 +93,7 @@ class SourceShapeTest : public QObject {
   void aPlaneIsNoBlock_data() {
     QTest::addColumn<QByteArray>("beside");
     QTest::newRow("floor") << QByteArray();
-    QTest::newRow("floor and ball") << QByteArray(R"({"center_m": [0.7, 0.1, -0.4], "radius_m": 0.2})");
+    QTest::newRow("floor and ball") << QByteArray(R"({"center_m": [0.7, 0.1, -0.6], "radius_m": 0.25})");
   }
   void aPlaneIsNoBlock() {
     QFETCH(QByteArray, beside);
