@@ -98,7 +98,7 @@ std::string remainingText(const gap::GapReport& report) {
   if (!report.remaining.where.empty()) {
     std::vector<int> named = report.remaining.where;
     named.resize(std::min<std::size_t>(named.size(), 8));
-    text += ", most at " + report.names.list(named, 8);
+    text += ", most at " + report.names.listInOrder(named, 8);
   }
   return text + ".\n" + gap::howFarOffText(report) + "\n";
 }

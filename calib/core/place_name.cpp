@@ -46,6 +46,10 @@ std::string PlaceNames::of(int node) const {
 std::string PlaceNames::list(std::vector<int> nodes, std::size_t most) const {
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return listInOrder(nodes, most);
+}
+
+std::string PlaceNames::listInOrder(std::span<const int> nodes, std::size_t most) const {
   const std::size_t named = nodes.size() <= most + 1 ? nodes.size() : most;
   std::string text;
   for (std::size_t i = 0; i < named; ++i) {

@@ -27,6 +27,9 @@ class PlaceNames {
   /// "A3, pipe 1", "A3, pipe 1 and B3, pipe 1", "A3, pipe 1; B3, pipe 1; C3, pipe 1 and 9 more"; each place once, by
   /// number.
   std::string list(std::vector<int> nodes, std::size_t most = 6) const;
+  /// The same in the order given.
+  /// @param nodes each place once
+  std::string listInOrder(std::span<const int> nodes, std::size_t most = 6) const;
 
  private:
   std::map<int, std::string> names_;

@@ -278,6 +278,27 @@ std::optional<std::size_t> selectedAs(const identify::GapSearch& search, const i
   return std::nullopt;
 }
 
+/// The leading one of the named causes stands before all that are no likelier.
+void putLeadingFirst(const std::string& leading, std::vector<GapCandidate>& candidates) {
+  std::stable_partition(candidates.begin(), candidates.end(),
+                        [&](const GapCandidate& c) { return c.effect == leading; });
+}
+
+/// Whatever is as likely as the leading one, these readings cannot tell from it, though its signal is another.
+/// @param candidates best first
+void joinEquallyLikely(const std::string& named, std::vector<GapCandidate>& candidates) {
+  constexpr double kEqual = 1.0 - 1e-9;  // But for rounding.
+  GapCandidate& leading = candidates.front();
+  if (leading.effect != named) return;
+  for (GapCandidate& c : candidates) {
+    if (isNameless(c.effect) || c.probability < kEqual * leading.probability ||
+        std::find(leading.equivalents.begin(), leading.equivalents.end(), c.effect) != leading.equivalents.end())
+      continue;
+    leading.equivalents.push_back(c.effect);
+    c.equivalents.push_back(leading.effect);
+  }
+}
+
 }  // namespace
 
 std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, const Judgement& judgement,
@@ -299,10 +320,13 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
   findEquivalents(search, selection, candidates);
   for (GapCandidate& c : candidates)
     if (const auto t = selectedAs(search, selection, c.effect)) c.shrinkage = shrinkageOfStep(judgement.far, *t);
+  const std::string named = selection.ways.empty() ? "" : search.ways()[selection.ways[selection.leading]].effect->id;
+  putLeadingFirst(named, candidates);
   const MostEvidence most_of = mostEvidence(search, selection, candidates);
   addNameless(judgement, has_gap, scattered_share, most_of, search.thresholds(), candidates);
-  setProbabilities(!selection.ways.empty() || judgement.refusal != Refusal::kNone, most_of, search.thresholds(),
-                   candidates);
+  const bool is_refused_gap = judgement.refusal != Refusal::kNone && has_gap;
+  setProbabilities(!selection.ways.empty() || is_refused_gap, most_of, search.thresholds(), candidates);
+  if (!selection.ways.empty()) joinEquallyLikely(named, candidates);
   return candidates;
 }
 

@@ -28,20 +28,31 @@ void addTraces(const std::vector<identify::Trace>& traces, const identify::Thres
       report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
 }
 
+/// Each flagged place once, the one that stands out most first.
+std::vector<int> flaggedPlaces(const GapReport& report) {
+  std::vector<const GapNode*> flagged;
+  for (const GapNode& node : report.nodes)
+    if (node.is_flagged) flagged.push_back(&node);
+  std::stable_sort(flagged.begin(), flagged.end(),
+                   [](const GapNode* a, const GapNode* b) { return a->excess > b->excess; });
+  std::vector<int> nodes;
+  for (const GapNode* node : flagged)
+    if (std::find(nodes.begin(), nodes.end(), node->node) == nodes.end()) nodes.push_back(node->node);
+  return nodes;
+}
+
 /// What has no name is at least placed: where it is largest, and which places stand out.
 void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) {
   constexpr std::size_t kMostNamed = 10;
   if (!has_gap || !report.selected.empty()) return;
-  std::vector<int> nodes;
-  for (const GapNode& node : report.nodes)
-    if (node.is_flagged && std::find(nodes.begin(), nodes.end(), node.node) == nodes.end()) nodes.push_back(node.node);
+  const std::vector<int> nodes = flaggedPlaces(report);
   if (nodes.empty()) return;
   const bool are_few = nodes.size() * 3 < rows.place_nodes.size();
-  std::string text =
-      nodes.size() == 1 ? "One place does not fit the others: "
-      : are_few         ? "Places that do not fit the others: "
-                : std::to_string(nodes.size()) + " of " + std::to_string(rows.place_nodes.size()) + " places lie off: ";
-  text += report.names.list(nodes, kMostNamed) + ".";
+  std::string text = nodes.size() == 1 ? "One place does not fit the others: "
+                     : are_few         ? "Places that do not fit the others: "
+                               : std::to_string(nodes.size()) + " of " + std::to_string(rows.place_nodes.size()) +
+                                     " places lie off, most of all ";
+  text += report.names.listInOrder(nodes, kMostNamed) + ".";
   if (report.hotspot && !rows.has_dipoles && are_few) {
     const Eigen::Vector3d& at = report.hotspot->center_m;
     text += " Something local acts within " + shown(report.hotspot->radius_m) + " m of (" + shown(at.x()) + ", " +

@@ -35,6 +35,13 @@ double unknownShareOf(const GapCandidate& c, const identify::Thresholds& thresho
   return c.location_m ? thresholds.unknown_as_thing : thresholds.unknown_as_other;
 }
 
+/// The same, but so much at least that nothing comes before the first by what is left to it.
+double unknownShareBehind(const GapCandidate& first, const GapCandidate& c, const identify::Thresholds& thresholds) {
+  if (c.effect == kUnnamedSmooth) return 0.0;
+  const double stays = (1.0 - unknownShareOf(first, thresholds)) * first.probability;
+  return std::max(unknownShareOf(c, thresholds), 1.0 - stays / std::max(stays, c.probability));
+}
+
 /// What the catalogue does not hold is taken for a cause that it holds, or for nothing, in part of all recordings: that
 /// part of the probability goes to a cause without a name, which does not become the first by it.
 void leaveRoomForTheUnknown(const identify::Thresholds& thresholds, std::vector<GapCandidate>& candidates) {
@@ -46,11 +53,17 @@ void leaveRoomForTheUnknown(const identify::Thresholds& thresholds, std::vector<
                                     [](const GapCandidate& c) { return c.effect == kUnnamedSmooth; });
   if (unnamed == candidates.end() || first == unnamed) return;
   double unknown = 0.0;
-  for (const GapCandidate& c : candidates) unknown += unknownShareOf(c, thresholds) * c.probability;
+  std::vector<double> shares;
+  for (const GapCandidate& c : candidates) {
+    shares.push_back(unknownShareBehind(*first, c, thresholds));
+    unknown += shares.back() * c.probability;
+  }
   const double lead = first->probability - unnamed->probability;
   const double closing = unknown + unknownShareOf(*first, thresholds) * first->probability;
   const double part = closing < lead ? 1.0 : 0.999 * lead / closing;
-  for (GapCandidate& c : candidates) c.probability *= 1.0 - part * unknownShareOf(c, thresholds);
+  const double most = first->probability * (1.0 - part * unknownShareOf(*first, thresholds));
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    candidates[i].probability = std::min(most, candidates[i].probability * (1.0 - part * shares[i]));
   unnamed->probability += part * unknown;
 }
 

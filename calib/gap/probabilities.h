@@ -24,8 +24,9 @@ struct MostEvidence {
 MostEvidence mostEvidence(const identify::GapSearch& search, const identify::EffectSelection& selection,
                           const std::vector<GapCandidate>& candidates);
 
-/// Gives the candidates their probabilities, with room for what the catalogue does not hold, and puts the best first.
-/// @param is_any_fit whether anything was selected or refused
+/// Gives the candidates their probabilities, with room for what the catalogue does not hold, and puts the best first;
+/// of equals the one that stood before.
+/// @param is_any_fit whether anything was selected, or refused as the name of a gap
 void setProbabilities(bool is_any_fit, const MostEvidence& most_of, const identify::Thresholds& thresholds,
                       std::vector<GapCandidate>& candidates);
 

@@ -48,6 +48,41 @@ std::optional<identify::RefinedModel> fittedBody(const identify::GapSearch& sear
   return best;
 }
 
+/// Whether it acts from the room and stands at no place in it, as an endless plane does.
+bool isEndless(const identify::GapTerm& term) {
+  return !term.fit->searchesPlace() && term.fit->describe(term.searched, term.linear).location_m.has_value();
+}
+
+/// The image of the transmitter in a plane is a dipole too, which answers along the plane's normal half as much as
+/// across it: where a plane is named, or explains as much, the dipole tells nothing of a shape.
+bool isImageInPlane(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                    const identify::RefinedModel& body) {
+  const std::vector<identify::GapTerm>& named = selection.model.model.terms;
+  if (std::any_of(named.begin(), named.end(), isEndless)) return true;
+  const double worst_bic = search.bicOf(body.model) + search.thresholds().same_evidence;
+  return std::any_of(selection.first.begin(), selection.first.end(), [&](const identify::TriedEffect& one) {
+    const std::vector<identify::GapTerm>& terms = one.refined.model.terms;
+    return !terms.empty() && isEndless(terms.back()) && search.bicOf(one.refined.model) < worst_bic;
+  });
+}
+
+double squaresOf(std::span<const identify::Vector6d> whitened) {
+  double sum = 0.0;
+  for (const identify::Vector6d& r : whitened) sum += r.squaredNorm();
+  return sum;
+}
+
+/// Share of what the named causes take of the squares that the dipole takes; 1 where none is named.
+double shareOfNamed(const identify::GapSearch& search, const identify::EffectSelection& selection,
+                    const identify::RefinedModel& body) {
+  if (selection.ways.empty()) return 1.0;
+  const auto left = [&](const identify::GapModel& model) {
+    return squaresOf(identify::whitenedResiduals(search.physics(), model, search.whitening()));
+  };
+  const double none = left(search.none().model);
+  return (none - left(body.model)) / (none - left(selection.model.model));
+}
+
 /// @param components xx yy zz xy xz yz
 Eigen::Matrix3d symmetric(const Eigen::VectorXd& components) {
   Eigen::Matrix3d matrix;
@@ -89,7 +124,8 @@ std::optional<SourceShape> sourceShapeOf(const identify::GapSearch& search,
   const std::vector<Eigen::Vector3d> centers_m = centersOf(search, selection);
   if (way == nullptr || centers_m.empty()) return std::nullopt;
   const std::optional<identify::RefinedModel> body = fittedBody(search, *way, centers_m);
-  if (!body || body->covariance.size() == 0) return std::nullopt;
+  if (!body || body->covariance.size() == 0 || isImageInPlane(search, selection, *body)) return std::nullopt;
+  if (shareOfNamed(search, selection, *body) < search.thresholds().least_share) return std::nullopt;
   const identify::GapTerm& term = body->model.terms.back();
   const Eigen::Index begin = identify::firstParameterOf(*body, 0);
   const Eigen::MatrixXd covariance = body->covariance.block(begin, begin, kComponents, kComponents);

@@ -10,7 +10,8 @@ namespace fieldtrue::gap {
 /// How the thing in the room that bends the readings most answers the transmitter's field along each of its axes: one
 /// dipole of a general symmetric polarizability, fitted beside nothing else. A ball answers alike along all three; a
 /// flat sheet that conducts, and a loop, along the normal alone; a bar of iron along its length. It decides nothing.
-/// @return nothing where no thing in the room stands out, or the tracker is no dipole
+/// @return nothing where no thing in the room stands out, a plane is named or explains as much, or one dipole takes
+/// less than Thresholds::least_share of what the named causes take
 /// @source principal polarizabilities of a buried body: Bell, Barrow, Miller 2001, IEEE Trans. Geosci. Remote Sens. 39
 /// 1286; of thin sheets and loops: Baum 1999, Detection and Identification of Visually Obscured Targets, chapter 6
 std::optional<SourceShape> sourceShapeOf(const identify::GapSearch& search, const identify::EffectSelection& selection);

@@ -25,18 +25,31 @@ std::string causesText(const GapReport& report) {
   for (const SelectedEffect& effect : report.selected) {
     std::string name = effects::labelOf(effect.effect);
     for (const std::string& other : effect.equivalents)
-      if (other != effect.effect) name += " or " + effects::labelOf(other) + " (these readings cannot tell)";
+      if (other != effect.effect) name += " or " + effects::labelOf(other);
+    if (effect.equivalents.size() > 1) name += " (these readings cannot tell)";
     text += (text.empty() ? "" : ", and ") + name;
   }
   return text;
 }
 
-/// The gap beside its floor: positions, and rotations too where these stand out more.
+/// RMS over the floor from which the size of the gap shows it: set by reason, chance alone gives it at fifty places in
+/// one recording of twenty.
+constexpr double kShownBySize = 1.1;
+
+std::string plainText(double rms, double floor, const std::string& unit) {
+  return shown(rms) + " " + unit + " where noise alone would be " + shown(floor) + " " + unit;
+}
+
+/// The gap beside its floor: of positions, of rotations too where these stand out more, or of rotations alone where
+/// only these do.
 std::string gapText(const GapReport& report) {
-  std::string text =
-      shown(report.position_rms_mm) + " mm where noise alone would be " + shown(report.floor_position_mm) + " mm";
   const double turned_deg = report.orientation_rms_deg.value_or(0.0);
   const double floor_deg = report.floor_orientation_deg.value_or(0.0);
+  if (report.position_rms_mm < kShownBySize * report.floor_position_mm) {
+    if (turned_deg > kShownBySize * floor_deg) return "of rotation, " + plainText(turned_deg, floor_deg, "degrees");
+    return shown(report.position_rms_mm) + " mm, as large as noise alone, but not scattered as noise is";
+  }
+  std::string text = plainText(report.position_rms_mm, report.floor_position_mm, "mm");
   const bool stands_out = turned_deg * report.floor_position_mm > report.position_rms_mm * floor_deg;
   if (stands_out && turned_deg > 2.0 * floor_deg)
     text += ", and " + shown(turned_deg) + " degrees where it would be " + shown(floor_deg);
@@ -136,7 +149,8 @@ std::string verdictText(const GapReport& report, const std::string& thing) {
   const std::string gap = gapText(report);
   switch (report.verdict) {
     case GapVerdict::kNoGap:
-      return "No " + thing + ": the recording agrees with the simulation within its noise (" + gap + ").";
+      return "No " + thing + ": the recording agrees with the simulation within its noise (" +
+             plainText(report.position_rms_mm, report.floor_position_mm, "mm") + ").";
     case GapVerdict::kExplained:
       return "The " + thing + " (" + gap + ") is explained by: " + causesText(report) +
              (isSureOfMost(report) ? "; " + fallText(report)

@@ -27,6 +27,8 @@ class PlaceNameTest : public QObject {
     QCOMPARE(names.list({10, 11, 12}), std::string("A3, pipe 1; B3, pipe 1 and C3, pipe 1"));
     QCOMPARE(names.list({10, 11, 12, 13}, 2), std::string("A3, pipe 1; B3, pipe 1 and 2 more"));
     QCOMPARE(names.list({10, 11, 12}, 2), std::string("A3, pipe 1; B3, pipe 1 and C3, pipe 1"));
+    const std::vector<int> worst_first{12, 10, 13, 11};
+    QCOMPARE(names.listInOrder(worst_first, 2), std::string("C3, pipe 1; A3, pipe 1 and 2 more"));
     QCOMPARE(PlaceNames().list({1, 2, 3, 4, 5, 6, 7}), std::string("P1; P2; P3; P4; P5; P6 and P7"));
   }
 

@@ -1,5 +1,9 @@
 #include <QTest>
+#include <array>
+#include <cmath>
+#include <vector>
 
+#include "calib/gap/probabilities.h"
 #include "calib/gap/verdict.h"
 #include "tests/support/test_main.h"
 
@@ -72,6 +76,63 @@ class GapVerdictTest : public QObject {
     QVERIFY2(text.endsWith("goes from 20 mm to 10 mm (12 mm at most, 95 % sure)."), qPrintable(text));
     report.selected.clear();
     QVERIFY(!isSureOfMost(report));
+  }
+
+  /// The figures in brackets show the gap: by size, by rotation, or neither, where only its structure does.
+  void figuresShowTheGap_data() {
+    QTest::addColumn<double>("position_mm");
+    QTest::addColumn<double>("turned_deg");
+    QTest::addColumn<QString>("shows");
+    QTest::newRow("size") << 8.0 << 0.3 << "There is a gap (8 mm where noise alone would be 5 mm) that";
+    QTest::newRow("size and rotation")
+        << 8.0 << 0.9 << "(8 mm where noise alone would be 5 mm, and 0.9 degrees where it would be 0.3)";
+    QTest::newRow("rotation") << 5.2 << 0.4 << "(of rotation, 0.4 degrees where noise alone would be 0.3 degrees)";
+    QTest::newRow("structure") << 4.9 << 0.31 << "(4.9 mm, as large as noise alone, but not scattered as noise is)";
+  }
+  void figuresShowTheGap() {
+    QFETCH(double, position_mm);
+    QFETCH(double, turned_deg);
+    QFETCH(QString, shows);
+    GapReport report;
+    report.verdict = GapVerdict::kUnexplained;
+    report.position_rms_mm = position_mm;
+    report.floor_position_mm = 5.0;
+    report.orientation_rms_deg = turned_deg;
+    report.floor_orientation_deg = 0.3;
+    const QString text = QString::fromStdString(verdictText(report));
+    QVERIFY2(text.contains(shows), qPrintable(text));
+    report.verdict = GapVerdict::kNoGap;
+    QVERIFY(QString::fromStdString(verdictText(report)).contains("mm where noise alone would be 5 mm)."));
+  }
+
+  /// No cause that is not named is likelier than the one that is: neither by more evidence of its own, nor because less
+  /// is left to the unknown of an error of the instrument than of a thing in the room.
+  void whatIsNamedComesFirst() {
+    std::vector<GapCandidate> candidates(5);
+    const std::array<const char*, 5> effects{"compact_metal", "closed_loop", "coil_gain", "none", kUnnamedSmooth};
+    const std::array<double, 5> gains{69.0, 75.0, 72.0, 0.0, 37.0};
+    for (std::size_t i = 0; i < 5; ++i) {
+      candidates[i].effect = effects[i];
+      candidates[i].bic_gain = gains[i];
+      candidates[i].shrinkage.fraction = 0.5;
+      if (i < 2) candidates[i].location_m = Eigen::Vector3d::Ones();
+    }
+    setProbabilities(true, {69.0, 57.0}, {}, candidates);
+    QCOMPARE(candidates.front().effect, std::string("compact_metal"));
+    double sum = 0.0;
+    for (const GapCandidate& c : candidates) sum += c.probability;
+    QVERIFY(std::abs(sum - 1.0) < 1e-12);
+  }
+
+  void whatCannotBeToldIsSaidOnce() {
+    GapReport report;
+    report.verdict = GapVerdict::kPartlyExplained;
+    SelectedEffect loop;
+    loop.effect = "closed_loop";
+    loop.equivalents = {"closed_loop", "finite_plate", "compact_metal"};
+    report.selected.push_back(loop);
+    const QString text = QString::fromStdString(verdictText(report));
+    QVERIFY2(text.contains(" or ") && text.count("(these readings cannot tell)") == 1, qPrintable(text));
   }
 
   void tellsHowFarReadingsLieOff() {

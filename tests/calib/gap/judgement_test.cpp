@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "calib/gap/candidates.h"
 #include "calib/gap/unseen.h"
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/test_main.h"
@@ -52,6 +53,20 @@ QString tracesOf(const CalibrationTable& table) {
 class JudgementTest : public QObject {
   Q_OBJECT
  private slots:
+  /// What was refused and stands out of no floor is not the likeliest cause of a gap that is not there; where there is
+  /// one, a field without a name comes first.
+  void refusedWithoutAGapNoneComesFirst() {
+    const Named named(recordedIn(gapScene(), gapPlan()));
+    Judgement judgement = judge(named.search, named.selection, {});
+    QVERIFY(judgement.selection.ways.empty());
+    judgement.refusal = Refusal::kForetellsNoBetter;
+    judgement.nats_over_unnamed = 8.0;
+    judgement.selection.alternatives.front().bic_gain = 23.0;
+    judgement.selection.alternatives.front().held_out_gain = 5.0;
+    QCOMPARE(describeCandidates(named.search, judgement, false, 0.0).front().effect, std::string("none"));
+    QCOMPARE(describeCandidates(named.search, judgement, true, 0.0).front().effect, std::string(kUnnamedSmooth));
+  }
+
   void namesErrorsThatOneBodyHides() {
     const Named named(instrumentErrors());
     const Judgement judgement = judge(named.search, named.selection, {});

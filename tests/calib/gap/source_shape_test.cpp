@@ -87,6 +87,29 @@ class SourceShapeTest : public QObject {
     }
   }
 
+  /// The image of the transmitter in a plane is a dipole at twice its distance d, whose moment is -4 pi (2 d)^3 times
+  /// the field there across the plane's normal and half of that along it: above 0.4, so that a floor would pass for a
+  /// block. Where a plane is named, alone or beside a body, nothing is told.
+  void aPlaneIsNoBlock_data() {
+    QTest::addColumn<QByteArray>("beside");
+    QTest::newRow("floor") << QByteArray();
+    QTest::newRow("floor and ball") << QByteArray(R"({"center_m": [0.7, 0.1, -0.6], "radius_m": 0.25})");
+  }
+  void aPlaneIsNoBlock() {
+    QFETCH(QByteArray, beside);
+    QVERIFY(shapeOf({-1.0, -1.0, -0.5}, Eigen::Vector3d::Constant(0.01), identify::Thresholds{}.silent_axis) ==
+            Shape::kBody);
+    const simulation::Scene believed = gapScene();
+    simulation::Scene actual = believed;
+    actual.effects.push_back({"metal_plane", nlohmann::json::parse(R"({"toward": [0, 0, -1], "distance_m": 1.2})")});
+    if (!beside.isEmpty()) actual.effects.push_back({"compact_metal", nlohmann::json::parse(beside.toStdString())});
+    const auto report = diagnose(recordedIn(actual, gapPlan()), nullptr, &believed);
+    FT_VERIFY_OK(report);
+    const auto is_plane = [](const SelectedEffect& effect) { return effect.effect == "metal_plane"; };
+    QVERIFY(std::any_of(report->selected.begin(), report->selected.end(), is_plane));
+    QVERIFY(!report->source_shape.has_value());
+  }
+
   void aSentenceHasNoMinusNothing() {
     SourceShape shape;
     shape.shape = Shape::kFlatOrLoop;
