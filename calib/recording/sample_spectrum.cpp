@@ -1,12 +1,13 @@
 #include "calib/recording/sample_spectrum.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "calib/core/statistics.h"
 #include "calib/recording/autoregression.h"
+#include "calib/recording/relaxation_noise.h"
 
 namespace fieldtrue::recording {
 
@@ -22,9 +23,14 @@ constexpr double kStandsStill = 1e-12;
 constexpr double kHighestPower = 12.0;
 /// Frequencies half the parts' resolution apart.
 constexpr int kPerResolution = 2;
-constexpr int kFirstBin = 3;  ///< Below 1.5 periods a part cannot tell a line from drift.
-constexpr int kNearest = 3;   ///< Neighbourhood of a frequency, in bins to either side.
+/// Below 2 periods a part cannot tell a line from drift, nor are there neighbours below it.
+constexpr int kFirstBin = 4;
+constexpr int kNearest = 3;  ///< Neighbourhood of a frequency, in bins to either side.
 constexpr int kFarthest = 9;
+/// Of the slow noise about a frequency at the low end: itself and what a line there shows beside it are left out, and
+/// it is fitted so many bins far.
+constexpr int kNearestSlow = 2;
+constexpr int kFarthestSlow = 36;
 constexpr std::size_t kMostLines = 3;
 constexpr double kLargestChance = 1e-3;
 /// A line that adds less than this share to the noise's power does no harm that could be seen.
@@ -36,15 +42,6 @@ struct Part {
   Eigen::VectorXd times_s;  ///< From the part's first reading.
   Eigen::MatrixXd values;
 };
-
-/// Takes mean and slope out of every column.
-Eigen::MatrixXd detrended(const Eigen::VectorXd& times_s, const Eigen::MatrixXd& values) {
-  Eigen::MatrixXd basis(values.rows(), 2);
-  basis.col(0).setOnes();
-  basis.col(1) = times_s.array() - times_s.mean();
-  const Eigen::MatrixXd normal = basis.transpose() * basis;
-  return values - basis * normal.ldlt().solve(basis.transpose() * values);
-}
 
 /// Scales the channels to unit variance; those that stand still are left out.
 Eigen::MatrixXd scaled(const Eigen::MatrixXd& values) {
@@ -234,20 +231,90 @@ std::vector<double> pooledAutocovariance(const std::vector<Part>& parts, Eigen::
   return sums;
 }
 
+std::size_t medianLength(const std::vector<Part>& parts) {
+  std::vector<double> lengths;
+  for (const Part& part : parts) lengths.push_back(static_cast<double>(part.values.rows()));
+  return static_cast<std::size_t>(median(std::move(lengths)));
+}
+
+const Part& ofMedianLength(const std::vector<Part>& parts) {
+  const auto length = static_cast<Eigen::Index>(medianLength(parts));
+  return *std::min_element(parts.begin(), parts.end(), [&](const Part& a, const Part& b) {
+    return std::abs(a.values.rows() - length) < std::abs(b.values.rows() - length);
+  });
+}
+
+/// What exponential variables have for a mean that have this one once they are cut at the highest power.
+double uncutMean(double shown) {
+  double mean = shown;
+  for (int step = 0; step < 30; ++step) mean = shown / -std::expm1(-kHighestPower / mean);
+  return mean;
+}
+
+/// What slow noise shows at the low end, where a frequency has few neighbours or none below.
+class SlowNoise {
+ public:
+  /// @param power from the lowest bin on, which is half a period a part
+  /// @param part stands for all
+  SlowNoise(const Eigen::VectorXd& power, const Part& part, double correlation, double rate_hz, double step_hz)
+      : power_(power) {
+    std::vector<double> frequencies;
+    for (Eigen::Index bin = 1; bin <= power.size(); ++bin)
+      frequencies.push_back(static_cast<double>(bin) * step_hz / rate_hz);
+    shapes_ = relaxationPowers((part.times_s * rate_hz).array().round(), correlation, frequencies);
+  }
+
+  /// Fitted to the others.
+  double powerAt(Eigen::Index bin) const {
+    std::vector<Eigen::Index> others;
+    for (Eigen::Index other = 1; other <= power_.size(); ++other)
+      if (std::abs(other - bin) >= kNearestSlow) others.push_back(other - 1);
+    const Eigen::MatrixXd shapes = shapes_(others, Eigen::all);
+    return shapes_.row(bin - 1).dot(likeliestSum(shapes, power_(others)));
+  }
+
+ private:
+  Eigen::VectorXd power_;
+  Eigen::MatrixXd shapes_;
+};
+
 /// What the neighbourhood of each frequency, itself left out, says of the noise there at most: neither a slope nor the
-/// top of a filter's lobe is a line. The lowest frequencies have no neighbours below: there red noise rises as a line
-/// would, and what the readings' own autoregression says counts too.
-std::vector<double> backgroundOf(const std::vector<double>& power, const std::vector<double>& frequencies_hz,
-                                 const Autoregression& noise, double rate_hz) {
+/// top of a filter's lobe is a line.
+std::vector<double> neighbourhood(const std::vector<double>& power) {
   std::vector<double> background;
-  for (int bin = 0; bin < static_cast<int>(power.size()); ++bin) {
+  for (int bin = 0; bin < static_cast<int>(power.size()); ++bin)
     background.push_back(std::max({medianBetween(power, bin - kFarthest, bin - kNearest),
                                    medianBetween(power, bin + kNearest, bin + kFarthest), parabolaAcross(power, bin)}));
-    if (bin < kFarthest)
-      background.back() =
-          std::max(background.back(), noise.powerAt(frequencies_hz[static_cast<std::size_t>(bin)] / rate_hz));
-  }
   return background;
+}
+
+/// The lowest bins, as far as slow noise is fitted; where there are neighbours on both sides they bound the power, lest
+/// a line be taken for noise.
+Eigen::VectorXd lowPower(const std::vector<Part>& white, const SampleSpectrum& spectrum, double step_hz) {
+  std::vector<double> below_hz;
+  for (int bin = 1; bin < kFirstBin; ++bin) below_hz.push_back(bin * step_hz);
+  std::vector<double> power = pooledPower(white, below_hz);
+  const std::size_t bins = std::min<std::size_t>(spectrum.power.size(), kFarthestSlow);
+  for (std::size_t bin = 0; bin < bins; ++bin)
+    power.push_back(bin < kFarthest ? spectrum.power[bin] : std::min(spectrum.power[bin], spectrum.background[bin]));
+  Eigen::VectorXd uncut(static_cast<Eigen::Index>(power.size()));
+  for (std::size_t bin = 0; bin < power.size(); ++bin)
+    uncut[static_cast<Eigen::Index>(bin)] = uncutMean(std::clamp(power[bin], 1e-9, 0.99 * kHighestPower));
+  return uncut;
+}
+
+/// The lowest frequencies have few neighbours below: there red noise rises as a line would, and what the readings' own
+/// autoregression and slow noise fitted to the others say counts too.
+void raiseLowEnd(SampleSpectrum& spectrum, const std::vector<Part>& parts, const std::vector<Part>& white, double rho) {
+  const double n_white = spectrum.series * static_cast<double>(medianLength(white));
+  const Autoregression noise = fittedAutoregression(pooledAutocovariance(white, kHighestOrder), n_white);
+  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  const SlowNoise slow(lowPower(white, spectrum, step_hz), ofMedianLength(parts), rho, spectrum.rate_hz, step_hz);
+  const std::size_t bins = std::min<std::size_t>(spectrum.power.size(), kFarthest);
+  for (std::size_t bin = 0; bin < bins; ++bin)
+    spectrum.background[bin] =
+        std::max({spectrum.background[bin], noise.powerAt(spectrum.frequencies_hz[bin] / spectrum.rate_hz),
+                  slow.powerAt(static_cast<Eigen::Index>(bin) + kFirstBin)});
 }
 
 /// Upper tail of the mean of as many exponential variables over a background known from a neighbourhood as wide as
@@ -330,12 +397,6 @@ std::vector<double> frequencyGrid_hz(double rate_hz, std::size_t length) {
   return frequencies_hz;
 }
 
-std::size_t medianLength(const std::vector<Part>& parts) {
-  std::vector<double> lengths;
-  for (const Part& part : parts) lengths.push_back(static_cast<double>(part.values.rows()));
-  return static_cast<std::size_t>(median(std::move(lengths)));
-}
-
 }  // namespace
 
 std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& visits, const TableMetadata& metadata) {
@@ -354,9 +415,8 @@ std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& vis
   const double rho = pooledCorrelation(parts);
   const std::vector<Part> white = prewhitened(parts, rho);
   spectrum.power = pooledPower(white, spectrum.frequencies_hz);
-  const double n_white = spectrum.series * static_cast<double>(medianLength(white));
-  const Autoregression noise = fittedAutoregression(pooledAutocovariance(white, kHighestOrder), n_white);
-  spectrum.background = backgroundOf(spectrum.power, spectrum.frequencies_hz, noise, *rate_hz);
+  spectrum.background = neighbourhood(spectrum.power);
+  raiseLowEnd(spectrum, parts, white, rho);
   while (spectrum.lines.size() < kMostLines) {
     const std::optional<SpectralLine> line = strongestLine(spectrum, white, rho);
     if (!line || (!spectrum.lines.empty() && line->amplitude_sd < 0.3 * spectrum.lines.front().amplitude_sd)) break;

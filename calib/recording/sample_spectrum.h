@@ -31,9 +31,12 @@ struct SampleSpectrum {
 
 /// Pools the periodograms of all stops before looking for lines: what is invisible at one stop shows in a hundred.
 /// Noise coloured by the tracker's filter is prewhitened to first order, and a line must stand out of both sides of its
-/// neighbourhood.
+/// neighbourhood. Up to six cycles a part there are few neighbours below or none: there it must stand out of the
+/// readings' autoregression and of the likeliest sum of relaxations, a random walk and white noise, fitted to the other
+/// frequencies, too. Below two cycles nothing is looked for.
 /// @return nothing where fewer than 4 stops of 16 readings are there, or their rate is unknown
-/// @source Lomb 1976; Scargle 1982; Welch 1967 for the pooling
+/// @source Lomb 1976; Scargle 1982; Welch 1967 for the pooling; van der Ziel 1950 for slow noise as a sum of
+/// relaxations, Whittle 1953 for its fit
 std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& visits, const TableMetadata& metadata);
 
 }  // namespace fieldtrue::recording
