@@ -1,12 +1,13 @@
 #include "calib/recording/sample_spectrum.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "calib/core/statistics.h"
 #include "calib/recording/autoregression.h"
+#include "calib/recording/relaxation_noise.h"
 
 namespace fieldtrue::recording {
 
@@ -22,29 +23,28 @@ constexpr double kStandsStill = 1e-12;
 constexpr double kHighestPower = 12.0;
 /// Frequencies half the parts' resolution apart.
 constexpr int kPerResolution = 2;
-constexpr int kFirstBin = 3;  ///< Below 1.5 periods a part cannot tell a line from drift.
-constexpr int kNearest = 3;   ///< Neighbourhood of a frequency, in bins to either side.
+/// Below 2 periods a part cannot tell a line from drift, nor are there neighbours below it.
+constexpr int kFirstBin = 4;
+constexpr int kNearest = 3;  ///< Neighbourhood of a frequency, in bins to either side.
 constexpr int kFarthest = 9;
+constexpr int kFarthestSlow = 40;  ///< Bins to which slow noise is fitted.
+/// Enough for an autoregression to fill what is left out with what it says itself.
+constexpr int kFillings = 12;
 constexpr std::size_t kMostLines = 3;
 constexpr double kLargestChance = 1e-3;
 /// A line that adds less than this share to the noise's power does no harm that could be seen.
 constexpr double kSmallestExcess = 0.2;
-constexpr Eigen::Index kHighestOrder = 12;  ///< Of the noise's autoregression.
+/// The same below 4 and below 6.5 periods a part, where noise known mostly from above may hide a broad hump. One three
+/// resolutions wide (second order, pole radius 0.85) stood out by 1.7 at most and by 0.5.
+constexpr double kSmallestLowestExcess = 2.0;
+constexpr double kSmallestLowExcess = 0.6;
+constexpr Eigen::Index kHighestOrder = 24;  ///< Of the noise's autoregression.
 
 /// A stop's readings, or a part of a long stop's: channels of unit variance, one reading a row.
 struct Part {
   Eigen::VectorXd times_s;  ///< From the part's first reading.
   Eigen::MatrixXd values;
 };
-
-/// Takes mean and slope out of every column.
-Eigen::MatrixXd detrended(const Eigen::VectorXd& times_s, const Eigen::MatrixXd& values) {
-  Eigen::MatrixXd basis(values.rows(), 2);
-  basis.col(0).setOnes();
-  basis.col(1) = times_s.array() - times_s.mean();
-  const Eigen::MatrixXd normal = basis.transpose() * basis;
-  return values - basis * normal.ldlt().solve(basis.transpose() * values);
-}
 
 /// Scales the channels to unit variance; those that stand still are left out.
 Eigen::MatrixXd scaled(const Eigen::MatrixXd& values) {
@@ -219,34 +219,114 @@ double parabolaAcross(const std::vector<double>& power, int bin) {
   return std::exp(parabolaAtZero(distances, logs));
 }
 
-/// Autocovariances of all parts together, lags 0 to `most`.
-std::vector<double> pooledAutocovariance(const std::vector<Part>& parts, Eigen::Index most) {
-  std::vector<double> sums(static_cast<std::size_t>(most) + 1, 0.0);
-  double count = 0.0;
-  for (const Part& part : parts) {
-    const Eigen::Index n = part.values.rows();
-    count += static_cast<double>(part.values.size());
-    for (Eigen::Index lag = 0; lag <= std::min(most, n - 1); ++lag)
-      sums[static_cast<std::size_t>(lag)] +=
-          (part.values.topRows(n - lag).array() * part.values.bottomRows(n - lag).array()).sum();
-  }
-  for (double& sum : sums) sum /= count;
-  return sums;
+std::size_t medianLength(const std::vector<Part>& parts) {
+  std::vector<double> lengths;
+  for (const Part& part : parts) lengths.push_back(static_cast<double>(part.values.rows()));
+  return static_cast<std::size_t>(median(std::move(lengths)));
 }
 
+const Part& ofMedianLength(const std::vector<Part>& parts) {
+  const auto length = static_cast<Eigen::Index>(medianLength(parts));
+  return *std::min_element(parts.begin(), parts.end(), [&](const Part& a, const Part& b) {
+    return std::abs(a.values.rows() - length) < std::abs(b.values.rows() - length);
+  });
+}
+
+/// What exponential variables have for a mean that have this one once they are cut at the highest power.
+double uncutMean(double shown) {
+  double mean = shown;
+  for (int step = 0; step < 30; ++step) mean = shown / -std::expm1(-kHighestPower / mean);
+  return mean;
+}
+
+/// The parts without sinusoids of the lines' frequencies.
+std::vector<Part> withoutLines(const std::vector<Part>& parts, const std::vector<SpectralLine>& lines) {
+  std::vector<Part> left = parts;
+  for (const SpectralLine& line : lines) {
+    for (Part& part : left) {
+      Eigen::MatrixXd basis(part.values.rows(), 2);
+      basis.col(0) = (kTwoPi * line.frequency_hz * part.times_s.array()).cos();
+      basis.col(1) = (kTwoPi * line.frequency_hz * part.times_s.array()).sin();
+      part.values -= basis * basis.colPivHouseholderQr().solve(part.values);
+    }
+  }
+  return left;
+}
+
+/// What the noise shows at a frequency by all others: the readings' autoregression, which knows a filter's lobe or a
+/// hand's sway, and at the low end, where few neighbours are below or none, the likeliest slow noise.
+class NoiseElsewhere {
+ public:
+  NoiseElsewhere(const std::vector<Part>& parts, const std::vector<Part>& white, const SampleSpectrum& spectrum,
+                 double rho)
+      : white_(white), n_values_(spectrum.series * static_cast<double>(medianLength(white))) {
+    const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+    for (int bin = 0; bin * step_hz <= 0.5 * spectrum.rate_hz * (1.0 + 1e-9); ++bin) grid_hz_.push_back(bin * step_hz);
+    std::vector<double> low;
+    for (std::size_t bin = 0; bin < std::min<std::size_t>(grid_hz_.size(), kFarthestSlow); ++bin)
+      low.push_back(grid_hz_[bin] / spectrum.rate_hz);
+    const Part& part = ofMedianLength(parts);
+    shapes_ = relaxationPowers((part.times_s * spectrum.rate_hz).array().round(), rho, low);
+  }
+
+  double powerAt(double frequency_hz) const {
+    SpectralLine line;
+    line.frequency_hz = frequency_hz;
+    const std::vector<double> shown = pooledPower(withoutLines(white_, {line}), grid_hz_);
+    Eigen::VectorXd power(static_cast<Eigen::Index>(shown.size()));
+    for (std::size_t bin = 0; bin < shown.size(); ++bin)
+      power[static_cast<Eigen::Index>(bin)] = uncutMean(std::clamp(shown[bin], 1e-9, 0.99 * kHighestPower));
+    const double at = frequency_hz / grid_hz_[1];
+    const double expected = autoregressive(power, at);
+    return at < kFirstBin + kFarthest ? std::max(expected, slow(power, at)) : expected;
+  }
+
+ private:
+  bool isLeftOut(Eigen::Index bin, double at) const { return std::abs(static_cast<double>(bin) - at) < kPerResolution; }
+
+  double slow(const Eigen::VectorXd& power, double at) const {
+    std::vector<Eigen::Index> others;
+    for (Eigen::Index bin = 1; bin < shapes_.rows(); ++bin)
+      if (!isLeftOut(bin, at)) others.push_back(bin);
+    const Eigen::MatrixXd shapes = shapes_(others, Eigen::all);
+    return shapes_.row(std::lround(at)).dot(likeliestSum(shapes, power(others)));
+  }
+
+  /// What was left out, and what mean and slope have taken, is filled with what the autoregression itself says of it.
+  double autoregressive(Eigen::VectorXd power, double at) const {
+    const auto length = static_cast<double>(power.size() - 1);
+    const Eigen::Index order = std::min(kHighestOrder, power.size() / 3);
+    Autoregression noise;
+    for (Eigen::Index bin = 0; bin < power.size(); ++bin)
+      if (bin < 2 || isLeftOut(bin, at)) power[bin] = power[std::min(bin + 2 * kPerResolution, power.size() - 1)];
+    for (int round = 0; round < kFillings; ++round) {
+      std::vector<double> covariances;
+      for (Eigen::Index lag = 0; lag <= order; ++lag) {
+        double sum = -0.5 * (power[0] + (lag % 2 == 0 ? 1.0 : -1.0) * power[power.size() - 1]);
+        for (Eigen::Index bin = 0; bin < power.size(); ++bin)
+          sum += power[bin] * std::cos(std::numbers::pi * static_cast<double>(bin * lag) / length);
+        covariances.push_back(sum / length);
+      }
+      noise = fittedAutoregression(covariances, n_values_);
+      for (Eigen::Index bin = 0; bin < power.size(); ++bin)
+        if (bin < 2 || isLeftOut(bin, at)) power[bin] = noise.powerAt(static_cast<double>(bin) / (2.0 * length));
+    }
+    return noise.powerAt(at / (2.0 * length));
+  }
+
+  const std::vector<Part>& white_;
+  double n_values_;
+  std::vector<double> grid_hz_;
+  Eigen::MatrixXd shapes_;  ///< Of the lowest bins of the grid.
+};
+
 /// What the neighbourhood of each frequency, itself left out, says of the noise there at most: neither a slope nor the
-/// top of a filter's lobe is a line. The lowest frequencies have no neighbours below: there red noise rises as a line
-/// would, and what the readings' own autoregression says counts too.
-std::vector<double> backgroundOf(const std::vector<double>& power, const std::vector<double>& frequencies_hz,
-                                 const Autoregression& noise, double rate_hz) {
+/// top of a filter's lobe is a line.
+std::vector<double> neighbourhood(const std::vector<double>& power) {
   std::vector<double> background;
-  for (int bin = 0; bin < static_cast<int>(power.size()); ++bin) {
+  for (int bin = 0; bin < static_cast<int>(power.size()); ++bin)
     background.push_back(std::max({medianBetween(power, bin - kFarthest, bin - kNearest),
                                    medianBetween(power, bin + kNearest, bin + kFarthest), parabolaAcross(power, bin)}));
-    if (bin < kFarthest)
-      background.back() =
-          std::max(background.back(), noise.powerAt(frequencies_hz[static_cast<std::size_t>(bin)] / rate_hz));
-  }
   return background;
 }
 
@@ -274,52 +354,73 @@ double prewhiteningGain(double frequency_hz, double rate_hz, double rho) {
   return 1.0 + rho * rho - 2.0 * rho * std::cos(kTwoPi * frequency_hz / rate_hz);
 }
 
-/// The strongest line not near one found before; none when nothing stands out.
-std::optional<SpectralLine> strongestLine(const SampleSpectrum& spectrum, const std::vector<Part>& white, double rho) {
-  const std::size_t bins = spectrum.power.size();
+/// The bin that stands out most of its neighbourhood, of those not near a line found before nor refused.
+std::size_t highestBin(const SampleSpectrum& spectrum, const std::vector<bool>& refused) {
   const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
-  double highest = 0.0;
-  std::size_t peak = bins;
-  for (std::size_t bin = 0; bin < bins; ++bin) {
+  const auto ratio = [&](std::size_t bin) {
+    return spectrum.background[bin] > 0.0 ? spectrum.power[bin] / spectrum.background[bin] : 0.0;
+  };
+  std::size_t peak = spectrum.power.size();
+  for (std::size_t bin = 0; bin < spectrum.power.size(); ++bin) {
     const bool is_taken = std::any_of(spectrum.lines.begin(), spectrum.lines.end(), [&](const SpectralLine& line) {
       return std::abs(line.frequency_hz - spectrum.frequencies_hz[bin]) < 3.0 * kPerResolution * step_hz;
     });
-    const double ratio = spectrum.background[bin] > 0.0 ? spectrum.power[bin] / spectrum.background[bin] : 0.0;
-    if (is_taken || ratio <= highest) continue;
-    highest = ratio;
+    if (is_taken || refused[bin] || ratio(bin) <= (peak < spectrum.power.size() ? ratio(peak) : 0.0)) continue;
     peak = bin;
   }
-  if (peak == bins || highest < 1.0 + kSmallestExcess) return std::nullopt;
-  SpectralLine line;
+  return peak;
+}
+
+double leastExcess(std::size_t bin) {
+  if (bin < kPerResolution * 4 - kFirstBin) return kSmallestLowestExcess;
+  return bin < kFarthest ? kSmallestLowExcess : kSmallestExcess;
+}
+
+/// That power stands out of a background as much by chance at any of the frequencies.
+double chanceAt(const SampleSpectrum& spectrum, std::size_t bin, double background) {
+  const double ratio = spectrum.power[bin] / background;
+  if (ratio < 1.0 + leastExcess(bin)) return 1.0;
   // At half the rate there is no sine beside the cosine, and the power scatters twice as much.
-  const bool is_at_end = spectrum.frequencies_hz[peak] > 0.5 * spectrum.rate_hz - 1.5 * step_hz;
+  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  const bool is_at_end = spectrum.frequencies_hz[bin] > 0.5 * spectrum.rate_hz - 1.5 * step_hz;
   const double series = is_at_end ? 0.5 * spectrum.series : spectrum.series;
-  line.p_value = std::min(1.0, static_cast<double>(bins) / kPerResolution * chanceOf(highest, series));
-  if (line.p_value > kLargestChance) return std::nullopt;
-  line.frequency_hz =
-      std::clamp(refined_hz(white, spectrum.frequencies_hz[peak], step_hz), 0.0, 0.5 * spectrum.rate_hz);
-  line.error_hz = 0.5 * step_hz / std::sqrt(std::max(1.0, (highest - 1.0) * std::sqrt(spectrum.series)));
-  const auto n = static_cast<double>(white.front().values.rows());
-  const double excess = (highest - 1.0) * spectrum.background[peak];
+  return std::min(1.0, static_cast<double>(spectrum.power.size()) / kPerResolution * chanceOf(ratio, series));
+}
+
+SpectralLine lineAt(const SampleSpectrum& spectrum, std::size_t bin, double frequency_hz, std::size_t readings,
+                    double rho) {
+  SpectralLine line;
+  line.frequency_hz = frequency_hz;
+  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  const double excess = spectrum.power[bin] - spectrum.background[bin];
+  const double sds = excess / spectrum.background[bin] * std::sqrt(spectrum.series);
+  line.error_hz = 0.5 * step_hz / std::sqrt(std::max(1.0, sds));
+  line.p_value = chanceAt(spectrum, bin, spectrum.background[bin]);
   // Before prewhitening the noise had variance 1 and the prewhitened 1 - rho^2.
-  const double power =
-      4.0 * excess / n * (1.0 - rho * rho) / prewhiteningGain(line.frequency_hz, spectrum.rate_hz, rho);
+  const double power = 4.0 * excess / static_cast<double>(readings) * (1.0 - rho * rho) /
+                       prewhiteningGain(frequency_hz, spectrum.rate_hz, rho);
   line.amplitude_sd = std::sqrt(std::max(0.0, power));
   return line;
 }
 
-/// The parts without sinusoids of the lines' frequencies.
-std::vector<Part> withoutLines(const std::vector<Part>& parts, const std::vector<SpectralLine>& lines) {
-  std::vector<Part> left = parts;
-  for (const SpectralLine& line : lines) {
-    for (Part& part : left) {
-      Eigen::MatrixXd basis(part.values.rows(), 2);
-      basis.col(0) = (kTwoPi * line.frequency_hz * part.times_s.array()).cos();
-      basis.col(1) = (kTwoPi * line.frequency_hz * part.times_s.array()).sin();
-      part.values -= basis * basis.colPivHouseholderQr().solve(part.values);
-    }
+/// The strongest line not near one found before; none when nothing stands out. What stands out of its neighbourhood but
+/// not of the noise elsewhere raises the background there.
+std::optional<SpectralLine> strongestLine(SampleSpectrum& spectrum, const std::vector<Part>& white,
+                                          const NoiseElsewhere& elsewhere, double rho) {
+  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  std::vector<bool> refused(spectrum.power.size(), false);
+  for (;;) {
+    const std::size_t bin = highestBin(spectrum, refused);
+    if (bin == spectrum.power.size()) return std::nullopt;
+    if (chanceAt(spectrum, bin, spectrum.background[bin]) > kLargestChance) return std::nullopt;
+    const double frequency_hz =
+        std::clamp(refined_hz(white, spectrum.frequencies_hz[bin], step_hz), 0.0, 0.5 * spectrum.rate_hz);
+    spectrum.background[bin] = std::max(spectrum.background[bin], elsewhere.powerAt(frequency_hz));
+    const SpectralLine line =
+        lineAt(spectrum, bin, frequency_hz, static_cast<std::size_t>(white.front().values.rows()), rho);
+    if (line.p_value <= kLargestChance) return line;
+    refused[bin] = true;
   }
-  return left;
 }
 
 std::vector<double> frequencyGrid_hz(double rate_hz, std::size_t length) {
@@ -328,12 +429,6 @@ std::vector<double> frequencyGrid_hz(double rate_hz, std::size_t length) {
   for (int bin = kFirstBin; bin * step_hz <= 0.5 * rate_hz * (1.0 + 1e-9); ++bin)
     frequencies_hz.push_back(bin * step_hz);
   return frequencies_hz;
-}
-
-std::size_t medianLength(const std::vector<Part>& parts) {
-  std::vector<double> lengths;
-  for (const Part& part : parts) lengths.push_back(static_cast<double>(part.values.rows()));
-  return static_cast<std::size_t>(median(std::move(lengths)));
 }
 
 }  // namespace
@@ -354,11 +449,10 @@ std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& vis
   const double rho = pooledCorrelation(parts);
   const std::vector<Part> white = prewhitened(parts, rho);
   spectrum.power = pooledPower(white, spectrum.frequencies_hz);
-  const double n_white = spectrum.series * static_cast<double>(medianLength(white));
-  const Autoregression noise = fittedAutoregression(pooledAutocovariance(white, kHighestOrder), n_white);
-  spectrum.background = backgroundOf(spectrum.power, spectrum.frequencies_hz, noise, *rate_hz);
+  spectrum.background = neighbourhood(spectrum.power);
+  const NoiseElsewhere elsewhere(parts, white, spectrum, rho);
   while (spectrum.lines.size() < kMostLines) {
-    const std::optional<SpectralLine> line = strongestLine(spectrum, white, rho);
+    const std::optional<SpectralLine> line = strongestLine(spectrum, white, elsewhere, rho);
     if (!line || (!spectrum.lines.empty() && line->amplitude_sd < 0.3 * spectrum.lines.front().amplitude_sd)) break;
     spectrum.lines.push_back(*line);
   }

@@ -22,18 +22,22 @@ struct SampleSpectrum {
   std::size_t stops = 0;
   double series = 0.0;  ///< Independent series pooled: stops (or parts of them) times channels.
   std::vector<double> frequencies_hz;
-  std::vector<double> power;        ///< 1 = white noise; after prewhitening.
-  std::vector<double> background;   ///< Of the neighbourhood: what a line must stand out of.
+  std::vector<double> power;  ///< 1 = white noise; after prewhitening.
+  /// What a line must stand out of: of the neighbourhood, and where power passes that, of the noise elsewhere.
+  std::vector<double> background;
   std::vector<SpectralLine> lines;  ///< Strongest first.
   double correlation = 0.0;         ///< Of successive readings, without the lines, corrected for the fitted means.
   double correlation_sd = 0.0;
 };
 
 /// Pools the periodograms of all stops before looking for lines: what is invisible at one stop shows in a hundred.
-/// Noise coloured by the tracker's filter is prewhitened to first order, and a line must stand out of both sides of its
-/// neighbourhood.
+/// Noise coloured by the tracker's filter is prewhitened to first order. A line must stand out of both sides of its
+/// neighbourhood, and of an autoregression of the readings fitted to all other frequencies. Up to 6.5 cycles a part,
+/// where neighbours below are few or none, it must stand out of the likeliest sum of relaxations, a random walk and
+/// white noise too. Below two cycles nothing is looked for.
 /// @return nothing where fewer than 4 stops of 16 readings are there, or their rate is unknown
-/// @source Lomb 1976; Scargle 1982; Welch 1967 for the pooling
+/// @source Lomb 1976; Scargle 1982; Welch 1967 for the pooling; van der Ziel 1950 for slow noise as a sum of
+/// relaxations, Whittle 1953 for its fit
 std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& visits, const TableMetadata& metadata);
 
 }  // namespace fieldtrue::recording

@@ -25,6 +25,8 @@ struct Recording {
   double correlation = 0.0;  ///< First order.
   int box = 1;               ///< Readings averaged by the tracker's filter.
   double sway_hz = 0.0;      ///< About which a hand sways: a broad resonance beside as much white noise.
+  double white_sds = 0.0;    ///< Beside the noise.
+  double exponent = 0.0;     ///< Of noise whose power falls by it with frequency; 2 = a random walk.
   int every = 1;             ///< Only every so many readings are kept: some are lost when it is above 1.
   std::uint64_t seed = 1;
 };
@@ -44,6 +46,23 @@ void addSway(const Recording& recording, field::GaussianStream& stream, std::vec
   }
 }
 
+/// Weights of white noise by age whose sum falls by an exponent of the frequency (Kasdin 1995, eq. 116).
+std::vector<double> weightsByAge(double exponent, std::size_t oldest) {
+  std::vector<double> weights = {1.0};
+  for (std::size_t age = 1; age < oldest; ++age)
+    weights.push_back(weights.back() * (static_cast<double>(age) - 1.0 + 0.5 * exponent) / static_cast<double>(age));
+  return weights;
+}
+
+void addPowerLaw(double exponent, field::GaussianStream& stream, std::vector<Eigen::Vector3d>& raw) {
+  constexpr std::size_t kOldest = 1000;
+  const std::vector<double> weights = weightsByAge(exponent, kOldest);
+  std::vector<Eigen::Vector3d> white;
+  for (std::size_t i = 0; i < raw.size() + kOldest; ++i) white.push_back(stream.nextVector());
+  for (std::size_t i = 0; i < raw.size(); ++i)
+    for (std::size_t age = 0; age < kOldest; ++age) raw[i] += weights[age] * white[i + kOldest - age];
+}
+
 /// Position noise with what is asked for; phases of the line are random by stop, for the stops are far apart.
 std::vector<SampleVisit> record(const Recording& recording) {
   field::GaussianStream stream(recording.seed, 77);
@@ -60,6 +79,9 @@ std::vector<SampleVisit> record(const Recording& recording) {
       raw.push_back(last);
     }
     if (recording.sway_hz > 0.0) addSway(recording, stream, raw);
+    if (recording.exponent > 0.0) addPowerLaw(recording.exponent, stream, raw);
+    if (recording.white_sds > 0.0)
+      for (Eigen::Vector3d& value : raw) value += recording.white_sds * stream.nextVector();
     std::vector<Eigen::Vector3d> values;
     for (int i = 0; i < recording.readings; ++i) {
       if (recording.every > 1 && i % recording.every == 1) continue;
@@ -195,6 +217,58 @@ class SampleSpectrumTest : public QObject {
       if (!spectrum->lines.empty()) ++alarms;
     }
     QCOMPARE(alarms, 0);
+  }
+
+  void slowNoiseIsNoLine_data() {
+    QTest::addColumn<double>("correlation");
+    QTest::addColumn<double>("exponent");
+    QTest::addColumn<double>("white_sds");
+    QTest::addColumn<int>("readings");
+    for (const int readings : {60, 120, 240}) {
+      QTest::addRow("first order 0.8 and white, %d", readings) << 0.8 << 0.0 << 0.5 << readings;
+      QTest::addRow("first order 0.97 and white, %d", readings) << 0.97 << 0.0 << 1.0 << readings;
+      QTest::addRow("f^-1, %d", readings) << 0.0 << 1.0 << 0.0 << readings;
+      QTest::addRow("f^-1.5, %d", readings) << 0.0 << 1.5 << 0.0 << readings;
+      QTest::addRow("random walk and white, %d", readings) << 0.0 << 2.0 << 3.0 << readings;
+    }
+  }
+  /// Noise that no autoregression of low order makes: its low end rises over one fitted to it, and is no line.
+  void slowNoiseIsNoLine() {
+    QFETCH(double, correlation);
+    QFETCH(double, exponent);
+    QFETCH(double, white_sds);
+    QFETCH(int, readings);
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Recording recording{.stops = 24, .readings = readings, .correlation = correlation, .seed = seed};
+      recording.exponent = exponent;
+      recording.white_sds = white_sds;
+      const auto spectrum = sampleSpectrum(record(recording), {});
+      QVERIFY(spectrum.has_value());
+      QVERIFY2(spectrum->lines.empty(), std::to_string(seed).c_str());
+    }
+  }
+
+  void aLineInSlowNoiseIsFound_data() {
+    QTest::addColumn<double>("line_hz");
+    QTest::addColumn<int>("readings");
+    for (const int readings : {60, 120})
+      for (const double line_hz : {5.0, 15.0, 50.0, 58.0})
+        QTest::addRow("%g Hz, %d", line_hz, readings) << line_hz << readings;
+  }
+  /// Of n readings an amplitude of the white noise's SD has n/4 times its power, 15 or 30; noise of correlation c
+  /// beside it has (1 - c^2) / (1 + c^2 - 2 c cos(2 pi f)): 0.9 times at 5 Hz, less above.
+  void aLineInSlowNoiseIsFound() {
+    QFETCH(double, line_hz);
+    QFETCH(int, readings);
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Recording recording{.stops = 24, .readings = readings, .line_hz = line_hz, .line_sd = 1.0, .seed = seed};
+      recording.correlation = 0.97;
+      recording.white_sds = 1.0;
+      const auto spectrum = sampleSpectrum(record(recording), {});
+      QVERIFY(spectrum.has_value());
+      QCOMPARE(spectrum->lines.size(), std::size_t(1));
+      FT_VERIFY_MATCH(near(spectrum->lines[0].frequency_hz, line_hz, 60.0 / readings));
+    }
   }
 
   void correlationIsMeasuredWithoutBias_data() {
