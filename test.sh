@@ -5,7 +5,8 @@ source "$(dirname "${BASH_SOURCE[0]}")/.ci/setup.sh"
 build ci
 find_recordings
 set +e
-on_display ctest --test-dir "$BUILD" --output-on-failure -j2 "$@" |
+# Many tests wait for what takes its time: three at once on two cores.
+on_display ctest --test-dir "$BUILD" --output-on-failure -j3 "$@" |
   .ci/skips.py "$BUILD/Testing/Temporary/LastTest.log" ${FIELDTRUE_ALLOWED_SKIPS:+"$FIELDTRUE_ALLOWED_SKIPS"}
 statuses=("${PIPESTATUS[@]}")
 exit "$((statuses[0] != 0 ? statuses[0] : statuses[1]))"
