@@ -239,6 +239,8 @@ double uncutMean(double shown) {
   return mean;
 }
 
+double stepOf_hz(const SampleSpectrum& spectrum) { return spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0]; }
+
 /// The parts without sinusoids of the lines' frequencies.
 std::vector<Part> withoutLines(const std::vector<Part>& parts, const std::vector<SpectralLine>& lines) {
   std::vector<Part> left = parts;
@@ -260,7 +262,7 @@ class NoiseElsewhere {
   NoiseElsewhere(const std::vector<Part>& parts, const std::vector<Part>& white, const SampleSpectrum& spectrum,
                  double rho)
       : white_(white), n_values_(spectrum.series * static_cast<double>(medianLength(white))) {
-    const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+    const double step_hz = stepOf_hz(spectrum);
     for (int bin = 0; bin * step_hz <= 0.5 * spectrum.rate_hz * (1.0 + 1e-9); ++bin) grid_hz_.push_back(bin * step_hz);
     std::vector<double> low;
     for (std::size_t bin = 0; bin < std::min<std::size_t>(grid_hz_.size(), kFarthestSlow); ++bin)
@@ -356,7 +358,7 @@ double prewhiteningGain(double frequency_hz, double rate_hz, double rho) {
 
 /// The bin that stands out most of its neighbourhood, of those not near a line found before nor refused.
 std::size_t highestBin(const SampleSpectrum& spectrum, const std::vector<bool>& refused) {
-  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  const double step_hz = stepOf_hz(spectrum);
   const auto ratio = [&](std::size_t bin) {
     return spectrum.background[bin] > 0.0 ? spectrum.power[bin] / spectrum.background[bin] : 0.0;
   };
@@ -371,17 +373,19 @@ std::size_t highestBin(const SampleSpectrum& spectrum, const std::vector<bool>& 
   return peak;
 }
 
+/// @param bin from the first that is looked at
 double leastExcess(std::size_t bin) {
-  if (bin < kPerResolution * 4 - kFirstBin) return kSmallestLowestExcess;
+  constexpr int kLowest = 4 * kPerResolution - kFirstBin;  // Below 4 periods a part.
+  if (bin < kLowest) return kSmallestLowestExcess;
   return bin < kFarthest ? kSmallestLowExcess : kSmallestExcess;
 }
 
-/// That power stands out of a background as much by chance at any of the frequencies.
-double chanceAt(const SampleSpectrum& spectrum, std::size_t bin, double background) {
-  const double ratio = spectrum.power[bin] / background;
+/// That power stands out of its background as much by chance at any of the frequencies.
+double chanceAt(const SampleSpectrum& spectrum, std::size_t bin) {
+  const double ratio = spectrum.power[bin] / spectrum.background[bin];
   if (ratio < 1.0 + leastExcess(bin)) return 1.0;
   // At half the rate there is no sine beside the cosine, and the power scatters twice as much.
-  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  const double step_hz = stepOf_hz(spectrum);
   const bool is_at_end = spectrum.frequencies_hz[bin] > 0.5 * spectrum.rate_hz - 1.5 * step_hz;
   const double series = is_at_end ? 0.5 * spectrum.series : spectrum.series;
   return std::min(1.0, static_cast<double>(spectrum.power.size()) / kPerResolution * chanceOf(ratio, series));
@@ -391,11 +395,11 @@ SpectralLine lineAt(const SampleSpectrum& spectrum, std::size_t bin, double freq
                     double rho) {
   SpectralLine line;
   line.frequency_hz = frequency_hz;
-  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  const double step_hz = stepOf_hz(spectrum);
   const double excess = spectrum.power[bin] - spectrum.background[bin];
   const double sds = excess / spectrum.background[bin] * std::sqrt(spectrum.series);
   line.error_hz = 0.5 * step_hz / std::sqrt(std::max(1.0, sds));
-  line.p_value = chanceAt(spectrum, bin, spectrum.background[bin]);
+  line.p_value = chanceAt(spectrum, bin);
   // Before prewhitening the noise had variance 1 and the prewhitened 1 - rho^2.
   const double power = 4.0 * excess / static_cast<double>(readings) * (1.0 - rho * rho) /
                        prewhiteningGain(frequency_hz, spectrum.rate_hz, rho);
@@ -407,12 +411,12 @@ SpectralLine lineAt(const SampleSpectrum& spectrum, std::size_t bin, double freq
 /// not of the noise elsewhere raises the background there.
 std::optional<SpectralLine> strongestLine(SampleSpectrum& spectrum, const std::vector<Part>& white,
                                           const NoiseElsewhere& elsewhere, double rho) {
-  const double step_hz = spectrum.frequencies_hz[1] - spectrum.frequencies_hz[0];
+  const double step_hz = stepOf_hz(spectrum);
   std::vector<bool> refused(spectrum.power.size(), false);
   for (;;) {
     const std::size_t bin = highestBin(spectrum, refused);
     if (bin == spectrum.power.size()) return std::nullopt;
-    if (chanceAt(spectrum, bin, spectrum.background[bin]) > kLargestChance) return std::nullopt;
+    if (chanceAt(spectrum, bin) > kLargestChance) return std::nullopt;
     const double frequency_hz =
         std::clamp(refined_hz(white, spectrum.frequencies_hz[bin], step_hz), 0.0, 0.5 * spectrum.rate_hz);
     spectrum.background[bin] = std::max(spectrum.background[bin], elsewhere.powerAt(frequency_hz));
