@@ -30,9 +30,7 @@ struct Effect {
   bool needs_dipoles =
       true;  ///< By the physics of a transmitter of dipoles; false for what the rig does to any tracker.
   bool acts_in_time = false;  ///< What it does changes during the session: nothing to be found without times.
-  /// Of what it explains, it has to win by this share: above 0 for an effect that is freer than others to fit what they
-  /// leave over.
-  double share_to_win = 0.0;
+  bool is_freer = false;      ///< Than others to fit what they leave over: it has to win by a share of its gain.
   /// Its shape; null for what does not stand in the room.
   EffectBody (*body)(const nlohmann::json& parameters) = nullptr;
   /// Adds what single readings show of it and the scene does not say yet; null where they show nothing.

@@ -9,10 +9,6 @@ namespace fieldtrue::effects {
 
 namespace {
 
-/// A body that is there for part of the time only is also freer to fit what a standing one leaves over; it has to win
-/// by this share of what it explains.
-constexpr double kShareForMoved = 0.06;
-
 /// A change that fewer readings than this on one side of it speak for is not looked for.
 constexpr double kLeastShare = 0.05;
 
@@ -165,7 +161,7 @@ Effect metalMovedEffect() {
   effect.fits = fits;
   effect.body = ballOf;
   effect.acts_in_time = true;
-  effect.share_to_win = kShareForMoved;
+  effect.is_freer = true;  // It is there for a part of the time that is free.
   return effect;
 }
 

@@ -13,7 +13,6 @@
 namespace fieldtrue::gap {
 namespace {
 
-constexpr double kFarSurer = 2.0;           ///< Times the log odds, from which what went is told and not what came.
 constexpr std::size_t kRowsForField = 500;  ///< Of the earlier one, to foretell what it would have read.
 
 /// What would have been read at one row, metres or radians beside the alignment, and the variance of each component.
@@ -282,7 +281,7 @@ Result<RecordingChange> changeSince(const CalibrationTable& before_table, const 
   back->p_value = std::min(1.0, 2.0 * back->p_value);
   back->changed = back->changed && back->p_value < std::exp(-thresholds.sure_of_change);
   // What came in shows both ways; what went, clearly only this way.
-  const bool is_far_surer = back->changed && back->p_value < std::pow(change.p_value, kFarSurer);
+  const bool is_far_surer = back->changed && back->p_value < std::pow(change.p_value, thresholds.gone_is_surer);
   if (change.changed ? !is_far_surer : !back->changed && !back->isAstray()) return change;
   back->is_gone = true;
   back->rig_moved_mm = change.rig_moved_mm;

@@ -117,13 +117,14 @@ void selectSignalFindings(GapReport& report) {
 
 /// What single readings show of each sensor, said of which where there are several.
 void addSignalFindings(const CalibrationTable& table, const SampleTable* samples, const simulation::Scene* scene,
-                       recording::Cleaned& cleaned) {
+                       const recording::LineRules& lines, recording::Cleaned& cleaned) {
   const std::vector<int> sensors = sensorsOf(cleaned.nodes);
   for (const int sensor : sensors) {
     const auto own = rowsOfSensor(table, sensor);
     std::optional<SampleTable> own_samples;
     if (samples != nullptr) own_samples = rowsOfSensor(*samples, sensor);
-    for (auto& found : identify::sampleFindings(own_samples ? &*own_samples : nullptr, own ? *own : table, scene)) {
+    for (auto& found :
+         identify::sampleFindings(own_samples ? &*own_samples : nullptr, own ? *own : table, scene, lines)) {
       if (sensors.size() > 1) found.text = "Sensor " + std::to_string(sensor) + ": " + found.text;
       cleaned.findings.push_back(std::move(found));
     }
@@ -270,7 +271,7 @@ Result<GapReport> diagnose(const CalibrationTable& table, const SampleTable* sam
     FT_TRY(auto foreign, recording::foreignSamples(*samples, table));
     if (foreign) cleaned.findings.push_back(*std::move(foreign));
   }
-  addSignalFindings(table, samples, scene, cleaned);
+  addSignalFindings(table, samples, scene, options.thresholds.lines, cleaned);
   return diagnoseRows(std::move(cleaned), table.metadata, samples, scene, options, {}, control);
 }
 

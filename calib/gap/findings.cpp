@@ -41,6 +41,11 @@ std::vector<int> flaggedPlaces(const GapReport& report) {
   return nodes;
 }
 
+/// Whether what is largest there is of that place: it falls to half nearer than its middle is wide or uncertain.
+bool isLocal(const Hotspot& hotspot) {
+  return hotspot.half_m && hotspot.sd_m && std::max(hotspot.radius_m, *hotspot.sd_m) < *hotspot.half_m;
+}
+
 /// What has no name is at least placed: where it is largest, and which places stand out.
 void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) {
   constexpr std::size_t kMostNamed = 10;
@@ -53,7 +58,7 @@ void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) 
                                : std::to_string(nodes.size()) + " of " + std::to_string(rows.place_nodes.size()) +
                                      " places lie off, most of all ";
   text += report.names.listInOrder(nodes, kMostNamed) + ".";
-  if (report.hotspot && !rows.has_dipoles && are_few) {
+  if (report.hotspot && !rows.has_dipoles && (are_few || isLocal(*report.hotspot))) {
     const Eigen::Vector3d& at = report.hotspot->center_m;
     text += " Something local acts within " + shown(report.hotspot->radius_m) + " m of (" + shown(at.x()) + ", " +
             shown(at.y()) + ", " + shown(at.z()) + ") m";
@@ -155,7 +160,7 @@ bool addInputFindings(const TableMetadata& metadata, const identify::GapSearch& 
   } else if (astray > search.thresholds().astray) {
     addAstray(astray, report);
   }
-  return mirrored.empty() && astray <= search.thresholds().astray;
+  return search.belongTogether();
 }
 
 void addFindings(const identify::GapSearch& search, const identify::GapRows& stated, const Judgement& judgement,

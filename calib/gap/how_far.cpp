@@ -99,7 +99,24 @@ std::vector<double> regionShares(const identify::GapRows& rows) {
   return fieldtrue::regionShares(places_m);
 }
 
+namespace {
+
+RowNoise noiseAllowed(const identify::GapSearch& search) {
+  const identify::GapRows& rows = search.physics().rows();
+  RowNoise noise;
+  for (const identify::GapRow& row : rows.rows) {
+    const identify::Matrix6d allowed = identify::noiseOf(row, search.floorPlacingSd_m(), search.floorPlacingSd_rad());
+    noise.square_m2.push_back(allowed.topLeftCorner<3, 3>().trace());
+    noise.square_rad2.push_back(allowed.bottomRightCorner<3, 3>().trace());
+    noise.whitened.push_back(rows.channels());
+  }
+  return noise;
+}
+
+}  // namespace
+
 RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structure& structure) {
+  if (!search.belongTogether()) return noiseAllowed(search);
   const identify::GapRows& rows = search.physics().rows();
   const auto share = [](double floor, double placing) {
     return floor < placing ? floor * floor / (placing * placing) : 1.0;

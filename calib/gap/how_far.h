@@ -42,7 +42,8 @@ struct RowNoise {
   std::vector<double> whitened;
 };
 
-/// No more of it is noise than GapSearch::floorPlacingSd_m and _rad allow.
+/// No more of it is noise than GapSearch::floorPlacingSd_m and _rad allow; of readings that do not belong to their
+/// places, which no smooth fit follows, as much as these allow is.
 /// @param structure of a model's residuals
 RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structure& structure);
 

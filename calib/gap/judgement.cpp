@@ -89,15 +89,34 @@ class Judge {
     }
   }
 
+  /// Whether unseen places come off worse with one effect more than without it: in units of the noise, or in the
+  /// figures that are told.
+  bool harms(const UnseenScores& scores, std::size_t step, const Judgement& judgement) const {
+    if (pairedDifference(scores.step[step + 1], scores.step[step], rows_).value > 0.0) return true;
+    const bool in_position = isLarger(scores, step, &UnseenRow::square_m2);
+    if (!rows_.has_orientation) return in_position;
+    const bool in_rotation = isLarger(scores, step, &UnseenRow::square_rad2);
+    if (in_position == in_rotation) return in_position;
+    const RowNoise noise = noiseLeftBy(search_, leftBy(search_, judgement.selection.model.model).structure);
+    return howFar(scores, noise, rows_).by_rotation ? in_rotation : in_position;
+  }
+
+  bool isLarger(const UnseenScores& scores, std::size_t step, double UnseenRow::*square) const {
+    constexpr double kRounding = 1e-9;
+    const auto mean = [&](const std::vector<UnseenRow>& rows) {
+      std::vector<double> squares;
+      for (const UnseenRow& row : rows) squares.push_back(row.*square);
+      return meanOverRegion(rows_, squares);
+    };
+    return mean(scores.step[step + 1]) > (1.0 + kRounding) * mean(scores.step[step]);
+  }
+
   /// Where unseen places come off worse with one effect more than without it, takes out the one that the rows miss
   /// least: the folds choose for themselves, so that what a step adds in them need not be what it adds in the whole.
   bool dropHarmful(const UnseenScores& scores, Judgement& judgement) {
     identify::EffectSelection& selection = judgement.selection;
-    const auto harms = [&](std::size_t s) {
-      return pairedDifference(scores.step[s + 1], scores.step[s], rows_).value > 0.0;
-    };
     bool is_harmful = false;
-    for (std::size_t s = 0; s + 1 < scores.step.size(); ++s) is_harmful = is_harmful || harms(s);
+    for (std::size_t s = 0; s + 1 < scores.step.size(); ++s) is_harmful = is_harmful || harms(scores, s, judgement);
     if (!is_harmful || control_.stop.stop_requested()) return false;
     const std::vector<identify::RefinedModel> rests = withoutEach(selection);
     std::vector<double> bic;

@@ -30,7 +30,8 @@ bool holds(const simulation::Scene* scene, const std::string& effect) {
 }
 
 /// @param quantum_m believed
-effects::SampleEvidence evidenceOf(const SampleTable* samples, const CalibrationTable& table, double quantum_m) {
+effects::SampleEvidence evidenceOf(const SampleTable* samples, const CalibrationTable& table, double quantum_m,
+                                   const recording::LineRules& lines) {
   effects::SampleEvidence evidence{.names = PlaceNames(table.nodes)};
   if (samples == nullptr) {
     evidence.noise_law = recording::fitNoiseLaw(recording::noiseRows(table.nodes, quantum_m));
@@ -39,7 +40,7 @@ effects::SampleEvidence evidenceOf(const SampleTable* samples, const Calibration
   TableMetadata metadata = samples->metadata;
   if (!metadata.rate_hz) metadata.rate_hz = table.metadata.rate_hz;
   const std::vector<recording::SampleVisit> visits = recording::sampleVisits(*samples);
-  evidence.spectrum = recording::sampleSpectrum(visits, metadata);
+  evidence.spectrum = recording::sampleSpectrum(visits, metadata, lines);
   evidence.lattice = recording::readingLattice(*samples, visits);
   const double correlation = evidence.spectrum ? std::max(0.0, evidence.spectrum->correlation) : 0.0;
   evidence.noise_law = recording::fitNoiseLaw(
@@ -50,9 +51,9 @@ effects::SampleEvidence evidenceOf(const SampleTable* samples, const Calibration
 }  // namespace
 
 std::vector<recording::GapFinding> sampleFindings(const SampleTable* samples, const CalibrationTable& table,
-                                                  const simulation::Scene* scene) {
+                                                  const simulation::Scene* scene, const recording::LineRules& lines) {
   effects::SignalBelief belief = beliefOf(scene, table.metadata);
-  const effects::SampleEvidence evidence = evidenceOf(samples, table, belief.signal.quantum_m);
+  const effects::SampleEvidence evidence = evidenceOf(samples, table, belief.signal.quantum_m, lines);
   const bool has_dipoles = table.metadata.transmitter_model.value_or("dipole") == "dipole";
   std::vector<recording::GapFinding> findings;
   for (const effects::Effect& effect : effects::effects()) {

@@ -12,7 +12,9 @@ namespace fieldtrue::identify {
 /// that follows itself, a lattice, noise that grows with range in another way. Without samples only what the
 /// table's own covariances tell.
 /// @param samples, scene null = none
+/// @param lines what is a line
 std::vector<recording::GapFinding> sampleFindings(const SampleTable* samples, const CalibrationTable& table,
-                                                  const simulation::Scene* scene);
+                                                  const simulation::Scene* scene,
+                                                  const recording::LineRules& lines = {});
 
 }  // namespace fieldtrue::identify

@@ -195,6 +195,10 @@ double GapSearch::shareAstray() const {
   return median(std::move(off_m)) / std::sqrt(spread_m2);
 }
 
+bool GapSearch::belongTogether() const {
+  return mirroredSensors(rows_, thresholds_).empty() && shareAstray() <= thresholds_.astray;
+}
+
 void GapSearch::settleWays() {
   ways_.clear();
   design_ = {};
@@ -315,7 +319,7 @@ void GapSearch::finish(TriedEffect& tried, double base_bic) const {
   const GapTerm& term = tried.model.terms.back();
   tried.fitted = term.fit->describe(term.searched, term.linear);
   tried.bic_gain = base_bic - bicOf(tried.model) - (tried.fitted.is_plausible ? 0.0 : thresholds_.implausible_cost);
-  if (term.effect->share_to_win > 0.0) tried.bic_gain -= term.effect->share_to_win * std::max(0.0, tried.bic_gain);
+  if (term.effect->is_freer) tried.bic_gain -= thresholds_.share_of_freer * std::max(0.0, tried.bic_gain);
 }
 
 /// The linearised gain of a strong effect can be a fifth off, and flatters: whatever is near the best of those fitted

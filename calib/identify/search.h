@@ -73,6 +73,8 @@ class GapSearch {
   /// How far readings lie from where they should without any further effect, median, as a share of the spread of the
   /// sensors' places (RMS about their middle).
   double shareAstray() const;
+  /// Whether readings are of their places at all: no sensor's are mirror images of them, and half of them lie near.
+  bool belongTogether() const;
 
   /// @param used per row, which rows count; empty = all
   double bicOf(const GapModel& model, std::span<const char> used = {}) const;

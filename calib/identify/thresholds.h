@@ -2,6 +2,8 @@
 
 #include <cstddef>
 
+#include "calib/recording/sample_spectrum.h"
+
 namespace fieldtrue::identify {
 
 /// Every figure by which a diagnosis decides: what is refused, selected, named, called a gap, told apart and told. What
@@ -54,6 +56,9 @@ struct Thresholds {
   double least_gain_exchange = 2.0;
   /// BIC units that an implausible fit loses against plausible ones. Set on open sessions.
   double implausible_cost = 12.0;
+  /// Share of its gain that an effect which is freer than others to fit what they leave has to win by. Set on open
+  /// sessions with an effect that does not move.
+  double share_of_freer = 0.06;
   /// Share of the best gain from which the best effect of the other kind (in the room, or not) starts a set of its own.
   /// Set on open sessions with two effects.
   double other_kind_start = 0.05;
@@ -173,12 +178,20 @@ struct Thresholds {
   double far_off = 10.0;
   /// Places astray from which that may be a change. Set by reason: fewer are slips of the hand.
   std::size_t fewest_far_off = 3;
+  /// Times the log odds of the one, from which what went is told and not what came, where recordings asked both ways
+  /// say either. Set by reason: what came shows both ways, what went clearly one way only.
+  double gone_is_surer = 2.0;
   /// How far a rig stands from where it stood, from which that is told [mm]. Set by reason: a foot set on a mark.
   double told_rig_moved_mm = 5.0;
   /// The same of its turn [degrees]. Set by reason.
   double told_rig_turned_deg = 0.5;
   /// Factor by which scatter grew or fell, from which that is told. Set by reason.
   double told_scatter = 1.7;
+
+  // What single readings show.
+
+  /// What is a line.
+  recording::LineRules lines;
 };
 
 }  // namespace fieldtrue::identify

@@ -15,6 +15,20 @@ struct SpectralLine {
   double p_value = 1.0;       ///< That the strongest of all frequencies searched stands out as much by chance.
 };
 
+/// By which figures a line is one. What half and double of each do is printed by tests/studies/lines_study.
+struct LineRules {
+  /// That noise alone shows one anywhere. Set by reason: once in a thousand recordings.
+  double largest_chance = 1e-3;
+  /// A line that adds less than this share to the noise's power is none. Set by reason: it does no harm that could be
+  /// seen.
+  double least_excess = 0.2;
+  /// The same below 6.5 periods a part, where noise known mostly from above may hide a broad hump. Set on simulated
+  /// noise: a hump three resolutions wide (second order, pole radius 0.85) stood out by 0.5 at most.
+  double least_low_excess = 0.6;
+  /// The same below 4 periods, where it stood out by 1.7 at most.
+  double least_lowest_excess = 2.0;
+};
+
 /// The readings' power by frequency, every stop and channel scaled to its own noise and pooled.
 struct SampleSpectrum {
   double rate_hz = 0.0;
@@ -38,6 +52,7 @@ struct SampleSpectrum {
 /// @return nothing where fewer than 4 stops of 16 readings are there, or their rate is unknown
 /// @source Lomb 1976; Scargle 1982; Welch 1967 for the pooling; van der Ziel 1950 for slow noise as a sum of
 /// relaxations, Whittle 1953 for its fit
-std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& visits, const TableMetadata& metadata);
+std::optional<SampleSpectrum> sampleSpectrum(const std::vector<SampleVisit>& visits, const TableMetadata& metadata,
+                                             const LineRules& rules = {});
 
 }  // namespace fieldtrue::recording

@@ -93,10 +93,13 @@ void firstLook(benchmark::State& state, const char* room) {
 BENCHMARK_CAPTURE(firstLook, steel_bar, "steel_bar")->Unit(benchmark::kSecond)->UseRealTime();
 BENCHMARK_CAPTURE(firstLook, mixed, "mixed")->Unit(benchmark::kSecond)->UseRealTime();
 
+// 4,913 places.
 BENCHMARK_CAPTURE(diagnoseRoom, steel_floor_5000, "steel_floor")
     ->Args({17, 17})
     ->Unit(benchmark::kSecond)
     ->UseRealTime();
+BENCHMARK_CAPTURE(diagnoseRoom, steel_bar_5000, "steel_bar")->Args({17, 17})->Unit(benchmark::kSecond)->UseRealTime();
+BENCHMARK_CAPTURE(diagnoseRoom, mixed_5000, "mixed")->Args({17, 17})->Unit(benchmark::kSecond)->UseRealTime();
 
 /// A steel floor found in a recording, its parameters then 3 % off: what the joint refinement starts from.
 struct FloorOff {

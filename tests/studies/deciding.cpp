@@ -16,6 +16,12 @@ Deciding one(const char* name, bool is_tried = true) {
           }};
 }
 
+template <auto Member>
+Deciding ofLines(const char* name) {
+  return {name, false, [](const Thresholds& thresholds) { return thresholds.lines.*Member; },
+          [](Thresholds& thresholds, double factor) { thresholds.lines.*Member *= factor; }};
+}
+
 const std::array kDeciding = {
     one<&Thresholds::fewest_places>("fewest_places", false),
     one<&Thresholds::fewest_places_for_causes>("fewest_places_for_causes"),
@@ -30,6 +36,7 @@ const std::array kDeciding = {
     one<&Thresholds::least_gain_more>("least_gain_more"),
     one<&Thresholds::least_gain_exchange>("least_gain_exchange"),
     one<&Thresholds::implausible_cost>("implausible_cost"),
+    one<&Thresholds::share_of_freer>("share_of_freer"),
     one<&Thresholds::other_kind_start>("other_kind_start"),
     one<&Thresholds::other_kind_share>("other_kind_share"),
     one<&Thresholds::least_nats>("least_nats"),
@@ -71,9 +78,14 @@ const std::array kDeciding = {
     one<&Thresholds::far_surer>("far_surer", false),
     one<&Thresholds::far_off>("far_off", false),
     one<&Thresholds::fewest_far_off>("fewest_far_off", false),
+    one<&Thresholds::gone_is_surer>("gone_is_surer", false),
     one<&Thresholds::told_rig_moved_mm>("told_rig_moved_mm", false),
     one<&Thresholds::told_rig_turned_deg>("told_rig_turned_deg", false),
     one<&Thresholds::told_scatter>("told_scatter", false),
+    ofLines<&recording::LineRules::largest_chance>("lines.largest_chance"),
+    ofLines<&recording::LineRules::least_excess>("lines.least_excess"),
+    ofLines<&recording::LineRules::least_low_excess>("lines.least_low_excess"),
+    ofLines<&recording::LineRules::least_lowest_excess>("lines.least_lowest_excess"),
 };
 
 // All members are eight bytes: one that is missing here does not compile.

@@ -10,8 +10,8 @@ namespace fieldtrue::testing {
 /// One member of Thresholds.
 struct Deciding {
   std::string name;
-  /// Whether half and double of it are tried: else it acts between two recordings, on plans, or on what to measure
-  /// next.
+  /// Whether half and double of it are tried: else it acts between two recordings, on plans, on what to measure
+  /// next, or on single readings.
   bool is_tried = true;
   double (*value)(const identify::Thresholds& thresholds) = nullptr;
   void (*scale)(identify::Thresholds& thresholds, double factor) = nullptr;

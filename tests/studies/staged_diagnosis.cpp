@@ -68,7 +68,8 @@ StagedDiagnosis::Stage StagedDiagnosis::staged(const Thresholds& thresholds, boo
 /// Where nothing is worth selecting, what further effects would need does not matter.
 bool StagedDiagnosis::selectsAsUsual(const Thresholds& thresholds, int most_effects) const {
   const Thresholds usual;
-  if (!usual_ || most_effects != usual_->most_effects || thresholds.implausible_cost != usual.implausible_cost)
+  if (!usual_ || most_effects != usual_->most_effects || thresholds.implausible_cost != usual.implausible_cost ||
+      thresholds.share_of_freer != usual.share_of_freer)
     return false;
   const std::vector<identify::TriedEffect>& first = usual_->selection.first;
   const double least_gain = std::min(thresholds.least_gain_first, usual.least_gain_first);

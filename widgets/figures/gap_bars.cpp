@@ -31,11 +31,18 @@ std::string noteOf(const gap::GapCandidate& candidate) {
   return note;
 }
 
+auto namedAs(const gap::GapReport& report, const std::string& effect) {
+  return std::find_if(report.selected.begin(), report.selected.end(),
+                      [&](const gap::SelectedEffect& one) { return one.effect == effect; });
+}
+
+bool isNamed(const gap::GapReport& report, const std::string& effect) {
+  return namedAs(report, effect) != report.selected.end();
+}
+
 /// Whether a cause is named, and another one before it.
 bool isNamedBeside(const gap::GapReport& report, const std::string& effect) {
-  const auto named = std::find_if(report.selected.begin(), report.selected.end(),
-                                  [&](const gap::SelectedEffect& one) { return one.effect == effect; });
-  return named != report.selected.end() && named != report.selected.begin();
+  return isNamed(report, effect) && namedAs(report, effect) != report.selected.begin();
 }
 
 GapBarChart binChart(const char* id, const std::string& title, const std::vector<gap::GapBin>& bins, const char* unit) {
@@ -113,6 +120,8 @@ GapBarChart shrinkageChart(const gap::GapReport& report, std::size_t most) {
   for (std::size_t i = 0; i < shown; ++i) {
     const gap::GapCandidate& candidate = report.candidates[i];
     if (candidate.effect == "none" || !std::isfinite(candidate.shrinkage.fraction)) continue;
+    // What is shown with 0 % for its probability took nothing away, whatever it could.
+    if (!isNamed(report, candidate.effect) && std::lround(100.0 * candidate.probability) == 0) continue;
     GapBar bar;
     bar.name = effectLabel(candidate.effect);
     bar.value = std::max(0.0, candidate.shrinkage.fraction);

@@ -84,6 +84,7 @@ class GapPageTest : public QObject {
   void windowFindsTheMetal();
   void windowTellsWhatCame();
   void windowTellsAProvisionalAnswer();
+  void windowTellsWhyACauseIsRefused();
 
  private:
   /// Whether the first body drawn is the known room's, within 10 cm.
@@ -489,6 +490,32 @@ void GapPageTest::windowTellsAProvisionalAnswer() {
   QTRY_VERIFY_WITH_TIMEOUT(page->report().has_value(), kWaitMs);
   QCOMPARE(page->report()->input.places, 192);
   QCOMPARE(find<FieldView>(*page, "gapField")->field().arrows.size(), std::size_t{192});
+}
+
+/// A field that no physics makes: what would fit it best is told, and why it is not named.
+void GapPageTest::windowTellsWhyACauseIsRefused() {
+  CalibrationTable table = recordedIn(gapScene(), gapPlan({.counts = {5, 5, 4}}), 8);
+  for (Node& node : table.nodes) {
+    Eigen::Vector3d& p_m = node.tracker_from_sensor.position_m;
+    p_m += 0.006 * Eigen::Vector3d(std::sin(6.0 * p_m.y()), std::sin(6.0 * p_m.z()), std::sin(6.0 * p_m.x()));
+  }
+  MainWindow window;
+  GapPage* page = openedAtGap(window);
+  QVERIFY(page && page->isVisible());
+  page->setRecording(table, {});
+  QTest::mouseClick(find<QWidget>(*page, "diagnose"), Qt::LeftButton);
+  QTRY_VERIFY_WITH_TIMEOUT(page->report().has_value() && !page->isDiagnosing(), kWaitMs);
+  QCOMPARE(textOf(*page, "headline"), QStringLiteral("Not explained by any known effect"));
+  QVERIFY(page->report()->selected.empty() && !page->report()->rival.refused.empty());
+  const QString text = textOf(*page, "gapSentence");
+  for (const std::string& refused : page->report()->rival.refused)
+    QVERIFY2(text.contains(QString::fromStdString(effectLabel(refused))), qPrintable(text));
+  QVERIFY2(text.contains("would fit, but"), qPrintable(text));
+  const QString folder = qEnvironmentVariable("FIELDTRUE_ARTEFACTS");
+  if (folder.isEmpty()) return;
+  QVERIFY(QDir().mkpath(folder));
+  QTest::qWait(400);
+  QVERIFY(window.grab().save(folder + QStringLiteral("/6-gap-refused.png")));
 }
 
 FIELDTRUE_WINDOW_TEST(GapPageTest)

@@ -99,6 +99,17 @@ class GapHtmlTest : public QObject {
     QCOMPARE(chart.bars[1].text, std::string("beside the first"));
   }
 
+  /// What is shown with 0 % for its probability is not shown to take all of the gap.
+  void whatNobodyBelievesTakesNothing() {
+    gap::GapReport report = writtenReport();
+    report.candidates[1].shrinkage.fraction = 1.05;
+    QCOMPARE(shrinkageChart(report).bars.size(), std::size_t{2});
+    report.candidates[1].probability = 0.004;
+    QCOMPARE(shrinkageChart(report).bars.size(), std::size_t{1});
+    report.candidates[0].probability = 0.004;  // But it is named.
+    QCOMPARE(shrinkageChart(report).bars.size(), std::size_t{1});
+  }
+
   void sharesOfRotationAreCalledSo() {
     gap::GapReport report = writtenReport();
     QVERIFY(shrinkageChart(report).title.find("rotation") == std::string::npos);
