@@ -12,6 +12,8 @@
 namespace fieldtrue::gap {
 namespace {
 
+constexpr std::size_t kMostNamed = 10;  ///< Places of a list.
+
 /// What is left beside the named effects and varies smoothly, where it is worth telling.
 void addRest(const Judgement& judgement, const identify::Thresholds& thresholds, GapReport& report) {
   const double start_m2 = judgement.far.excess_m2.front().value;
@@ -48,7 +50,6 @@ bool isLocal(const Hotspot& hotspot) {
 
 /// What has no name is at least placed: where it is largest, and which places stand out.
 void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) {
-  constexpr std::size_t kMostNamed = 10;
   if (!has_gap || !report.selected.empty()) return;
   const std::vector<int> nodes = flaggedPlaces(report);
   if (nodes.empty()) return;
@@ -67,6 +68,22 @@ void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) 
                                    : "; within these places it does not fall to half.";
   }
   report.findings.push_back({"", text, nodes});
+}
+
+/// Beside what is named, single places that lie farther off than it and noise put them.
+void addStrays(const HowFar& far, const identify::GapRows& rows, GapReport& report) {
+  if (report.selected.empty() || far.strays.empty()) return;
+  std::vector<std::size_t> strays = far.strays;
+  std::stable_sort(strays.begin(), strays.end(),
+                   [&](std::size_t a, std::size_t b) { return far.size_m[a] > far.size_m[b]; });
+  std::vector<int> nodes;
+  for (const std::size_t i : strays)
+    if (std::find(nodes.begin(), nodes.end(), rows.rows[i].node) == nodes.end()) nodes.push_back(rows.rows[i].node);
+  report.findings.push_back({"",
+                             (nodes.size() == 1 ? "Beside what is named, one place does not fit the others: "
+                                                : "Beside what is named, places do not fit the others: ") +
+                                 report.names.listInOrder(nodes, kMostNamed) + ".",
+                             nodes});
 }
 
 /// What the physics of the tracker is taken to be is said where it matters.
@@ -168,6 +185,7 @@ void addFindings(const identify::GapSearch& search, const identify::GapRows& sta
   if (has_gap && stated.has_dipoles) addTraces(judgement.left.traces, search.thresholds(), report);
   addRest(judgement, search.thresholds(), report);
   addMisfits(has_gap, stated, report);
+  addStrays(judgement.far, stated, report);
   addStatedTooSmall(search, stated, report);
   addBoundOfFloor(search, stated, report);
 }

@@ -7,6 +7,7 @@
 
 #include "calib/core/statistics.h"
 #include "calib/evaluation/base/intervals.h"
+#include "calib/gap/row_tails.h"
 #include "calib/geometry/region_shares.h"
 
 namespace fieldtrue::gap {
@@ -101,38 +102,55 @@ std::vector<double> regionShares(const identify::GapRows& rows) {
 
 namespace {
 
-RowNoise noiseAllowed(const identify::GapSearch& search) {
+/// As much noise as the recording's own samples and its rig allow.
+void setAllowed(const identify::GapSearch& search, std::size_t row, RowNoise& noise) {
   const identify::GapRows& rows = search.physics().rows();
-  RowNoise noise;
-  for (const identify::GapRow& row : rows.rows) {
-    const identify::Matrix6d allowed = identify::noiseOf(row, search.floorPlacingSd_m(), search.floorPlacingSd_rad());
-    noise.square_m2.push_back(allowed.topLeftCorner<3, 3>().trace());
-    noise.square_rad2.push_back(allowed.bottomRightCorner<3, 3>().trace());
-    noise.whitened.push_back(rows.channels());
-  }
-  return noise;
+  const identify::Matrix6d allowed =
+      identify::noiseOf(rows.rows[row], search.floorPlacingSd_m(), search.floorPlacingSd_rad());
+  noise.square_m2[row] = allowed.topLeftCorner<3, 3>().trace();
+  noise.square_rad2[row] = allowed.bottomRightCorner<3, 3>().trace();
+  noise.whitened[row] = rows.channels();
 }
 
 }  // namespace
 
 RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structure& structure) {
-  if (!search.belongTogether()) return noiseAllowed(search);
   const identify::GapRows& rows = search.physics().rows();
   const auto share = [](double floor, double placing) {
     return floor < placing ? floor * floor / (placing * placing) : 1.0;
   };
   const double share_m2 = share(search.floorPlacingSd_m(), search.placingSd_m());
   const double share_rad2 = share(search.floorPlacingSd_rad(), search.placingSd_rad());
-  RowNoise noise;
-  for (std::size_t i = 0; i < rows.rows.size(); ++i) {
+  const bool belong_together = search.belongTogether();
+  const std::vector<char> is_stray = farOff(search, structure.noise, search.thresholds().sure_stray);
+  const std::size_t count = rows.rows.size();
+  RowNoise noise{std::vector<double>(count), std::vector<double>(count), std::vector<double>(count), {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    if (belong_together && is_stray[i] != 0) noise.strays.push_back(i);
+    if (!belong_together || is_stray[i] != 0) {
+      setAllowed(search, i, noise);
+      continue;
+    }
     const identify::Vector6d& left = structure.noise[i];
     const Eigen::Vector3d left_m = search.whitening().position[i].triangularView<Eigen::Lower>().solve(left.head<3>());
-    noise.square_m2.push_back(share_m2 * left_m.squaredNorm());
-    noise.whitened.push_back(left.squaredNorm());
-    noise.square_rad2.push_back(share_rad2 * (left.tail<3>() / search.whitening().rotation[i]).squaredNorm());
+    noise.square_m2[i] = share_m2 * left_m.squaredNorm();
+    noise.whitened[i] = left.squaredNorm();
+    noise.square_rad2[i] = share_rad2 * (left.tail<3>() / search.whitening().rotation[i]).squaredNorm();
   }
   return noise;
 }
+
+namespace {
+
+/// Of the whitened squares of all rows those of some.
+double shareOf(const std::vector<std::size_t>& some, const std::vector<UnseenRow>& rows) {
+  double of_some = 0.0, of_all = 0.0;
+  for (const std::size_t i : some) of_some += rows[i].whitened;
+  for (const UnseenRow& row : rows) of_all += row.whitened;
+  return of_all > 0.0 ? of_some / of_all : 0.0;
+}
+
+}  // namespace
 
 double signedRoot_mm(double square_m2) { return 1e3 * std::copysign(std::sqrt(std::abs(square_m2)), square_m2); }
 
@@ -161,6 +179,8 @@ HowFar howFar(const UnseenScores& scores, const RowNoise& noise, const identify:
   for (std::size_t i = 0; i < noise.whitened.size(); ++i)
     far.whitened_excess += scores.step.front()[i].whitened - noise.whitened[i];
   for (const UnseenRow& row : scores.step.back()) far.size_m.push_back(std::sqrt(row.square_m2));
+  far.strays = noise.strays;
+  far.strays_share = shareOf(far.strays, scores.step.front());
   return far;
 }
 

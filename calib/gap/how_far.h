@@ -31,6 +31,8 @@ struct HowFar {
   bool by_rotation = false;             ///< The shares are of rotations, because only these stand out of the floor.
   double whitened_excess = 0.0;         ///< At the start, sum over rows and channels, in units of the noise.
   std::vector<double> size_m;           ///< Of the position's residual with all effects, by row.
+  std::vector<std::size_t> strays;      ///< As of RowNoise.
+  double strays_share = 0.0;            ///< Of the squares without any effect, theirs.
 
   const Bounded& remaining() const { return left_of_start.back(); }
 };
@@ -40,6 +42,8 @@ struct RowNoise {
   std::vector<double> square_m2;
   std::vector<double> square_rad2;
   std::vector<double> whitened;
+  /// Rows that lie farther off any smooth fit than noise of this law puts them: for noise what is allowed stands there.
+  std::vector<std::size_t> strays;
 };
 
 /// No more of it is noise than GapSearch::floorPlacingSd_m and _rad allow; of readings that do not belong to their

@@ -98,7 +98,7 @@ bool hasGap(const identify::GapSearch& search, const Judgement& judgement, doubl
   const bool is_any_sure = std::any_of(first.begin(), first.end(), [&](const auto& one) {
     return !one.refined.model.terms.empty() && one.bic_gain > thresholds.sure_unselected;
   });
-  return !judgement.selection.ways.empty() || scattered_share > 0.0 || is_any_sure ||
+  return !judgement.selection.ways.empty() || scattered_share > 0.0 || is_any_sure || !judgement.far.strays.empty() ||
          search.structureOfNone().p_value < thresholds.sure_of_structure ||
          judgement.unnamed_nats > thresholds.sure_nats;
 }
@@ -117,7 +117,7 @@ bool decide(const identify::GapSearch& search, const Judgement& judgement, std::
   describeWhere(search, judgement.selection.model.model, report);
   report.floor_position_mm = 1e3 * std::sqrt(judgement.far.floor_m2);
   if (rows.has_orientation) report.floor_orientation_deg = kDegPerRad * std::sqrt(judgement.far.floor_rad2);
-  const double scattered = scatteredShare(search, rows, report);
+  const double scattered = std::max(scatteredShare(search, rows, report), judgement.far.strays_share);
   const bool has_gap = known_gap.value_or(hasGap(search, judgement, scattered));
   report.candidates = describeCandidates(search, judgement, has_gap, scattered);
   report.verdict = verdictOf(judgement.far, !judgement.selection.ways.empty(), has_gap, search.thresholds());

@@ -11,51 +11,10 @@
 
 #include "calib/core/statistics.h"
 #include "calib/core/units.h"
+#include "calib/gap/row_tails.h"
 
 namespace fieldtrue::gap {
 namespace {
-
-/// Upper tail of the squared size of three whitened numbers under a Student t of them together: a third of it follows
-/// Fisher's F of 3 and `freedom` degrees, by the finite sum that the incomplete beta function is for whole a.
-/// @param freedom even
-/// @source Abramowitz and Stegun 1964, 26.6.2 and 26.5.6
-double tailOfThree(double square, double freedom) {
-  const double beyond = freedom / (freedom + square);
-  double term = std::pow(1.0 - beyond, 1.5), sum = 0.0;
-  for (int j = 0; j < static_cast<int>(0.5 * freedom); ++j) {
-    sum += term;
-    term *= (1.5 + j) / (1.0 + j) * beyond;
-  }
-  return std::clamp(1.0 - sum, 1e-15, 1.0);
-}
-
-/// How likely noise alone takes a row so far off, position and rotation together. Rows whose means are of few samples
-/// know their own scatter badly: the law of the residuals, not a normal one, says what is far.
-/// @source Fisher 1932, the product of two tails
-/// @param scale of the residuals under that law
-double tailOfRow(const identify::Vector6d& whitened, bool has_orientation, const identify::ResidualLaw& law,
-                 const identify::ResidualScale& scale) {
-  const auto tailOf = [&](const auto& part, double unit) {
-    return tailOfThree(part.squaredNorm() / (unit * unit), law.degrees_of_freedom);
-  };
-  const double position = tailOf(whitened.head<3>(), scale.position);
-  if (!has_orientation) return position;
-  const double both = position * tailOf(whitened.tail<3>(), scale.rotation);
-  return both * (1.0 - std::log(both));
-}
-
-/// Marks the hypotheses that may be rejected with a false-discovery rate of at most `rate`.
-std::vector<char> discoveries(const std::vector<double>& p, double rate) {
-  std::vector<std::size_t> order(p.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p[a] < p[b]; });
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < order.size(); ++k)
-    if (p[order[k]] <= rate * static_cast<double>(k + 1) / static_cast<double>(p.size())) count = k + 1;
-  std::vector<char> found(p.size(), 0);
-  for (std::size_t k = 0; k < count; ++k) found[order[k]] = 1;
-  return found;
-}
 
 struct RowGap {
   double floor_mm = 0.0;
@@ -255,11 +214,8 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
   const std::vector<identify::Vector6d> white = identify::whitenedResiduals(
       search.physics(), none, identify::makeWhitening(table, search.floorPlacingSd_m(), search.floorPlacingSd_rad()));
   const std::vector<field::SensorSetting> settings = search.physics().settings(with_effects.alignment);
-  const identify::ResidualScale scale =
-      identify::devianceOf(search.noiseLeft(), table.has_orientation, search.law()).scale;
   std::vector<identify::Matrix6d> noise;
   std::vector<RowGap> rows;
-  std::vector<double> p;
   const double channels = table.channels();
   double sum = 0.0;
   double floor_m2 = 0.0;
@@ -273,7 +229,6 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
     rows.push_back({1e3 * std::sqrt(var_m2), kDegPerRad * std::sqrt(var_rad2),
                     settings[i].tracker_from_sensor.position_m.norm(), table.rows[i].time_s});
     const double d2 = white[i].squaredNorm();
-    p.push_back(tailOfRow(white[i], table.has_orientation, search.law(), scale));
     sum += d2;
     floor_m2 += var_m2;
     floor_rad2 += var_rad2;
@@ -291,7 +246,7 @@ void describeWhere(const identify::GapSearch& search, const identify::GapModel& 
     node.excess = std::sqrt(std::max(0.0, d2 / channels - 1.0));
     report.nodes.push_back(node);
   }
-  const std::vector<char> flagged = discoveries(p, search.thresholds().false_discoveries);
+  const std::vector<char> flagged = farOff(search, white, search.thresholds().false_discoveries);
   for (std::size_t i = 0; i < flagged.size(); ++i) report.nodes[i].is_flagged = flagged[i] != 0;
   const auto n = static_cast<double>(before.size());
   report.position_rms_mm = 1e3 * std::sqrt(gap_m2 / n);

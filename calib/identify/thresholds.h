@@ -89,6 +89,9 @@ struct Thresholds {
   /// BIC units of an effect from which there is a gap though it foretells nothing: at the edge of the places it bends
   /// so few that the others cannot foretell it. Set on open sessions: 0 of 300 without an effect reach it.
   double sure_unselected = 40.0;
+  /// Rate of false ones among the readings that lie off any smooth field farther than noise of the recording's own law
+  /// puts them: each is a gap, and no noise. Set by reason, as sure_trace.
+  double sure_stray = 1e-5;
   /// Scatter over what may be noise, from which on it is a gap. Set so that tolerances stated at half of the truth stay
   /// none on open sessions.
   double clearly_scattered = 1.2;

@@ -45,6 +45,7 @@ const std::array kDeciding = {
     one<&Thresholds::sure_of_structure>("sure_of_structure"),
     one<&Thresholds::sure_nats>("sure_nats"),
     one<&Thresholds::sure_unselected>("sure_unselected"),
+    one<&Thresholds::sure_stray>("sure_stray"),
     one<&Thresholds::clearly_scattered>("clearly_scattered"),
     one<&Thresholds::partly_left>("partly_left"),
     one<&Thresholds::unexplained_left>("unexplained_left"),

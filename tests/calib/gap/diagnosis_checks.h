@@ -41,6 +41,12 @@ inline Match names(const gap::GapReport& report, const std::string& effect) {
   return {is_named && is_alone && is_explained, "seen " + seen + ", wanted " + QByteArray::fromStdString(effect)};
 }
 
+/// Whether a finding holds these words.
+inline bool isTold(const gap::GapReport& report, const std::string& words) {
+  return std::any_of(report.findings.begin(), report.findings.end(),
+                     [&](const recording::GapFinding& f) { return f.text.find(words) != std::string::npos; });
+}
+
 /// The scene with what was found added makes recordings in which it finds no gap.
 inline Match isSettled(const gap::GapReport& report, const Withheld& made) {
   const simulation::Scene updated = gap::updatedScene(made.believed, {}, report);

@@ -40,11 +40,6 @@ CalibrationTable recordedByTwo(simulation::Scene scene, const Pose& second = mou
   return both;
 }
 
-bool isTold(const GapReport& report, const std::string& words) {
-  return std::any_of(report.findings.begin(), report.findings.end(),
-                     [&](const recording::GapFinding& f) { return f.text.find(words) != std::string::npos; });
-}
-
 }  // namespace
 
 class SensorsAndTrackersTest : public QObject {

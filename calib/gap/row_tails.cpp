@@ -1,0 +1,62 @@
+#include "calib/gap/row_tails.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace fieldtrue::gap {
+namespace {
+
+/// Upper tail of the squared size of three whitened numbers under a Student t of them together: a third of it follows
+/// Fisher's F of 3 and `freedom` degrees, by the finite sum that the incomplete beta function is for whole a.
+/// @param freedom even
+/// @source Abramowitz and Stegun 1964, 26.6.2 and 26.5.6
+double tailOfThree(double square, double freedom) {
+  const double beyond = freedom / (freedom + square);
+  double term = std::pow(1.0 - beyond, 1.5), sum = 0.0;
+  for (int j = 0; j < static_cast<int>(0.5 * freedom); ++j) {
+    sum += term;
+    term *= (1.5 + j) / (1.0 + j) * beyond;
+  }
+  return std::clamp(1.0 - sum, 1e-15, 1.0);
+}
+
+/// How likely noise alone takes a row so far off, position and rotation together. Rows whose means are of few samples
+/// know their own scatter badly: the law of the residuals, not a normal one, says what is far.
+/// @source Fisher 1932, the product of two tails
+/// @param scale of the residuals under that law
+double tailOfRow(const identify::Vector6d& whitened, bool has_orientation, const identify::ResidualLaw& law,
+                 const identify::ResidualScale& scale) {
+  const auto tailOf = [&](const auto& part, double unit) {
+    return tailOfThree(part.squaredNorm() / (unit * unit), law.degrees_of_freedom);
+  };
+  const double position = tailOf(whitened.head<3>(), scale.position);
+  if (!has_orientation) return position;
+  const double both = position * tailOf(whitened.tail<3>(), scale.rotation);
+  return both * (1.0 - std::log(both));
+}
+
+/// Marks the hypotheses that may be rejected with a false-discovery rate of at most `rate`.
+std::vector<char> discoveries(const std::vector<double>& p, double rate) {
+  std::vector<std::size_t> order(p.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p[a] < p[b]; });
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < order.size(); ++k)
+    if (p[order[k]] <= rate * static_cast<double>(k + 1) / static_cast<double>(p.size())) count = k + 1;
+  std::vector<char> found(p.size(), 0);
+  for (std::size_t k = 0; k < count; ++k) found[order[k]] = 1;
+  return found;
+}
+
+}  // namespace
+
+std::vector<char> farOff(const identify::GapSearch& search, std::span<const identify::Vector6d> whitened, double rate) {
+  const bool has_orientation = search.physics().rows().has_orientation;
+  const identify::ResidualScale scale = identify::devianceOf(search.noiseLeft(), has_orientation, search.law()).scale;
+  std::vector<double> p;
+  for (const identify::Vector6d& row : whitened) p.push_back(tailOfRow(row, has_orientation, search.law(), scale));
+  return discoveries(p, rate);
+}
+
+}  // namespace fieldtrue::gap
