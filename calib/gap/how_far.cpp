@@ -121,13 +121,11 @@ RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structur
   };
   const double share_m2 = share(search.floorPlacingSd_m(), search.placingSd_m());
   const double share_rad2 = share(search.floorPlacingSd_rad(), search.placingSd_rad());
-  const bool belong_together = search.belongTogether();
-  const std::vector<char> is_stray = farOff(search, structure.noise, search.thresholds().sure_stray);
   const std::size_t count = rows.rows.size();
   RowNoise noise{std::vector<double>(count), std::vector<double>(count), std::vector<double>(count), {}};
+  const bool belong_together = search.belongTogether();
   for (std::size_t i = 0; i < count; ++i) {
-    if (belong_together && is_stray[i] != 0) noise.strays.push_back(i);
-    if (!belong_together || is_stray[i] != 0) {
+    if (!belong_together) {
       setAllowed(search, i, noise);
       continue;
     }
@@ -137,6 +135,8 @@ RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structur
     noise.whitened[i] = left.squaredNorm();
     noise.square_rad2[i] = share_rad2 * (left.tail<3>() / search.whitening().rotation[i]).squaredNorm();
   }
+  if (belong_together) noise.strays = straysAmong(structure.noise, rows.has_orientation, search.thresholds());
+  for (const std::size_t i : noise.strays) setAllowed(search, i, noise);
   return noise;
 }
 

@@ -143,6 +143,18 @@ Deviance devianceOf(std::span<const Vector6d> whitened, bool has_orientation, co
   return deviance;
 }
 
+ResidualLaw likeliestLaw(std::span<const Vector6d> whitened, bool has_orientation) {
+  ResidualLaw likeliest;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double nu : {4.0, 8.0, 100.0}) {
+    const double deviance = devianceOf(whitened, has_orientation, {nu}).value;
+    if (deviance >= least) continue;
+    least = deviance;
+    likeliest.degrees_of_freedom = nu;
+  }
+  return likeliest;
+}
+
 std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapModel& model, const Whitening& whitening) {
   return whitened(physics.residuals(model), whitening);
 }

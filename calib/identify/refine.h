@@ -29,6 +29,8 @@ struct Deviance {
   ResidualScale scale;
 };
 Deviance devianceOf(std::span<const Vector6d> whitened, bool has_orientation, const ResidualLaw& law);
+/// Of tails with 4, 8 and 100 degrees of freedom.
+ResidualLaw likeliestLaw(std::span<const Vector6d> whitened, bool has_orientation);
 
 /// Whitened residuals of a model, one per row.
 std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapModel& model, const Whitening& whitening);

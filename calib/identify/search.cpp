@@ -132,14 +132,7 @@ Structure GapSearch::settleNoise(RefinedModel& about) {
     placing_sd_m_ = placingFrom(Channel::kPosition, placing_sd_m_);
     if (rows_.has_orientation) placing_sd_rad_ = placingFrom(Channel::kRotation, placing_sd_rad_);
   }
-  double best = std::numeric_limits<double>::infinity();
-  for (const double nu : {4.0, 8.0, 100.0}) {
-    const double deviance = devianceOf(noise_left_, rows_.has_orientation, {nu}).value;
-    if (deviance < best) {
-      best = deviance;
-      law_.degrees_of_freedom = nu;
-    }
-  }
+  law_ = likeliestLaw(noise_left_, rows_.has_orientation);
   return structure;
 }
 

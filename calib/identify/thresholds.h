@@ -89,8 +89,8 @@ struct Thresholds {
   /// BIC units of an effect from which there is a gap though it foretells nothing: at the edge of the places it bends
   /// so few that the others cannot foretell it. Set on open sessions: 0 of 300 without an effect reach it.
   double sure_unselected = 40.0;
-  /// Rate of false ones among the readings that lie off any smooth field farther than noise of the recording's own law
-  /// puts them: each is a gap, and no noise. Set by reason, as sure_trace.
+  /// Chance that noise by the law of the others puts any reading of a recording as far off a smooth field as one that
+  /// strays: that is a gap, and no noise. It must lie off by `far_off` too. Set by reason, as sure_trace.
   double sure_stray = 1e-5;
   /// Scatter over what may be noise, from which on it is a gap. Set so that tolerances stated at half of the truth stay
   /// none on open sessions.
@@ -176,8 +176,9 @@ struct Thresholds {
   /// Share of the variance without any reading, below which the earlier recording knows the field at a place. Set by
   /// reason: the SD is half.
   double far_surer = 0.25;
-  /// SDs that a reading must lie from what the earlier recording foretells to be astray: no slip of a placing that is
-  /// as stated. Set on pairs of simulated recordings without a change, by false alarms.
+  /// SDs that a reading must lie from what the earlier recording foretells, or from a smooth field through the others,
+  /// to be astray: no slip of a placing that is as stated. Set on pairs of simulated recordings without a change, by
+  /// false alarms.
   double far_off = 10.0;
   /// Places astray from which that may be a change. Set by reason: fewer are slips of the hand.
   std::size_t fewest_far_off = 3;

@@ -50,6 +50,48 @@ class GapMisfitsTest : public QObject {
     QVERIFY2(isTold(*report, "Places that do not fit the others: " + places + "."), report->text.c_str());
   }
 
+  /// One reading of eighty 0.4 m off is no noise of the others: it is what the gap is, and leaves their floor alone.
+  void aReadingFarOffIsAGap() {
+    CalibrationTable table = recordedIn(gapScene(), gapPlan());
+    Node& node = table.nodes[33];
+    node.tracker_from_sensor.position_m.z() += 0.4;
+    const auto report = diagnose(table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    QVERIFY2(report->verdict == GapVerdict::kUnexplained && report->selected.empty(), report->text.c_str());
+    QVERIFY2(isTold(*report, "One place does not fit the others: " + report->names.of(node.node)),
+             report->text.c_str());
+    QCOMPARE(report->candidates.front().effect, std::string(kUnnamedScattered));
+    const auto calm = diagnose(recordedIn(gapScene(), gapPlan()), nullptr, nullptr);
+    QVERIFY2(report->floor_position_mm < 1.5 * calm->floor_position_mm, report->text.c_str());
+    // 0.4 m at one of 80 places of about equal share.
+    FT_VERIFY_MATCH(near(std::sqrt(report->remaining.excess2_before_mm2), 400.0 / std::sqrt(80.0), 12.0));
+  }
+
+  void aReadingFarOffIsToldBesideACause() {
+    Withheld made = withheldFrom("compact_metal", R"({"center_m": [1.3, 0.5, 0.3], "radius_m": 0.15})");
+    Node& node = made.table.nodes[7];
+    node.tracker_from_sensor.position_m.z() += 0.05;
+    const auto report = diagnose(made.table, nullptr, nullptr);
+    FT_VERIFY_OK(report);
+    FT_VERIFY_MATCH(names(*report, "compact_metal"));
+    QVERIFY2(isTold(*report, "Beside what is named, one place does not fit the others: " + report->names.of(node.node)),
+             report->text.c_str());
+  }
+
+  /// Tails of Student's law with four degrees of freedom throw a reading of 2400 twenty scales off.
+  void heavyTailsAreNoise() {
+    std::mt19937_64 generator(5);
+    std::student_t_distribution<double> off(4.0);
+    for (unsigned seed = 1; seed <= 10; ++seed) {
+      CalibrationTable table = recordedIn(gapScene(), gapPlan({}, seed), seed);
+      for (Node& node : table.nodes)
+        node.tracker_from_sensor.position_m += 0.001 * Eigen::Vector3d(off(generator), off(generator), off(generator));
+      const auto report = diagnose(table, nullptr, nullptr);
+      FT_VERIFY_OK(report);
+      QVERIFY2(report->verdict == GapVerdict::kNoGap, report->text.c_str());
+    }
+  }
+
   void somethingLocalIsPlaced_data() {
     QTest::addColumn<double>("height_m");
     QTest::newRow("a few places lie off") << 0.02;
