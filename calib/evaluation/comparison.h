@@ -107,7 +107,9 @@ struct SensorSplit {
   /// The same of errors as shares of what the shared correction leaves of each sensor, so that one that is noisy does
   /// not hide what another gains; a number, not a unit.
   PairedDifference separate_less_shared_in_shares;
-  bool is_better = false;     ///< Separate: one of both paired 90 % intervals is below zero.
+  /// Separate: the RMS is lower by 5 % at least, in the unit or, where one sensor errs far more than another, in shares
+  /// (and then no higher in the unit), with the paired 90 % interval of that difference below zero.
+  bool is_better = false;
   bool is_told = true;        ///< False where a sensor cannot be fitted by itself; then only the text is set.
   GainTest gain;              ///< Of the separate corrections, over no correction.
   double before = 0;          ///< RMS with no correction, at the same places.
