@@ -266,9 +266,7 @@ Result<SensorSplits> splitsOf(const CalibrationTable& table, const calibration::
          parseMethodText(correctors::methodText(choice.orientation_id, choice.orientation_settings)));
   options.position_methods = {position};
   options.orientation_methods = {turn};
-  // Left out one by one in closed form, the sensors could not be fitted apart.
-  if (!options.validation || options.validation->kind == ValidationKind::kLeaveOneOut)
-    options.validation = defaultValidation(table, true);
+  if (!options.validation) options.validation = defaultValidation(table, true);
   options.with_surroundings = false;
   const auto together = compareMethods(table, options, partOf(control, 0.0, 0.4));
   options.separate_sensors = true;

@@ -8,6 +8,7 @@
 #include "calib/calibration/coincident_places.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/units.h"
+#include "calib/correctors/base/method_text.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/sensor_splits.h"
 #include "tests/support/matchers.h"
@@ -198,6 +199,38 @@ class SensorsTest : public QObject {
     QVERIFY(comparison.split->separate_less_shared_in_shares.high90 < 0.0);
     QVERIFY(comparison.split->separate > comparison.split->shared);
     QVERIFY2(!comparison.split->is_better, comparison.split->text.c_str());
+  }
+
+  void everythingIsByTheValidationAsked_data() {
+    QTest::addColumn<double>("gain");
+    QTest::newRow("apart") << 0.02;
+    QTest::newRow("shared") << 0.0;
+  }
+  void everythingIsByTheValidationAsked() {
+    QFETCH(double, gain);
+    const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = gain, .noise_2_m = 0.001});
+    ComparisonOptions options;
+    options.position_methods = {{"affine", {}}, parseMethodText("polynomial:degree=2").value()};
+    options.orientation_methods = {{"none", {}}};
+    options.validation = Validation{ValidationKind::kLeaveOneOut, 0};
+    const auto comparison = compareMethods(table, options);
+    FT_VERIFY_OK(comparison);
+    const std::optional<SensorSplit>& split = comparison->split;
+    QCOMPARE(isApart(split), gain > 0.0);
+    FT_VERIFY_MATCH(holdsAll(split->text, {"loo"}));
+    const MethodScore& best = comparison->position[*comparison->best_position_row];
+    FT_VERIFY_MATCH(near(split->shared, best.stats.rms, 1e-9));
+    const double after = isApart(split) ? split->separate : best.stats.rms;
+    for (const MethodScore& score : comparison->position) QVERIFY(after <= score.stats.rms);
+    FT_VERIFY_MATCH(near(comparison->verdict.position.gain, 1.0 - after / comparison->before_position_mm.rms, 1e-9));
+    // Each sensor's own fits, made anew without every place.
+    options.position_methods = {parseMethodText(correctors::methodText(best.method, best.settings)).value()};
+    options.separate_sensors = true;
+    options.closed_form = false;
+    options.with_surroundings = false;
+    const auto refitted = compareMethods(table, options);
+    FT_VERIFY_OK(refitted);
+    FT_VERIFY_MATCH(near(split->separate, refitted->position.front().stats.rms, 1e-6));
   }
 
   /// 20 mm an axis of the first drown what a gain of 2 % makes of the second, unless each is measured by its own.
