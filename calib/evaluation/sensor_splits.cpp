@@ -177,6 +177,7 @@ SensorSplit splitOf(const Comparison& together, const Comparison& apart, bool of
   split.gain = testGain(apart.places, before, separate.place_errors, separate.freedom);
   split.before = rootMeanSquare(before);
   split.after = separate.place_errors;
+  split.sensors = separate.sensors;
   const char* unit = of_position ? "mm" : "degrees";
   const std::string why_apart = apartText(what, separate.sensors.size(), is_one_region);
   if (split.is_better && !isApart(split))
@@ -237,6 +238,7 @@ Result<SplitOfRow> bestSplit(const Comparison& comparison, bool of_position, con
 void takePosition(Comparison& comparison, std::size_t row) {
   comparison.best_position_row = row;
   comparison.best_position = comparison.position[row].method;
+  comparison.after_sensors = comparison.split->sensors;
   tellDistanceTo(comparison.split->after, comparison.position);
   comparison.trueness.after_position_mm = excessError(comparison.split->separate, comparison.floor_position_mm);
   judgePosition(comparison.verdict, comparison.split->gain);

@@ -139,7 +139,31 @@ class SensorsTest : public QObject {
       const double both = std::hypot(sensors[0].place_errors[k], sensors[1].place_errors[k]) / std::sqrt(2.0);
       FT_VERIFY_MATCH(near(comparison.position.front().place_errors[k], both, 1e-12));
     }
-    QCOMPARE(toJson(comparison).at("sensors").size(), std::size_t{2});
+    const nlohmann::json told = toJson(comparison).at("sensors");
+    QCOMPARE(told.size(), std::size_t{2});
+    // Nothing distorts this field, so no correction is best.
+    QVERIFY(told.at(0).at("after").is_null());
+    QCOMPARE(told.at(1).at("rms").get<double>(), comparison.before_sensors[1].stats.rms);
+  }
+
+  void whatTheBestLeavesOfEachSensorIsTold_data() {
+    QTest::addColumn<double>("gain");
+    QTest::newRow("shared") << 0.0;
+    QTest::newRow("apart") << 0.02;
+  }
+  void whatTheBestLeavesOfEachSensorIsTold() {
+    QFETCH(double, gain);
+    const Comparison comparison =
+        compared(twoSensors({.smooth_m = 0.02, .gain = gain, .noise_2_m = 0.001}), "polynomial:degree=3");
+    QCOMPARE(isApart(comparison.split), gain > 0.0);
+    const nlohmann::json told = toJson(comparison).at("sensors");
+    // Every place has a row of either, so that their mean square is that of the best.
+    double square_mm2 = 0.0;
+    for (const nlohmann::json& sensor : told)
+      square_mm2 += 0.5 * std::pow(sensor.at("after").at("rms").get<double>(), 2);
+    const double best_mm = gain > 0.0 ? comparison.split->separate : comparison.position.front().stats.rms;
+    FT_VERIFY_MATCH(near(std::sqrt(square_mm2), best_mm, 1e-9));
+    QVERIFY(told.at(0).at("after").at("rms") < told.at(0).at("rms"));
   }
 
   void sensorsThatErrAlikeShare_data() {
