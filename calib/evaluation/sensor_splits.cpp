@@ -290,8 +290,19 @@ std::vector<Node> fitRowsOf(const CalibrationTable& table) {
   return rows;
 }
 
+Result<void> checkFitRows(const CalibrationTable& table) {
+  if (!fitRowsOf(table).empty()) return {};
+  const bool is_skipped = std::all_of(table.nodes.begin(), table.nodes.end(),
+                                      [](const Node& node) { return node.role == NodeRole::kSkipped; });
+  return fail(ErrorCode::kTooFewNodes,
+              table.nodes.empty() ? "The table has no rows to fit"
+              : is_skipped        ? "Every row of the table is skipped; nothing is left to fit"
+                                  : "Every row of the table is for validation or skipped; nothing is left to fit");
+}
+
 Result<calibration::Corrector> fitByEvidence(const CalibrationTable& table, calibration::CorrectorChoice choice,
                                              calibration::AlignMode align, const RunControl& control) {
+  FT_TRY_VOID(checkFitRows(table));
   ComparisonOptions options;
   options.align = align;
   FT_TRY(const auto splits, splitsOf(table, choice, options, partOf(control, 0.0, 0.9)));

@@ -27,9 +27,12 @@ Result<SensorSplits> splitsOf(const CalibrationTable& table, const calibration::
 /// The rows a calibration is fitted to: validation rows stay unseen, skipped ones never count.
 std::vector<Node> fitRowsOf(const CalibrationTable& table);
 
+/// @error kTooFewNodes where there are none, telling what the table's rows are
+Result<void> checkFitRows(const CalibrationTable& table);
+
 /// Fits to them, each part with a correction for each sensor where splitsOf says that this errs less; the report then
 /// tells both figures.
-/// @error as Corrector::fit
+/// @error as checkFitRows and Corrector::fit
 Result<calibration::Corrector> fitByEvidence(const CalibrationTable& table, calibration::CorrectorChoice choice,
                                              calibration::AlignMode align, const RunControl& control);
 

@@ -386,6 +386,24 @@ class SensorsTest : public QObject {
     FT_VERIFY_MATCH(holdsAll(comparison->verdict.text, {"no method does better"}));
   }
 
+  void aTableWithoutRowsToFitIsTold_data() {
+    QTest::addColumn<bool>("one_is_seen");
+    QTest::addColumn<QByteArray>("says");
+    QTest::newRow("skipped") << false << QByteArray("Every row of the table is skipped");
+    QTest::newRow("validation") << true << QByteArray("for validation or skipped");
+  }
+  void aTableWithoutRowsToFitIsTold() {
+    QFETCH(bool, one_is_seen);
+    QFETCH(QByteArray, says);
+    CalibrationTable table = twoSensors({});
+    for (Node& node : table.nodes) node.role = NodeRole::kSkipped;
+    if (one_is_seen) table.nodes.front().role = NodeRole::kValidation;
+    const auto fitted = fitByEvidence(table, {}, calibration::AlignMode::kRigid, {});
+    QVERIFY(!fitted);
+    QCOMPARE(fitted.error().code, ErrorCode::kTooFewNodes);
+    FT_VERIFY_MATCH(holdsAll(fitted.error().message, {says.constData()}));
+  }
+
   void aSensorOfFewPlacesIsTold() {
     CalibrationTable table = twoSensors({.smooth_m = 0.02, .noise_2_m = 0.001});
     std::erase_if(table.nodes, [](const Node& node) { return node.sensor == 2 && node.node > 5; });
