@@ -40,6 +40,7 @@ Result<calibration::Corrector> fitted(const CalibrationTable& table, calibration
                                       const std::string& sensors, calibration::AlignMode align,
                                       const RunControl& control) {
   if (sensors == "auto") return evaluation::fitByEvidence(table, choice, align, control);
+  FT_TRY_VOID(evaluation::checkFitRows(table));
   choice.separate_position = choice.separate_orientation = sensors == "separate";
   return calibration::Corrector::fit(evaluation::fitRowsOf(table), table.metadata, choice, align, control);
 }

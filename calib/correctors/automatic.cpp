@@ -6,6 +6,7 @@
 #include "calib/core/json_reader.h"
 #include "calib/correctors/automatic_blend.h"
 #include "calib/correctors/automatic_choice.h"
+#include "calib/correctors/automatic_evidence.h"
 #include "calib/correctors/base/method.h"
 #include "calib/correctors/base/readers.h"
 #include "calib/correctors/base/rows.h"
@@ -101,21 +102,20 @@ std::string partsOf(const std::vector<AutomaticCandidate>& candidates, const Ble
   return text;
 }
 
-/// @param blend that was taken in place of the chosen candidate, or null
 std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& candidates,
-                   const std::vector<InnerScore>& scores, const AutomaticDecision& decision, const Blend* blend,
-                   std::size_t n_folds) {
+                   const std::vector<InnerScore>& scores, const AutomaticAnswer& answer, std::size_t n_folds) {
+  const AutomaticDecision& decision = answer.decision;
+  const std::optional<Blend>& blend = answer.blend;
   const std::size_t chosen = decision.candidate;
   const auto n_scored =
       std::count_if(scores.begin(), scores.end(), [](const InnerScore& score) { return !score.skipped; });
   // Every other model says so itself.
   const std::string plane = chosen == 0 ? planeNote(data, "nothing is claimed off it") : "";
   std::string note = plane + (plane.empty() ? "" : " ") + "Chosen: ";
-  note += blend != nullptr
-              ? "a blend of " + partsOf(candidates, *blend) + ", held-out RMS " + inMm(blend->score.rms_m()) +
-                    " against " + inMm(scores[chosen].rms_m()) + " of " + labelOf(candidates[chosen]) + " alone"
-              : labelOf(candidates[chosen]) + ", held-out RMS " + inMm(scores[chosen].rms_m());
-  if (blend != nullptr)
+  note += blend ? "a blend of " + partsOf(candidates, *blend) + ", held-out RMS " + inMm(blend->score.rms_m()) +
+                      " against " + inMm(scores[chosen].rms_m()) + " of " + labelOf(candidates[chosen]) + " alone"
+                : labelOf(candidates[chosen]) + ", held-out RMS " + inMm(scores[chosen].rms_m());
+  if (blend)
     note += " and " + inMm(scores.front().rms_m()) + " without correction";
   else if (chosen == 0)
     note += ", since nothing else lowers it clearly";
@@ -123,16 +123,32 @@ std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& c
     note += " against " + inMm(scores.front().rms_m()) + " without correction";
   if (decision.is_despite_squares)
     note += ", figures that a few places carry: at most places it errs less, and it moves them the right way";
+  if (decision.is_by_evidence && !blend) note += ", by the evidence of all places";
+  if (answer.stuck)
+    note += ", without " + labelOf(candidates[*answer.stuck]) +
+            ", whose fit to all places leaves more at them than fits without them";
   return note + "; " + std::to_string(n_scored) + " candidates scored over the same " + std::to_string(n_folds) +
          " folds.";
 }
 
-Result<std::unique_ptr<PositionModel>> fitBlend(const std::vector<AutomaticCandidate>& candidates, const Blend& blend,
-                                                const FitData& data, const RunControl& control) {
+/// A candidate's fit to all places. @param made before, if it was
+Result<std::unique_ptr<PositionModel>> fitOnce(std::unique_ptr<PositionModel> made, const AutomaticCandidate& candidate,
+                                               const FitData& data, const RunControl& control) {
+  if (made != nullptr) return made;
+  return candidate.method->fit(data, candidate.settings, control);
+}
+
+Result<std::unique_ptr<PositionModel>> fitAnswer(const std::vector<AutomaticCandidate>& candidates,
+                                                 const AutomaticAnswer& answer, WholeFits whole, const FitData& data,
+                                                 const RunControl& control) {
+  const std::size_t chosen = answer.decision.candidate;
+  if (!answer.blend) return fitOnce(std::move(whole.models[chosen]), candidates[chosen], data, control);
+  const Blend& blend = *answer.blend;
   std::vector<BlendMember> members;
   for (std::size_t i = 0; i < blend.members.size(); ++i) {
-    const AutomaticCandidate& candidate = candidates[blend.members[i]];
-    FT_TRY(auto model, candidate.method->fit(data, candidate.settings, control));
+    const std::size_t member = blend.members[i];
+    const AutomaticCandidate& candidate = candidates[member];
+    FT_TRY(auto model, fitOnce(std::move(whole.models[member]), candidate, data, control));
     members.push_back({candidate.method->id, toJson(candidate.settings), blend.weights[i], std::move(model)});
   }
   return makeBlend(std::move(members));
@@ -156,24 +172,21 @@ Result<std::unique_ptr<PositionModel>> fitAutomatic(const FitData& data, const S
   FT_TRY_VOID(checkSpread(data));
   const std::vector<AutomaticCandidate> candidates = automaticCandidates(candidateSetOf(settings));
   const auto folds = innerFolds(data);
-  FT_TRY(const auto scored, scoreCandidates(candidates, data, folds, control));
-  const std::vector<InnerScore>& scores = scored;
-  const AutomaticDecision decision = chooseCandidate(candidates, scores);
-  const std::size_t chosen = decision.candidate;
-  const AutomaticCandidate& winner = candidates[chosen];
-  std::optional<Blend> blend;  // Which weighs the squares.
-  if (chosen != 0 && !decision.is_despite_squares) blend = blendCandidates(candidates, scores, data, folds);
-  if (blend && !isWorthBlending(blend->score, scores[chosen])) blend.reset();
+  FT_TRY(auto scores, scoreCandidates(candidates, data, folds, control));
   RunControl inner = control;
   inner.progress = [](double) {};
-  FT_TRY(auto model,
-         blend ? fitBlend(candidates, *blend, data, inner) : winner.method->fit(data, winner.settings, inner));
+  FT_TRY(auto whole, fitWhole(candidates, scores, data, folds, inner));
+  const double n_steps = static_cast<double>(candidates.size() + kFitsAfterScores);
+  control.progress((n_steps - 1.0) / n_steps);
+  const AutomaticAnswer answer = answerOf(candidates, scores, data, folds, whole.evidence ? &*whole.evidence : nullptr);
+  if (answer.stuck) scores[*answer.stuck].skipped = "its fit to all places leaves more at them than fits without them";
+  FT_TRY(auto model, fitAnswer(candidates, answer, std::move(whole), data, inner));
   control.progress(1.0);
-  nlohmann::json table = {
-      {"method", blend ? kBlend : winner.method->id},
-      {"settings", blend ? nlohmann::json::object() : toJson(winner.settings)},
-      {"candidates", tableOf(candidates, scores)},
-      {"note", noteOf(data, candidates, scores, decision, blend ? &*blend : nullptr, folds.rows.size())}};
+  const AutomaticCandidate& winner = candidates[answer.decision.candidate];
+  nlohmann::json table = {{"method", answer.blend ? kBlend : winner.method->id},
+                          {"settings", answer.blend ? nlohmann::json::object() : toJson(winner.settings)},
+                          {"candidates", tableOf(candidates, scores)},
+                          {"note", noteOf(data, candidates, scores, answer, folds.rows.size())}};
   return std::make_unique<AutomaticModel>(std::move(model), std::move(table));
 }
 
@@ -200,7 +213,9 @@ PositionMethod automaticPosition() {
   PositionMethod method;
   method.id = "auto";
   method.label = "Automatic choice";
-  method.source = "Nested cross-validation: Stone 1974; one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984";
+  method.source =
+      "Nested cross-validation: Stone 1974; one-standard-error rule: Breiman, Friedman, Olshen, Stone 1984; "
+      "evidence: Schwarz 1978; errors with heavy tails: Lange, Little, Taylor 1989";
   method.settings = {declare::choice("candidates", "Candidates", {"survey", "ours", "all"}, "all",
                                      "Methods to choose from: the survey's, those that came after it, or all; no "
                                      "correction, a rigid motion and an affine map are always among them.")};

@@ -91,12 +91,6 @@ Result<ModelOfFold> modelsOf(const AutomaticCandidate& candidate, const FitData&
   };
 }
 
-/// On the places scored so far.
-bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
-  const PairedDifference excess(score, best);
-  return excess.mean > 0.0 && excess.mean > kClearlyWorse * excess.standard_error;
-}
-
 /// RMS over the places alike, whatever part of the region each stands for.
 double rmsOfPlaces_m(const InnerScore& score) {
   const double sum_m2 = std::accumulate(score.squares_m2.begin(), score.squares_m2.end(), 0.0);
@@ -128,6 +122,23 @@ AutomaticDecision chosenDespiteSquares(const std::vector<InnerScore>& scores) {
   return chosen;
 }
 
+std::vector<double> rowsOfPlaces(const std::vector<std::size_t>& slots) {
+  std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
+  for (const std::size_t slot : slots) n_rows[slot] += 1.0;
+  return n_rows;
+}
+
+/// @param square_m2 of places that no row was taken in of
+InnerScore emptyScore(const FitData& data, std::size_t n_places, const std::vector<double>& shares, double square_m2) {
+  InnerScore score;
+  score.shares = shares;
+  score.squares_m2.assign(n_places, square_m2);
+  score.residual_m.assign(n_places, Eigen::Vector3d::Zero());
+  score.row_residual_m.assign(data.size(), Eigen::Vector3d::Zero());
+  score.dimension = data.dimension;
+  return score;
+}
+
 InnerScore skippedScore(std::string why) {
   InnerScore score;
   score.skipped = std::move(why);
@@ -156,6 +167,19 @@ std::vector<AutomaticCandidate> automaticCandidates(CandidateSet set) {
     return a.complexity < b.complexity;
   });
   return candidates;
+}
+
+bool isClearlyWorse(const InnerScore& score, const InnerScore& best) {
+  const PairedDifference excess(score, best);
+  return excess.mean > 0.0 && excess.mean > kClearlyWorse * excess.standard_error;
+}
+
+std::size_t leastSquare(const std::vector<InnerScore>& scores) {
+  FT_CHECK(!scores.empty() && !scores.front().skipped);
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < scores.size(); ++i)
+    if (!scores[i].skipped && PairedDifference(scores[i], scores[best]).mean < 0.0) best = i;
+  return best;
 }
 
 double errsLessMostly(const InnerScore& score, const InnerScore& other) {
@@ -217,6 +241,15 @@ InnerFolds innerFolds(const FitData& data) {
   return folds;
 }
 
+InnerScore scoreOfFit(const PositionModel& model, const FitData& data, const std::vector<double>& shares) {
+  const std::vector<std::size_t> slots = placeSlots(data);
+  const std::vector<double> n_rows = rowsOfPlaces(slots);
+  InnerScore score = emptyScore(data, n_rows.size(), shares, 0.0);
+  for (std::size_t row = 0; row < data.size(); ++row)
+    score.add(slots[row], row, residual_m(model, data, row), 1.0 / n_rows[slots[row]]);
+  return score;
+}
+
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data, const InnerFolds& folds,
                                   const InnerScore* best, const RunControl& control) {
   const auto cancelled = [] { return fail(ErrorCode::kCancelled, "Stopped on request"); };
@@ -227,14 +260,8 @@ Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const Fit
     return skippedScore(model_without.error().message);
   }
   const std::vector<std::size_t> slots = placeSlots(data);
-  std::vector<double> n_rows(1 + *std::max_element(slots.begin(), slots.end()), 0.0);
-  for (const std::size_t slot : slots) n_rows[slot] += 1.0;
-  InnerScore score;
-  score.shares = folds.shares;
-  score.squares_m2.assign(n_rows.size(), std::nan(""));
-  score.residual_m.assign(n_rows.size(), Eigen::Vector3d::Zero());
-  score.row_residual_m.assign(data.size(), Eigen::Vector3d::Zero());
-  score.dimension = data.dimension;
+  const std::vector<double> n_rows = rowsOfPlaces(slots);
+  InnerScore score = emptyScore(data, n_rows.size(), folds.shares, std::nan(""));
   for (std::size_t k = 0; k < folds.rows.size(); ++k) {
     if (control.stop.stop_requested()) return cancelled();
     const std::vector<std::size_t>& out = folds.rows[k];
@@ -271,17 +298,15 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
     FT_TRY(auto score, scoreCandidate(candidates[i], data, folds, best, inner));
     scores[i] = std::move(score);
     if (!scores[i].skipped && (best == nullptr || PairedDifference(scores[i], *best).mean < 0.0)) best = &scores[i];
-    control.progress(++n_done / static_cast<double>(candidates.size() + 1));
+    control.progress(++n_done / static_cast<double>(candidates.size() + kFitsAfterScores));
   }
   return scores;
 }
 
 AutomaticDecision chooseCandidate(const std::vector<AutomaticCandidate>& candidates,
                                   const std::vector<InnerScore>& scores) {
-  FT_CHECK(candidates.size() == scores.size() && !scores.empty() && !scores.front().skipped);
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < scores.size(); ++i)
-    if (!scores[i].skipped && PairedDifference(scores[i], scores[best]).mean < 0.0) best = i;
+  FT_CHECK(candidates.size() == scores.size());
+  const std::size_t best = leastSquare(scores);
   if (best == 0) return chosenDespiteSquares(scores);
   std::size_t chosen = best;
   for (std::size_t i = 1; i < scores.size(); ++i) {

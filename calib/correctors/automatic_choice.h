@@ -44,6 +44,18 @@ struct InnerScore {
   double rms_m() const;
 };
 
+/// What a fit to all rows leaves at them, in the form of errors held out; where it does not cover a place, what was
+/// there before.
+/// @param shares of the region, by place
+InnerScore scoreOfFit(const PositionModel& model, const FitData& data, const std::vector<double>& shares);
+
+/// Whether the mean square exceeds that of another by more than two standard errors of the difference; of a candidate
+/// that is still being scored, on the places that are.
+bool isClearlyWorse(const InnerScore& score, const InnerScore& best);
+
+/// The candidate of least mean square of those not skipped; the first must not be.
+std::size_t leastSquare(const std::vector<InnerScore>& scores);
+
 /// At how many places, and by how much, one candidate errs less than another, in SDs of chance: Wilcoxon's signed ranks
 /// of the squares' differences, weighted by what each place stands for. A few places that carry the squares carry it no
 /// further than others.
@@ -69,6 +81,9 @@ InnerFolds innerFolds(const FitData& data);
 Result<InnerScore> scoreCandidate(const AutomaticCandidate& candidate, const FitData& data, const InnerFolds& folds,
                                   const InnerScore* best, const RunControl& control);
 
+/// Steps of the progress after the scores: fits to all places, and the answer's own.
+inline constexpr std::size_t kFitsAfterScores = 2;
+
 /// Scores every candidate, costly ones last; in the candidates' order.
 /// @param progress is told the fraction done
 /// @error kCancelled
@@ -79,6 +94,7 @@ Result<std::vector<InnerScore>> scoreCandidates(const std::vector<AutomaticCandi
 struct AutomaticDecision {
   std::size_t candidate = 0;
   bool is_despite_squares = false;  ///< By most places and by directions, while a few places carry the squares.
+  bool is_by_evidence = false;      ///< Of all places, rather than by places left out.
 };
 
 /// The simplest candidate that corrects at all and whose mean squared error exceeds the least by no more than one

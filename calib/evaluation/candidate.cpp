@@ -1,5 +1,6 @@
 #include "calib/evaluation/candidate.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -117,6 +118,37 @@ Result<std::vector<Candidate>> makeCandidates(
   return candidates;
 }
 
+correctors::FitData dataOfSensor(int sensor, std::span<const Node> rows, const TableMetadata& metadata,
+                                 const calibration::Alignment& alignment, int dimension) {
+  correctors::FitData data = calibration::makeFitData(nodesOfSensor(rows, sensor), metadata, alignment);
+  if (data.dimension == 2) data.dimension = dimension;
+  return data;
+}
+
+std::string whose(int sensor) { return "Sensor " + std::to_string(sensor) + ": "; }
+
+tl::unexpected<Error> ofSensor(int sensor, const Error& error) {
+  return fail(error.code, whose(sensor) + error.message);
+}
+
+/// One model of several sensors; rows of one that has none are the first's.
+Result<FittedCandidate> joined(std::map<int, FittedCandidate> fits) {
+  if (fits.empty()) return fail(ErrorCode::kTooFewNodes, "There are no rows to fit");
+  FittedCandidate all;
+  for (const auto& [sensor, fitted] : fits) {
+    all.coefficients += fitted.coefficients;
+    if (!fitted.note.empty()) all.note += (all.note.empty() ? "" : " ") + fitted.note;
+  }
+  const auto shared = std::make_shared<const std::map<int, FittedCandidate>>(std::move(fits));
+  const auto of = [shared](const Node& node) -> const FittedCandidate& {
+    const auto found = shared->find(node.sensor);
+    return found == shared->end() ? shared->begin()->second : found->second;
+  };
+  all.score = [of](const Node& node, const calibration::Alignment& by) { return of(node).score(node, by); };
+  all.evaluate = [of](const Node& node) { return of(node).evaluate(node); };
+  return all;
+}
+
 }  // namespace
 
 Result<std::vector<Candidate>> positionCandidates(const std::vector<MethodText>& methods) {
@@ -134,28 +166,44 @@ Result<FittedCandidate> fitSensorsApart(const Candidate& candidate, std::span<co
                                         int dimension, const RunControl& control) {
   std::map<int, FittedCandidate> fits;
   for (const int sensor : sensorsOf(rows)) {
-    correctors::FitData data = calibration::makeFitData(nodesOfSensor(rows, sensor), metadata, alignment);
-    if (data.dimension == 2) data.dimension = dimension;
-    auto fitted = candidate.fit(data, control);
-    const std::string whose = "Sensor " + std::to_string(sensor) + ": ";
-    if (!fitted) return fail(fitted.error().code, whose + fitted.error().message);
-    if (!fitted->note.empty()) fitted->note = whose + fitted->note;
+    auto fitted = candidate.fit(dataOfSensor(sensor, rows, metadata, alignment, dimension), control);
+    if (!fitted) return ofSensor(sensor, fitted.error());
+    if (!fitted->note.empty()) fitted->note = whose(sensor) + fitted->note;
     fits.emplace(sensor, *std::move(fitted));
   }
-  if (fits.empty()) return fail(ErrorCode::kTooFewNodes, "There are no rows to fit");
-  FittedCandidate all;
-  for (const auto& [sensor, fitted] : fits) {
-    all.coefficients += fitted.coefficients;
-    if (!fitted.note.empty()) all.note += (all.note.empty() ? "" : " ") + fitted.note;
+  return joined(std::move(fits));
+}
+
+Result<FitsWithout> holdOutSensorsApart(const Candidate& candidate, std::span<const Node> rows,
+                                        const TableMetadata& metadata, const calibration::Alignment& alignment,
+                                        int dimension, const RunControl& control) {
+  std::map<int, FitsWithout> fits;
+  std::map<int, std::size_t> n_rows;
+  std::vector<std::pair<int, std::size_t>> sensor_and_row;  // Of each row, and which of that sensor's rows it is.
+  for (const Node& node : rows) sensor_and_row.emplace_back(node.sensor, n_rows[node.sensor]++);
+  double own_variance = 0.0;
+  for (const auto& [sensor, n] : n_rows) {
+    const correctors::FitData data = dataOfSensor(sensor, rows, metadata, alignment, dimension);
+    if (!candidate.holds_out(data)) return fail(ErrorCode::kUnsupported, "There is no closed form for these rows");
+    auto of_sensor = candidate.hold_out(data, control);
+    if (!of_sensor) return ofSensor(sensor, of_sensor.error());
+    own_variance = std::max(own_variance, of_sensor->own_variance);
+    fits.emplace(sensor, *std::move(of_sensor));
   }
-  const auto shared = std::make_shared<const std::map<int, FittedCandidate>>(std::move(fits));
-  const auto of = [shared](const Node& node) -> const FittedCandidate& {
-    const auto found = shared->find(node.sensor);
-    return found == shared->end() ? shared->begin()->second : found->second;
+  const auto without = [fits = std::move(fits), n_rows = std::move(n_rows), sensor_and_row = std::move(sensor_and_row)](
+                           std::span<const std::size_t> out, const Pose& fold_from_data) -> Result<FittedCandidate> {
+    std::map<int, std::vector<std::size_t>> out_of_sensor;
+    for (const std::size_t row : out) out_of_sensor[sensor_and_row[row].first].push_back(sensor_and_row[row].second);
+    std::map<int, FittedCandidate> models;
+    for (const auto& [sensor, of_sensor] : fits) {
+      if (out_of_sensor[sensor].size() == n_rows.at(sensor)) continue;  // As in fits anew, of the sensors with rows.
+      auto model = of_sensor.fit(out_of_sensor[sensor], fold_from_data);
+      if (!model) return ofSensor(sensor, model.error());
+      models.emplace(sensor, *std::move(model));
+    }
+    return joined(std::move(models));
   };
-  all.score = [of](const Node& node, const calibration::Alignment& by) { return of(node).score(node, by); };
-  all.evaluate = [of](const Node& node) { return of(node).evaluate(node); };
-  return all;
+  return FitsWithout{without, own_variance};
 }
 
 RowScore alignedPositionScore(const Node& node, const calibration::Alignment& alignment) {

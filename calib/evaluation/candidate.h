@@ -58,6 +58,13 @@ Result<FittedCandidate> fitSensorsApart(const Candidate& candidate, std::span<co
                                         const TableMetadata& metadata, const calibration::Alignment& alignment,
                                         int dimension, const RunControl& control);
 
+/// Fits of each sensor's rows alone that leave rows out, of which each scores its own sensor's.
+/// @param rows numbered in this order
+/// @error kUnsupported where there is no closed form for a sensor's rows; as the method's, naming the sensor
+Result<FitsWithout> holdOutSensorsApart(const Candidate& candidate, std::span<const Node> rows,
+                                        const TableMetadata& metadata, const calibration::Alignment& alignment,
+                                        int dimension, const RunControl& control);
+
 /// The score of a row that only the alignment touches.
 RowScore alignedPositionScore(const Node& node, const calibration::Alignment& alignment);
 RowScore alignedOrientationScore(const Node& node, const calibration::Alignment& alignment);

@@ -107,12 +107,15 @@ struct SensorSplit {
   /// The same of errors as shares of what the shared correction leaves of each sensor, so that one that is noisy does
   /// not hide what another gains; a number, not a unit.
   PairedDifference separate_less_shared_in_shares;
-  bool is_better = false;     ///< Separate: one of both paired 90 % intervals is below zero.
-  bool is_told = true;        ///< False where a sensor cannot be fitted by itself; then only the text is set.
-  GainTest gain;              ///< Of the separate corrections, over no correction.
-  double before = 0;          ///< RMS with no correction, at the same places.
-  std::vector<double> after;  ///< Of each place with separate corrections; same order as Comparison::places.
-  std::string text;           ///< One sentence.
+  /// Separate: the RMS is lower by 5 % at least, in the unit or, where one sensor errs far more than another, in shares
+  /// (and then no higher in the unit), with the paired 90 % interval of that difference below zero.
+  bool is_better = false;
+  bool is_told = true;               ///< False where a sensor cannot be fitted by itself; then only the text is set.
+  GainTest gain;                     ///< Of the separate corrections, over no correction.
+  double before = 0;                 ///< RMS with no correction, at the same places.
+  std::vector<double> after;         ///< Of each place with separate corrections; same order as Comparison::places.
+  std::vector<SensorScore> sensors;  ///< With separate corrections.
+  std::string text;                  ///< One sentence.
 };
 
 /// Whether each sensor is to have a correction of its own: better than one for all, and better than none.
@@ -181,6 +184,7 @@ struct Comparison {
   ErrorStats before_position_mm;
   std::optional<ErrorStats> before_orientation_deg;  ///< None without orientation.
   std::vector<SensorScore> before_sensors;           ///< Of positions; empty with one sensor.
+  std::vector<SensorScore> after_sensors;  ///< With the best position method, as the verdict has it; empty without one.
   std::vector<double> before_place_mm;
   std::vector<double> before_place_deg;  ///< Empty without orientation.
   std::vector<Eigen::Vector3d> before_residual_m;

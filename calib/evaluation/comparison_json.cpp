@@ -38,6 +38,14 @@ json sensorsToJson(const std::vector<SensorScore>& sensors) {
   return to;
 }
 
+/// Of each sensor what is left before and with the best position method.
+json beforeAndAfterToJson(const Comparison& comparison) {
+  json to = sensorsToJson(comparison.before_sensors);
+  const std::vector<SensorScore>& after = comparison.after_sensors;
+  for (std::size_t i = 0; i < to.size(); ++i) to[i]["after"] = after.empty() ? json() : statsToJson(after[i].stats);
+  return to;
+}
+
 json splitToJson(const SensorSplit& split, const std::string& unit) {
   const auto figure = [&](double value) { return nullUnless(split.is_told, ifFinite(value)); };
   return {{"shared_" + unit, figure(split.shared)},
@@ -174,7 +182,7 @@ json toJson(const Comparison& comparison) {
           {"position_dependence", partToJson(comparison.position_dependence)},
           {"orientation_dependence", partToJson(comparison.orientation_dependence)},
           {"resampling", resamplingToJson(comparison.resampling)},
-          {"sensors", sensorsToJson(comparison.before_sensors)},
+          {"sensors", beforeAndAfterToJson(comparison)},
           {"split", comparison.split ? splitToJson(*comparison.split, "mm") : json(nullptr)},
           {"orientation_split",
            comparison.orientation_split ? splitToJson(*comparison.orientation_split, "deg") : json(nullptr)},

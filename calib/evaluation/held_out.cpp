@@ -82,9 +82,16 @@ void refit(Run& run, std::size_t i, std::size_t k, const Fold& fold, const corre
     run.why_not[i][k] = model.error().message + heldOutText(run.job, fold);
 }
 
+/// Of a job that leaves places out, so that all of its rows may be fitted.
+Result<FitsWithout> closedForm(const Run& run, const Candidate& candidate) {
+  if (!run.job.separate_sensors) return candidate.hold_out(run.all_data, run.inner());
+  return holdOutSensorsApart(candidate, run.job.nodes, run.job.metadata, run.all_alignment, run.scores.dimension,
+                             run.inner());
+}
+
 /// Scores a candidate fold by fold from its closed form; where there is none for this data after all, by refitting.
 void runClosedForm(Run& run, std::size_t i, ProgressMeter& meter, double share) {
-  const auto fits = run.job.candidates[i].hold_out(run.all_data, run.inner());
+  const auto fits = closedForm(run, run.job.candidates[i]);
   run.scores.candidates[i].closed_form = fits.has_value();
   if (fits) run.scores.candidates[i].own_variance = fits->own_variance;
   const Pose tracker_from_all = run.all_alignment.reference_from_tracker;

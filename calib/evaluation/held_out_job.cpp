@@ -43,7 +43,7 @@ Result<HeldOutJob> makeJob(const CalibrationTable& table, const ComparisonOption
   if (!candidates) return tl::unexpected(candidates.error());
   job.candidates = *std::move(candidates);
   for (Candidate& candidate : job.candidates)
-    if (!options.closed_form || options.separate_sensors) candidate.hold_out = nullptr;
+    if (!options.closed_form) candidate.hold_out = nullptr;
   job.separate_sensors = options.separate_sensors;
   const bool needs_refits = std::any_of(job.candidates.begin(), job.candidates.end(), [](const Candidate& candidate) {
     return candidate.is_tuned || candidate.is_costly;

@@ -211,6 +211,7 @@ void pickBest(Comparison& comparison) {
   if (const auto row = comparison.best_position_row) {
     const MethodScore& best = comparison.position[*row];
     comparison.best_position = best.method;
+    comparison.after_sensors = best.sensors;
     judgePosition(verdict, testGain(comparison.places, comparison.before_place_mm, best.place_errors, best.freedom));
     trueness.after_position_mm = excessError(best.stats.rms, comparison.floor_position_mm);
   }

@@ -25,6 +25,7 @@ Result<Written> exportCalibration(const Exporter& exporter, const calibration::C
     return fail(ErrorCode::kUnsupported, "Format " + exporter.id +
                                              " is written measured-to-true only; leave --direction out, "
                                              "or choose a field of ITK or VTK or a lattice");
+  if (exporter.check != nullptr) FT_TRY_VOID(exporter.check(corrector));
   if (!exporter.knows_pose && !corrector.sensorsApart().empty())
     return fail(ErrorCode::kUnsupported, "This calibration holds a correction for each of " +
                                              sensorsText(corrector.sensorsApart()) + ", and format " + exporter.id +

@@ -42,6 +42,8 @@ struct Exporter {
   bool is_folder = false;       ///< Writes a folder of files.
   Result<Written> (*write)(const ExportSubject&, const ExportOptions&, const std::filesystem::path&,
                            const RunControl&) = nullptr;
+  /// @error kUnsupported where such a file cannot hold this calibration, whatever the options; null = it holds any
+  Result<void> (*check)(const calibration::Corrector&) = nullptr;
   /// What stands in such a file, in metres and the frames of the calibration; null where the file is no lattice.
   Result<LatticeField> (*read)(const std::filesystem::path&) = nullptr;
 };

@@ -45,14 +45,16 @@ std::vector<std::array<int, 3>> powersOf(int dimension, int degree) {
   return powers;
 }
 
+Result<void> checkIsPolynomial(const calibration::Corrector& corrector) {
+  const std::string& method = corrector.choice().position_id;
+  if (method == "polynomial" && !corrector.isBaked()) return {};
+  return fail(ErrorCode::kUnsupported,
+              "Coefficients can be written of the method polynomial only; this calibration corrects by " + method +
+                  (corrector.isBaked() ? ", baked" : "") + ": fit polynomial, or choose a lattice");
+}
+
 Result<WrittenOut> writtenOut(const ExportSubject& subject) {
   const calibration::Corrector& corrector = subject.corrector();
-  const std::string& method = corrector.choice().position_id;
-  if (method != "polynomial" || corrector.isBaked())
-    return fail(ErrorCode::kUnsupported,
-                "Coefficients can be written of the method polynomial only; this calibration "
-                "corrects by " +
-                    method + (corrector.isBaked() ? ", baked" : "") + ": fit polynomial, or choose a lattice");
   return readJson<WrittenOut>(nlohmann::json::parse(corrector.toText()), "the calibration",
                               [&](const JsonReader& file) {
                                 const JsonReader parameters = file["position"]["parameters"];
@@ -186,7 +188,8 @@ Exporter polynomialJsonExporter() {
           .reads_it = "any program: powers, coefficients, centre and scale",
           .in_words = "metres; measured (tracker frame) to true (the calibration's frame)",
           .purpose = Purpose::kProgram,
-          .write = writeJson};
+          .write = writeJson,
+          .check = checkIsPolynomial};
 }
 
 Exporter polynomialCExporter() {
@@ -196,7 +199,8 @@ Exporter polynomialCExporter() {
           .reads_it = "any C or C++ program, Unity plug-ins, firmware: one C99 function without a library",
           .in_words = "metres; measured (tracker frame) to true (the calibration's frame)",
           .purpose = Purpose::kProgram,
-          .write = writeC};
+          .write = writeC,
+          .check = checkIsPolynomial};
 }
 
 }  // namespace fieldtrue::exporters

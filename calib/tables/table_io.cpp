@@ -155,12 +155,19 @@ NodeRole readRole(CsvReader& reader, const Column& column) {
   return NodeRole::kFit;
 }
 
+/// 0 where there is no such column.
+int sensorFrom(CsvReader& reader, Column column) {
+  const int sensor = reader.optionalInteger(column).value_or(0);
+  if (sensor < 0) reader.failAt(*column, std::to_string(sensor) + " is no sensor, it must be 0 or more");
+  return sensor;
+}
+
 Node readNode(CsvReader& reader, const NodeColumns& columns) {
   Node node;
   node.node = reader.integer(columns.required[0]);
   if (node.node < 0)
     reader.failAt(columns.required[0], std::to_string(node.node) + " is no place, it must be 0 or more");
-  node.sensor = reader.optionalInteger(columns.sensor).value_or(0);
+  node.sensor = sensorFrom(reader, columns.sensor);
   if (isGiven(reader, columns.index)) {
     const std::vector<std::size_t>& c = *columns.index;
     node.index = {reader.integer(c[0]), reader.integer(c[1]), reader.integer(c[2])};
@@ -264,7 +271,7 @@ SampleRow readSampleRow(CsvReader& reader, const SampleColumns& columns) {
                   std::to_string(row.node) + " is no place, it must be 0 or more, or -1 between places");
   }
   row.visit = reader.optionalInteger(columns.visit).value_or(0);
-  row.sample.sensor = reader.optionalInteger(columns.sensor).value_or(0);
+  row.sample.sensor = sensorFrom(reader, columns.sensor);
   row.sample.time_s = reader.number(columns.required[1]);
   if (columns.status) row.sample.status = reader.field(*columns.status);
   readSamplePose(reader, columns, row.sample);

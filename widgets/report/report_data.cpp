@@ -180,12 +180,12 @@ std::string truenessText(const evaluation::Comparison& comparison) {
 
 std::string sensorsText(const evaluation::Comparison& comparison) {
   std::string text;
-  const auto& best = comparison.best_position_row;
   for (std::size_t i = 0; i < comparison.before_sensors.size(); ++i) {
     const evaluation::SensorScore& before = comparison.before_sensors[i];
     text += (text.empty() ? "Sensor " : " Sensor ") + std::to_string(before.sensor) + ": " +
             errorFigure(before.stats.rms) + " mm before";
-    if (best) text += ", " + errorFigure(comparison.position[*best].sensors[i].stats.rms) + " mm with the best method";
+    if (!comparison.after_sensors.empty())
+      text += ", " + errorFigure(comparison.after_sensors[i].stats.rms) + " mm with the best method";
     text += ", at " + std::to_string(before.places.size()) + " places.";
   }
   return text;

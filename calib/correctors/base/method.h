@@ -56,7 +56,7 @@ enum class FitCost {
 
 /// Whether a fit chooses from the true positions what is not determined by them alone: settings, scales, members.
 enum class Tuning {
-  kBySettings,  ///< Where one of its auto-numbers is left to it.
+  kBySettings,  ///< Where one of its auto-numbers, among those that count, is left to it.
   kNever,
   kAlways
 };
@@ -92,6 +92,8 @@ struct CorrectionMethod {
   std::vector<AutomaticTry> tries = {};
   /// How the source is read where a sentence of it leaves more than one way; empty where none does.
   std::string reading = {};
+  /// Whether a fit with such settings looks at that auto-number at all; null = at every one.
+  bool (*uses)(const Settings&, const std::string& key) = nullptr;
   /// Settings that earlier versions stored in calibrations and that change nothing any more.
   std::vector<std::string> former_settings = {};
 
@@ -110,7 +112,7 @@ struct CorrectionMethod {
     return std::any_of(settings.begin(), settings.end(), [&](const Setting& setting) {
       const auto value = given.find(setting.key);
       return setting.type == SettingType::kAutoNumber && value != given.end() &&
-             std::holds_alternative<std::string>(value->second);
+             std::holds_alternative<std::string>(value->second) && (uses == nullptr || uses(given, setting.key));
     });
   }
 

@@ -194,6 +194,11 @@ Result<std::unique_ptr<PositionModel>> fitNeuralNetwork(const FitData& data, con
   return std::make_unique<NeuralNetworkPosition>(std::move(parts));
 }
 
+/// Back-propagation has no weight penalty.
+bool usesSetting(const Settings& settings, const std::string& key) {
+  return key != "weight_penalty" || choiceSetting(settings, "training") == "levenberg_marquardt";
+}
+
 std::vector<Setting> neuralNetworkSettings() {
   return {
       declare::integer("hidden", "First hidden layer", {2, 16}, 8,
@@ -251,7 +256,8 @@ PositionMethod neuralNetworkPosition() {
       .origin = MethodOrigin::kSurvey,
       .reading =
           "What the outputs are is not said: published runs give positions; here they give what a rigid motion leaves, "
-          "since a position given outright runs away from the sensor beyond the places."};
+          "since a position given outright runs away from the sensor beyond the places.",
+      .uses = usesSetting};
 }
 
 }  // namespace fieldtrue::correctors

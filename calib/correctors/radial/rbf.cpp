@@ -168,6 +168,11 @@ Result<std::unique_ptr<HoldOutFits<PositionModel>>> holdOutRbf(const FitData& da
   return std::make_unique<RbfHoldOut>(std::move(system), *std::move(solutions));
 }
 
+/// Cubic and thin plate have no shape that could be chosen.
+bool usesSetting(const Settings& settings, const std::string& key) {
+  return key != "shape_mm" || hasShape(*radialKernelFrom(choiceSetting(settings, "kernel")));
+}
+
 std::vector<Setting> rbfSettings() {
   return {
       declare::choice("kernel", "Kernel", {"multiquadric", "inverse_multiquadric", "cubic", "thin_plate"},
@@ -198,7 +203,8 @@ PositionMethod rbfPosition() {
           .hold_out = holdOutRbf,
           .keeps_scales = true,
           .origin = MethodOrigin::kLater,
-          .tries = {{"", simplicity::kSmoothing}, {"kernel=thin_plate", simplicity::kSmoothing}}};
+          .tries = {{"", simplicity::kSmoothing}, {"kernel=thin_plate", simplicity::kSmoothing}},
+          .uses = usesSetting};
 }
 
 }  // namespace fieldtrue::correctors

@@ -195,8 +195,9 @@ Result<Places> smoothFitPlaces(const FitData& data, const std::string& name) {
   FT_TRY_VOID(checkSpread(name, places.size(), data.dimension));
   const auto needed = static_cast<std::size_t>(data.dimension) + 3;
   if (places.size() < needed)
-    return fail(ErrorCode::kTooFewNodes,
-                name + " needs at least " + std::to_string(needed) + " places, got " + std::to_string(places.size()));
+    return fail(ErrorCode::kTooFewNodes, name + " needs at least 6 places" +
+                                             (data.dimension == 2 ? ", or 5 that lie in one plane, got " : ", got ") +
+                                             std::to_string(places.size()));
   return places;
 }
 

@@ -193,6 +193,35 @@ class ClosedFormTest : public QObject {
       QVERIFY(score.tuned_inside && score.validated == folds->validation && score.n_folds == 10);
   }
 
+  void whatHasNothingToChooseIsNotTuned_data() {
+    QTest::addColumn<QByteArray>("text");
+    QTest::addColumn<bool>("tunes");
+    // A cubic and a thin plate have no shape, back-propagation no weight penalty.
+    for (const char* text : {"rbf:kernel=cubic,smoothing=0", "rbf:kernel=thin_plate,smoothing=0.1",
+                             "rbf:shape_mm=300,smoothing=0", "neural_network:training=back_propagation"})
+      QTest::newRow(text) << QByteArray(text) << false;
+    for (const char* text : {"rbf:kernel=cubic", "rbf:smoothing=0", "rbf:shape_mm=300", "neural_network"})
+      QTest::newRow(text) << QByteArray(text) << true;
+  }
+  void whatHasNothingToChooseIsNotTuned() {
+    QFETCH(QByteArray, text);
+    QFETCH(bool, tunes);
+    const MethodText method = parseMethodText(text.toStdString()).value();
+    const correctors::PositionMethod& row = **correctors::findPositionMethod(method.id);
+    QCOMPARE(row.tunes(resolveSettings(method.id, row.settings, method.given).value()), tunes);
+    if (row.isCostly()) return;
+    ComparisonOptions options;
+    options.position_methods = {{"affine", {}}, method};
+    options.orientation_methods = {{"none", {}}};
+    options.with_surroundings = false;
+    const auto comparison = compareMethods(weightedTable(), options);
+    FT_VERIFY_OK(comparison);
+    QCOMPARE(toText(comparison->validation), std::string(tunes ? "kfold:10" : "loo"));
+    QVERIFY(comparison->position.back().tuned_inside);
+    QVERIFY(comparison->position.back().stats.rms < comparison->position.front().stats.rms);
+    QCOMPARE(comparison->best_position, std::string("rbf"));
+  }
+
   void aCostlyMethodIsHeldOutInTenFoldsAndThenNotBest() {
     int n_scored = 0;
     for (const correctors::PositionMethod& method : correctors::positionMethods()) {

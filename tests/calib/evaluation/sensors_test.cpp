@@ -8,6 +8,7 @@
 #include "calib/calibration/coincident_places.h"
 #include "calib/calibration/corrector.h"
 #include "calib/core/units.h"
+#include "calib/correctors/base/method_text.h"
 #include "calib/evaluation/comparison.h"
 #include "calib/evaluation/sensor_splits.h"
 #include "tests/support/matchers.h"
@@ -138,18 +139,47 @@ class SensorsTest : public QObject {
       const double both = std::hypot(sensors[0].place_errors[k], sensors[1].place_errors[k]) / std::sqrt(2.0);
       FT_VERIFY_MATCH(near(comparison.position.front().place_errors[k], both, 1e-12));
     }
-    QCOMPARE(toJson(comparison).at("sensors").size(), std::size_t{2});
+    const nlohmann::json told = toJson(comparison).at("sensors");
+    QCOMPARE(told.size(), std::size_t{2});
+    // Nothing distorts this field, so no correction is best.
+    QVERIFY(told.at(0).at("after").is_null());
+    QCOMPARE(told.at(1).at("rms").get<double>(), comparison.before_sensors[1].stats.rms);
+  }
+
+  void whatTheBestLeavesOfEachSensorIsTold_data() {
+    QTest::addColumn<double>("gain");
+    QTest::newRow("shared") << 0.0;
+    QTest::newRow("apart") << 0.02;
+  }
+  void whatTheBestLeavesOfEachSensorIsTold() {
+    QFETCH(double, gain);
+    const Comparison comparison =
+        compared(twoSensors({.smooth_m = 0.02, .gain = gain, .noise_2_m = 0.001}), "polynomial:degree=3");
+    QCOMPARE(isApart(comparison.split), gain > 0.0);
+    const nlohmann::json told = toJson(comparison).at("sensors");
+    // Every place has a row of either, so that their mean square is that of the best.
+    double square_mm2 = 0.0;
+    for (const nlohmann::json& sensor : told)
+      square_mm2 += 0.5 * std::pow(sensor.at("after").at("rms").get<double>(), 2);
+    const double best_mm = gain > 0.0 ? comparison.split->separate : comparison.position.front().stats.rms;
+    FT_VERIFY_MATCH(near(std::sqrt(square_mm2), best_mm, 1e-9));
+    QVERIFY(told.at(0).at("after").at("rms") < told.at(0).at("rms"));
   }
 
   void sensorsThatErrAlikeShare_data() {
-    QTest::addColumn<bool>("side_by_side");
-    QTest::newRow("side by side") << true;
-    QTest::newRow("in one place") << false;
+    QTest::addColumn<double>("apart_m");
+    QTest::addColumn<QByteArray>("method");
+    QTest::newRow("side by side") << 0.1 << QByteArray("polynomial:degree=3");
+    QTest::newRow("in one place") << 0.0 << QByteArray("polynomial:degree=3");
+    // A plane for each of two regions of one curved field errs a little less than one for both.
+    QTest::newRow("side by side, by a stiff method") << 0.08 << QByteArray("affine");
   }
   void sensorsThatErrAlikeShare() {
-    QFETCH(bool, side_by_side);
-    const Comparison comparison = compared(
-        twoSensors({.smooth_m = 0.02, .noise_2_m = 0.001, .side_by_side = side_by_side}), "polynomial:degree=3");
+    QFETCH(double, apart_m);
+    QFETCH(QByteArray, method);
+    const Comparison comparison =
+        compared(twoSensors({.smooth_m = 0.02, .noise_2_m = 0.001, .side_by_side = apart_m > 0.0, .apart_m = apart_m}),
+                 method.constData());
     QVERIFY(comparison.split.has_value());
     QVERIFY2(!comparison.split->is_better, comparison.split->text.c_str());
     QVERIFY(!comparison.verdict.text.empty());
@@ -165,14 +195,66 @@ class SensorsTest : public QObject {
     FT_VERIFY_MATCH(holdsAll(splits->position->text, {"(difference 0 to 0 mm; "}));
   }
 
+  void sensorsThatErrDifferentlyAreToldApart_data() {
+    QTest::addColumn<bool>("side_by_side");
+    QTest::newRow("side by side") << true;
+    QTest::newRow("in one place") << false;
+  }
   void sensorsThatErrDifferentlyAreToldApart() {
+    QFETCH(bool, side_by_side);
     // A gain of 2 % is up to 2 cm of the second's reading, and none of the first's.
     const Comparison comparison =
-        compared(twoSensors({.smooth_m = 0.02, .gain = 0.02, .noise_2_m = 0.001}), "polynomial:degree=3");
+        compared(twoSensors({.smooth_m = 0.02, .gain = 0.02, .noise_2_m = 0.001, .side_by_side = side_by_side}),
+                 "polynomial:degree=3");
     QVERIFY(comparison.split.has_value());
     QVERIFY2(comparison.split->is_better, comparison.split->text.c_str());
     QVERIFY(comparison.split->separate < 0.5 * comparison.split->shared);
-    FT_VERIFY_MATCH(holdsAll(comparison.split->text, {"err differently", "kfold:10"}));
+    // Only where both met the same field is it surely the sensors.
+    FT_VERIFY_MATCH(holdsAll(
+        comparison.split->text,
+        {side_by_side ? "by this method does not serve both sensors" : "The sensors err differently", "kfold:10"}));
+  }
+
+  void whatLeavesMoreIsNotBetter() {
+    // The first gains by a correction of its own what the second, of 40 mm an axis, loses in millimetres.
+    const Comparison comparison =
+        compared(twoSensors({.smooth_m = 0.01, .noise_1_m = 1e-4, .noise_2_m = 0.04}), "polynomial:degree=2");
+    QVERIFY(comparison.split.has_value());
+    QVERIFY(comparison.split->separate_less_shared_in_shares.high90 < 0.0);
+    QVERIFY(comparison.split->separate > comparison.split->shared);
+    QVERIFY2(!comparison.split->is_better, comparison.split->text.c_str());
+  }
+
+  void everythingIsByTheValidationAsked_data() {
+    QTest::addColumn<double>("gain");
+    QTest::newRow("apart") << 0.02;
+    QTest::newRow("shared") << 0.0;
+  }
+  void everythingIsByTheValidationAsked() {
+    QFETCH(double, gain);
+    const CalibrationTable table = twoSensors({.smooth_m = 0.02, .gain = gain, .noise_2_m = 0.001});
+    ComparisonOptions options;
+    options.position_methods = {{"affine", {}}, parseMethodText("polynomial:degree=2").value()};
+    options.orientation_methods = {{"none", {}}};
+    options.validation = Validation{ValidationKind::kLeaveOneOut, 0};
+    const auto comparison = compareMethods(table, options);
+    FT_VERIFY_OK(comparison);
+    const std::optional<SensorSplit>& split = comparison->split;
+    QCOMPARE(isApart(split), gain > 0.0);
+    FT_VERIFY_MATCH(holdsAll(split->text, {"loo"}));
+    const MethodScore& best = comparison->position[*comparison->best_position_row];
+    FT_VERIFY_MATCH(near(split->shared, best.stats.rms, 1e-9));
+    const double after = isApart(split) ? split->separate : best.stats.rms;
+    for (const MethodScore& score : comparison->position) QVERIFY(after <= score.stats.rms);
+    FT_VERIFY_MATCH(near(comparison->verdict.position.gain, 1.0 - after / comparison->before_position_mm.rms, 1e-9));
+    // Each sensor's own fits, made anew without every place.
+    options.position_methods = {parseMethodText(correctors::methodText(best.method, best.settings)).value()};
+    options.separate_sensors = true;
+    options.closed_form = false;
+    options.with_surroundings = false;
+    const auto refitted = compareMethods(table, options);
+    FT_VERIFY_OK(refitted);
+    FT_VERIFY_MATCH(near(split->separate, refitted->position.front().stats.rms, 1e-6));
   }
 
   /// 20 mm an axis of the first drown what a gain of 2 % makes of the second, unless each is measured by its own.
@@ -288,9 +370,10 @@ class SensorsTest : public QObject {
   }
 
   void nothingWorseThanNothingIsBest() {
-    // The second scatters so much that a correction of its own spoils the first least, and still more than none.
+    // What passes through the second's 40 mm spoils the first that stands beside it, and either way leaves more than
+    // none.
     ComparisonOptions options;
-    options.position_methods = {{"rigid", {}}, parseMethodText("polynomial:degree=2").value()};
+    options.position_methods = {{"rigid", {}}, parseMethodText("rbf:kernel=cubic,smoothing=0").value()};
     options.orientation_methods = {{"none", {}}};
     options.validation = Validation{ValidationKind::kFolds, 10};
     const auto comparison =
@@ -301,6 +384,24 @@ class SensorsTest : public QObject {
     QVERIFY(!comparison->best_position_row && !comparison->verdict.apply_position);
     FT_VERIFY_MATCH(holdsAll(split->text, {"No correction of position helps"}));
     FT_VERIFY_MATCH(holdsAll(comparison->verdict.text, {"no method does better"}));
+  }
+
+  void aTableWithoutRowsToFitIsTold_data() {
+    QTest::addColumn<bool>("one_is_seen");
+    QTest::addColumn<QByteArray>("says");
+    QTest::newRow("skipped") << false << QByteArray("Every row of the table is skipped");
+    QTest::newRow("validation") << true << QByteArray("for validation or skipped");
+  }
+  void aTableWithoutRowsToFitIsTold() {
+    QFETCH(bool, one_is_seen);
+    QFETCH(QByteArray, says);
+    CalibrationTable table = twoSensors({});
+    for (Node& node : table.nodes) node.role = NodeRole::kSkipped;
+    if (one_is_seen) table.nodes.front().role = NodeRole::kValidation;
+    const auto fitted = fitByEvidence(table, {}, calibration::AlignMode::kRigid, {});
+    QVERIFY(!fitted);
+    QCOMPARE(fitted.error().code, ErrorCode::kTooFewNodes);
+    FT_VERIFY_MATCH(holdsAll(fitted.error().message, {says.constData()}));
   }
 
   void aSensorOfFewPlacesIsTold() {
@@ -369,7 +470,7 @@ class SensorsTest : public QObject {
     const std::vector<std::string>& notes = fitted->report().notes;
     QVERIFY(notes.size() >= 2);
     const std::string& of_position = notes[notes.size() - 2];
-    FT_VERIFY_MATCH(holdsAll(of_position, {gain > 0.0 ? "err differently in position" : "share one"}));
+    FT_VERIFY_MATCH(holdsAll(of_position, {gain > 0.0 ? "does not serve both" : "share one"}));
     if (gain == 0.0) {
       auto shared = calibration::Corrector::fit(table.nodes, table.metadata, choice, calibration::AlignMode::kRigid);
       QCOMPARE(shared->withNote(of_position).withNote(notes.back()).toText(), fitted->toText());

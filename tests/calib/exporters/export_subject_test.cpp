@@ -3,7 +3,9 @@
 #include <QTest>
 
 #include "calib/calibration/alignment.h"
+#include "calib/exporters/export_calibration.h"
 #include "calib/exporters/exporter.h"
+#include "calib/exporters/registry.h"
 #include "tests/calib/correctors/cell_fixtures.h"
 #include "tests/calib/correctors/coil_readings.h"
 #include "tests/support/matchers.h"
@@ -90,6 +92,21 @@ class ExportSubjectTest : public QObject {
     Written written;
     subject.tellOfTurns(written);
     QVERIFY(written.notes.empty());
+  }
+
+  /// Before an orientation is asked for that would not help.
+  void whatCannotBeWrittenIsRefusedAtOnce() {
+    const CalibrationTable table = turnedTable();
+    const auto corrector = calibration::Corrector::fit(
+        table.nodes, table.metadata, calibration::parseCorrectorChoice("gaussian_process", "none").value(),
+        calibration::AlignMode::kNone);
+    FT_VERIFY_OK(corrector);
+    QVERIFY(corrector->takesOrientation());
+    for (const char* id : {"polynomial_json", "polynomial_c"}) {
+      const auto written = exportCalibration(*findExporter(id).value(), *corrector, {}, "never_written", RunControl());
+      QVERIFY(!written);
+      FT_VERIFY_MATCH(holdsAll(written.error().message, {"polynomial only", "gaussian_process"}));
+    }
   }
 };
 

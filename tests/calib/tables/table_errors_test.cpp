@@ -57,6 +57,8 @@ class TableErrorsTest : public QObject {
     QTest::newRow("overflow") << QByteArray("z_m") << QByteArray("1e999")
                               << QByteArray("'1e999' is not a finite number");
     QTest::newRow("text") << QByteArray("z_m") << QByteArray("abc") << QByteArray("'abc' is not a finite number");
+    QTest::newRow("sensor below 0") << QByteArray("sensor") << QByteArray("-1")
+                                    << QByteArray("-1 is no sensor, it must be 0 or more");
     QTest::newRow("unit") << QByteArray("z_m") << QByteArray("6 m") << QByteArray("'6 m' is not a finite number");
     QTest::newRow("signs") << QByteArray("z_m") << QByteArray("+-6") << QByteArray("'+-6' is not a finite number");
     QTest::newRow("blank") << QByteArray("x_true_m") << QByteArray("")
