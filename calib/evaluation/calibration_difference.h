@@ -50,7 +50,8 @@ struct CalibrationDifference {
   std::optional<double> angle_max_deg;
   /// The turn that all orientations share, which is taken out of both: the mounting's and the rig's.
   std::optional<double> angle_shared_deg;
-  std::vector<ChangeAt> points;  ///< Each as the sensor is held where the change there is largest.
+  /// Each as the sensor is held where the change there is largest; the last is the worst of the region.
+  std::vector<ChangeAt> points;
 
   PlaceErrors first_own;  ///< Each at places of its own that its fits did not see.
   PlaceErrors second_own;

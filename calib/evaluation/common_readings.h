@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -27,6 +28,8 @@ struct CommonReadings {
   std::vector<Eigen::Quaterniond> held;
   bool is_held_seen_by_both = false;  ///< Both were fitted on these orientations; else either one was.
 
+  double step_m = 0.0;  ///< Between neighbours of a lattice of places; 0 where they are of none.
+
   /// Place by place.
   std::vector<Reading> all() const;
   std::size_t readingsAPlace() const { return held.empty() ? 1 : held.size(); }
@@ -35,5 +38,13 @@ struct CommonReadings {
 /// Places spread evenly over what both cover; places of the second where no lattice fits in. Where either correction
 /// takes orientation, with those that both were fitted on, or that either was where they share none.
 CommonReadings commonReadings(const calibration::Corrector& first, const calibration::Corrector& second);
+
+/// The reading that both cover at which a figure is largest, to a small part of a lattice's step: climbed to from the
+/// worst of the common readings and of the places that either was fitted on, since edges lie between those of a
+/// lattice.
+/// @param on_lattice the figure at each of common.all()
+Reading worstReading(const calibration::Corrector& first, const calibration::Corrector& second,
+                     const CommonReadings& common, const std::vector<double>& on_lattice,
+                     const std::function<double(const Reading&)>& figure);
 
 }  // namespace fieldtrue::evaluation

@@ -13,6 +13,13 @@ namespace {
 
 using calibration::Corrector;
 
+/// Between two corrected positions, rigid motion included.
+double wholeChange_mm(const Eigen::Vector3d& first_m, const Eigen::Vector3d& second_m) {
+  return kMmPerM * (second_m - first_m).norm();
+}
+
+double size_mm(const ChangeAt& change) { return kMmPerM * change.change_m.norm(); }
+
 /// The change at a reading once the rigid motion is taken out of it.
 ChangeAt changeAt(const Reading& reading, const Eigen::Vector3d& first_m, const Eigen::Vector3d& second_m,
                   const Pose& second_from_first) {
@@ -66,13 +73,16 @@ void measureField(const Corrector& first, const Corrector& second, const CommonR
   for (const Reading& reading : readings) {
     by_first_m.push_back(correctedBy(first, reading).position_m);
     by_second_m.push_back(correctedBy(second, reading).position_m);
-    whole_mm.push_back(kMmPerM * (by_second_m.back() - by_first_m.back()).norm());
+    whole_mm.push_back(wholeChange_mm(by_first_m.back(), by_second_m.back()));
   }
   to.n_points = common.points_m.size();
   to.n_orientations = common.held.size();
   to.is_held_seen_by_both = common.is_held_seen_by_both;
   to.whole_rms_mm = rootMeanSquare(whole_mm);
-  to.whole_max_mm = *std::max_element(whole_mm.begin(), whole_mm.end());
+  const auto whole_at = [&](const Reading& reading) {
+    return wholeChange_mm(correctedBy(first, reading).position_m, correctedBy(second, reading).position_m);
+  };
+  to.whole_max_mm = whole_at(worstReading(first, second, common, whole_mm, whole_at));
   // Fewer points, or points on a line, tell no rotation: then nothing is taken out.
   const Pose second_from_first = fitRigid(by_first_m, by_second_m).value_or(Pose{});
   const Eigen::Vector3d middle_m = pointSpread(by_first_m).center_m;
@@ -81,17 +91,22 @@ void measureField(const Corrector& first, const Corrector& second, const CommonR
   std::vector<double> change_mm;
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const ChangeAt change = changeAt(readings[i], by_first_m[i], by_second_m[i], second_from_first);
-    change_mm.push_back(kMmPerM * change.change_m.norm());
+    change_mm.push_back(size_mm(change));
     if (i % common.readingsAPlace() == 0)
       to.points.push_back(change);
-    else if (change.change_m.norm() > to.points.back().change_m.norm())
+    else if (change_mm.back() > size_mm(to.points.back()))
       to.points.back() = change;
   }
-  const auto worst = std::max_element(change_mm.begin(), change_mm.end());
+  const auto change_at = [&](const Reading& reading) {
+    return changeAt(reading, correctedBy(first, reading).position_m, correctedBy(second, reading).position_m,
+                    second_from_first);
+  };
+  to.points.push_back(change_at(worstReading(first, second, common, change_mm,
+                                             [&](const Reading& reading) { return size_mm(change_at(reading)); })));
+  to.worst = to.points.size() - 1;
+  to.max_mm = size_mm(to.points.back());
   to.rms_mm = rootMeanSquare(change_mm);
   to.p95_mm = quantile(change_mm, 0.95);
-  to.max_mm = *worst;
-  to.worst = static_cast<std::size_t>(worst - change_mm.begin()) / common.readingsAPlace();
   to.expected_mm = expectedChange_mm(first, second, readings);
 }
 
@@ -110,7 +125,11 @@ void measureOrientation(const Corrector& first, const Corrector& second, const C
     shared_deg.push_back(kDegPerRad * angleBetween_rad(by_first[i], shared(by_first[i])));
   }
   to.angle_rms_deg = rootMeanSquare(angles_deg);
-  to.angle_max_deg = *std::max_element(angles_deg.begin(), angles_deg.end());
+  const auto angle_at_deg = [&](const Reading& reading) {
+    return kDegPerRad *
+           angleBetween_rad(correctedBy(second, reading).orientation, shared(correctedBy(first, reading).orientation));
+  };
+  to.angle_max_deg = angle_at_deg(worstReading(first, second, common, angles_deg, angle_at_deg));
   to.angle_shared_deg = rootMeanSquare(shared_deg);
 }
 

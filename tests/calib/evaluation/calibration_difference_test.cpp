@@ -84,14 +84,21 @@ class CalibrationDifferenceTest : public QObject {
  private slots:
   void aStretchIsWhatItIs() {
     // The second corrects by 1 % of the distance from the origin. Over a cube of side 1 m the mean square distance is
-    // 3/12 m^2, so the RMS change is 5 mm; its farthest point is a corner, sqrt(3)/2 m away: 8.66 mm.
+    // 3/12 m^2, so the RMS change is 5 mm; its farthest point is a corner, sqrt(3)/2 m away, 8.66 mm, and a margin
+    // more.
     CalibrationTable stretched = exactTable();
     for (Node& node : stretched.nodes) node.reference_from_sensor.position_m *= 1.01;
     const auto difference = compareCalibrations(fitted(exactTable(), "none"), fitted(stretched, "polynomial:degree=1"));
     FT_VERIFY_OK(difference);
     QVERIFY(difference->n_points > 1000);
     FT_VERIFY_MATCH(near(difference->rms_mm, 5.0, 0.15));
-    QVERIFY(difference->max_mm > 7.5 && difference->max_mm <= 8.6602541);
+    const calibration::Corrector unchanged = fitted(exactTable(), "none");
+    double corner_m = 0.5;
+    while (unchanged.covers(Eigen::Vector3d::Constant(corner_m + 1e-4))) corner_m += 1e-4;
+    QVERIFY(corner_m < 0.6);
+    FT_VERIFY_MATCH(near(difference->max_mm, 10.0 * std::sqrt(3.0) * corner_m, 0.05));
+    FT_VERIFY_MATCH(near(difference->whole_max_mm, difference->max_mm, 0.05));
+    QCOMPARE(difference->worst, difference->n_points);
     FT_VERIFY_MATCH(near(difference->moved_mm, 0.0, 0.01));
     FT_VERIFY_MATCH(near(difference->turned_deg, 0.0, 1e-6));
     const ChangeAt& worst = difference->points[difference->worst];
@@ -134,7 +141,7 @@ class CalibrationDifferenceTest : public QObject {
     QCOMPARE(difference->n_orientations, std::size_t(6));
     FT_VERIFY_MATCH(near(difference->rms_mm, 10.0, 0.5));
     FT_VERIFY_MATCH(near(difference->max_mm, 10.0, 1.0));
-    QCOMPARE(difference->points.size(), difference->n_points);
+    QCOMPARE(difference->points.size(), difference->n_points + 1);
     const ChangeAt& worst = difference->points[difference->worst];
     FT_VERIFY_MATCH(near((worst.change_m - 0.01 * (*worst.held * Eigen::Vector3d::UnitX())).norm(), 0.0, 0.001));
     FT_VERIFY_MATCH(holdsAll(difference->text, {"in 6 orientations that both were fitted on", "held as (w "}));
