@@ -10,13 +10,13 @@
 
 #include "calib/core/json_reader.h"
 #include "calib/core/statistics.h"
-#include "calib/core/units.h"
 #include "calib/correctors/base/method_text.h"
 #include "calib/evaluation/base/figures.h"
 #include "calib/evaluation/base/progress_meter.h"
+#include "calib/evaluation/common_readings.h"
 #include "calib/evaluation/comparison.h"
+#include "calib/evaluation/correction_change.h"
 #include "calib/evaluation/judged_calibration.h"
-#include "calib/evaluation/region/region_lattice.h"
 #include "calib/geometry/geometry.h"
 #include "calib/tables/table_sensors.h"
 
@@ -26,91 +26,12 @@ namespace {
 
 using calibration::Corrector;
 
-constexpr double kMmPerM = 1000.0;
-constexpr std::size_t kMostPoints = 4000;
 constexpr std::size_t kFewestPlaces = 6;
 /// Times the largest error of the first at places of its own: farther off, the sensor slipped or the field changed.
 constexpr double kFar = 3.0;
 constexpr double kRare = 0.01;
 
-std::vector<Eigen::Vector3d> trackedPlaces(const Corrector& corrector) {
-  std::vector<Eigen::Vector3d> places_m;
-  for (const Node& node : corrector.table().nodes) places_m.push_back(node.tracker_from_sensor.position_m);
-  return places_m;
-}
-
-bool coversBoth(const Corrector& first, const Corrector& second, const Eigen::Vector3d& p_tracked_m) {
-  return first.covers(p_tracked_m) && second.covers(p_tracked_m);
-}
-
-/// Points spread evenly over what both cover, tracker frame; places of the second where no lattice fits in.
-std::vector<Eigen::Vector3d> commonPoints(const Corrector& first, const Corrector& second) {
-  const std::vector<Eigen::Vector3d> places_m = trackedPlaces(first);
-  const int dimension = std::clamp(pointSpread(places_m).dimension, 0, 3);
-  std::vector<Eigen::Vector3d> points_m = latticeInside(places_m, dimension, first.region(), kMostPoints).points_m;
-  const auto is_outside = [&](const Eigen::Vector3d& p_m) { return !coversBoth(first, second, p_m); };
-  std::erase_if(points_m, is_outside);
-  if (!points_m.empty()) return points_m;
-  points_m = trackedPlaces(second);
-  std::erase_if(points_m, is_outside);
-  return points_m;
-}
-
 double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
-
-/// The field's change over the common region, and the rigid motion that was taken out of it.
-void measureField(const Corrector& first, const Corrector& second, const std::vector<Eigen::Vector3d>& points_m,
-                  CalibrationDifference& to) {
-  std::vector<Eigen::Vector3d> by_first_m, by_second_m;
-  std::vector<double> whole_mm;
-  for (const Eigen::Vector3d& p_m : points_m) {
-    by_first_m.push_back(first.correctPosition_m(p_m));
-    by_second_m.push_back(second.correctPosition_m(p_m));
-    whole_mm.push_back(kMmPerM * (by_second_m.back() - by_first_m.back()).norm());
-  }
-  to.n_points = points_m.size();
-  to.whole_rms_mm = rootMeanSquare(whole_mm);
-  to.whole_max_mm = largest(whole_mm);
-  // Fewer points, or points on a line, tell no rotation: then nothing is taken out.
-  const Pose second_from_first = fitRigid(by_first_m, by_second_m).value_or(Pose{});
-  const Eigen::Vector3d middle_m = pointSpread(by_first_m).center_m;
-  to.moved_mm = kMmPerM * (second_from_first * middle_m - middle_m).norm();
-  to.turned_deg = kDegPerRad * angleBetween_rad(second_from_first.orientation, Eigen::Quaterniond::Identity());
-  std::vector<double> change_mm;
-  double expected_mm2 = 0.0;
-  bool is_expected_known = true;
-  for (std::size_t i = 0; i < points_m.size(); ++i) {
-    const Eigen::Vector3d change_m =
-        second_from_first.orientation.conjugate() * (by_second_m[i] - second_from_first * by_first_m[i]);
-    to.points.push_back({by_first_m[i], change_m});
-    change_mm.push_back(kMmPerM * change_m.norm());
-    const auto first_m = first.uncertainty_m(points_m[i]), second_m = second.uncertainty_m(points_m[i]);
-    is_expected_known = is_expected_known && first_m && second_m;
-    if (is_expected_known) expected_mm2 += kMmPerM * kMmPerM * (*first_m * *first_m + *second_m * *second_m);
-  }
-  to.rms_mm = rootMeanSquare(change_mm);
-  to.p95_mm = quantile(change_mm, 0.95);
-  to.max_mm = largest(change_mm);
-  to.worst = static_cast<std::size_t>(std::max_element(change_mm.begin(), change_mm.end()) - change_mm.begin());
-  if (is_expected_known) to.expected_mm = std::sqrt(expected_mm2 / static_cast<double>(points_m.size()));
-}
-
-/// What is left between corrected orientations once the rotation that both share at all points is taken out.
-void measureOrientation(const Corrector& first, const Corrector& second, const std::vector<Eigen::Vector3d>& points_m,
-                        CalibrationDifference& to) {
-  if (first.choice().orientation_id == "none" && second.choice().orientation_id == "none") return;
-  std::vector<Eigen::Quaterniond> turns;
-  for (const Eigen::Vector3d& p_m : points_m) {
-    const Pose tracked{p_m, Eigen::Quaterniond::Identity()};
-    turns.push_back(second.correct(tracked).orientation * first.correct(tracked).orientation.conjugate());
-  }
-  const Eigen::Quaterniond shared = meanRotation(turns);
-  std::vector<double> angles_deg;
-  for (const Eigen::Quaterniond& turn : turns) angles_deg.push_back(kDegPerRad * angleBetween_rad(turn, shared));
-  to.angle_rms_deg = rootMeanSquare(angles_deg);
-  to.angle_max_deg = largest(angles_deg);
-  to.angle_shared_deg = kDegPerRad * angleBetween_rad(shared, Eigen::Quaterniond::Identity());
-}
 
 PlaceErrors placeErrors(std::vector<double> errors_mm, const FitFreedom& freedom) {
   PlaceErrors errors;
@@ -248,10 +169,23 @@ std::string beyond(const CalibrationDifference& difference) {
          (difference.n_far > 0 ? "; " + std::to_string(difference.n_far) + " more than three times as bad" : "");
 }
 
+/// " in 12 orientations that both were fitted on"; empty where neither correction takes any.
+std::string inOrientations(const CalibrationDifference& difference) {
+  if (difference.n_orientations == 0) return {};
+  const bool is_one = difference.n_orientations == 1;
+  return " in " + countText(difference.n_orientations, "orientation", "orientations") + " that " +
+         (difference.is_held_seen_by_both ? "both were"
+          : is_one                        ? "one of them was"
+                                          : "either was") +
+         " fitted on";
+}
+
 std::string sentences(const CalibrationDifference& difference) {
+  const ChangeAt& worst = difference.points[difference.worst];
   const std::string field = " The corrections differ by " + errorText(difference.rms_mm) +
-                            " mm RMS over the common region, most, " + errorText(difference.max_mm) + " mm, at " +
-                            pointText(difference.points[difference.worst].reference_m) + ".";
+                            " mm RMS over the common region" + inOrientations(difference) + ", most, " +
+                            errorText(difference.max_mm) + " mm, at " + pointText(worst.reference_m) +
+                            (worst.held ? " with the sensor held as " + turnText(*worst.held) : "") + ".";
   const std::string other =
       difference.setup_matches == SetupMatch::kNo
           ? " They are of different set-ups: " + differenceText(difference.first_setup, difference.second_setup) + "."
@@ -301,6 +235,11 @@ nlohmann::json nullUnlessTold(const std::string& text) {
   return text.empty() ? nlohmann::json(nullptr) : nlohmann::json(text);
 }
 
+nlohmann::json orientationsOf(const CalibrationDifference& difference) {
+  if (difference.n_orientations == 0) return nullptr;
+  return difference.is_held_seen_by_both ? "both" : "either";
+}
+
 nlohmann::json toJson(const PlaceErrors& errors) {
   if (errors.mm.empty()) return nullptr;
   return {{"places", errors.mm.size()},
@@ -337,8 +276,8 @@ Result<CalibrationDifference> compareCalibrations(const Corrector& first, const 
       return fail(ErrorCode::kUnsupported, "A calibration holds a correction for each of " +
                                                sensorsText(one->sensorsApart()) +
                                                ": compare one sensor at a time, with --sensor N");
-  const std::vector<Eigen::Vector3d> points_m = commonPoints(first, second);
-  if (points_m.empty())
+  const CommonReadings common = commonReadings(first, second);
+  if (common.points_m.empty())
     return fail(ErrorCode::kUnsupported,
                 "The two calibrations cover no reading in common: they are of different trackers, or of different "
                 "places before the transmitter");
@@ -346,8 +285,8 @@ Result<CalibrationDifference> compareCalibrations(const Corrector& first, const 
   difference.first_setup = first.setup();
   difference.second_setup = second.setup();
   difference.setup_matches = match(first.setup(), second.setup());
-  measureField(first, second, points_m, difference);
-  measureOrientation(first, second, points_m, difference);
+  measureField(first, second, common, difference);
+  measureOrientation(first, second, common, difference);
   RunControl half = control;
   half.progress = [&](double fraction) { control.progress(0.5 * fraction); };
   const Result<Comparison> of_first = judgeCalibration(first, half);
@@ -376,6 +315,8 @@ nlohmann::json toJson(const CalibrationDifference& difference) {
       {"setup_matches", fieldtrue::nameOf(difference.setup_matches)},
       {"setup_differences", setupDifferencesToJson(difference.first_setup, difference.second_setup)},
       {"common_points", difference.n_points},
+      {"orientations", difference.n_orientations},
+      {"orientations_of", orientationsOf(difference)},
       {"whole", {{"rms_mm", difference.whole_rms_mm}, {"max_mm", difference.whole_max_mm}}},
       {"rigid", {{"moved_mm", difference.moved_mm}, {"turned_deg", difference.turned_deg}}},
       {"field",
@@ -383,6 +324,7 @@ nlohmann::json toJson(const CalibrationDifference& difference) {
         {"p95_mm", difference.p95_mm},
         {"max_mm", difference.max_mm},
         {"max_at_m", jsonOf(worst.reference_m)},
+        {"max_at_wxyz", worst.held ? jsonOf(*worst.held) : nlohmann::json(nullptr)},
         {"max_change_mm", jsonOf(Eigen::Vector3d(kMmPerM * worst.change_m))},
         {"expected_mm", orNull(difference.expected_mm)}}},
       {"orientation",

@@ -17,6 +17,7 @@ namespace fieldtrue::evaluation {
 struct ChangeAt {
   Eigen::Vector3d reference_m = Eigen::Vector3d::Zero();  ///< What the first makes of it, its reference frame.
   Eigen::Vector3d change_m = Eigen::Vector3d::Zero();     ///< The second's less the first's, rigid motion taken out.
+  std::optional<Eigen::Quaterniond> held;  ///< tracker_from_sensor, where either correction takes orientation.
 };
 
 /// Errors of a calibration at places, with the 90 % interval of their RMS.
@@ -29,11 +30,14 @@ struct PlaceErrors {
 enum class DifferenceVerdict { kChanged, kNotShown, kCannotTell };
 
 /// What changed between two calibrations of one set-up. Over the common region: points spread evenly over what both
-/// cover. A rig or transmitter that was put down elsewhere moves every corrected position alike; this rigid motion is
-/// told apart, and with it goes what the field's own change has of one.
+/// cover, where either correction takes orientation with the sensor held in several at each. A rig or transmitter that
+/// was put down elsewhere moves every corrected position alike; this rigid motion is told apart, and with it goes what
+/// the field's own change has of one.
 struct CalibrationDifference {
   std::size_t n_points = 0;
-  double whole_rms_mm = 0.0;  ///< Rigid motion included.
+  std::size_t n_orientations = 0;     ///< At each of the points; 0 where neither correction takes orientation.
+  bool is_held_seen_by_both = false;  ///< Both were fitted on these orientations; else either one was.
+  double whole_rms_mm = 0.0;          ///< Rigid motion included.
   double whole_max_mm = 0.0;
   double moved_mm = 0.0;  ///< Rigid motion at the middle of the common region.
   double turned_deg = 0.0;
@@ -46,6 +50,7 @@ struct CalibrationDifference {
   std::optional<double> angle_max_deg;
   /// The turn that all orientations share, which is taken out of both: the mounting's and the rig's.
   std::optional<double> angle_shared_deg;
+  /// Each as the sensor is held where the change there is largest; the last is the worst of the region.
   std::vector<ChangeAt> points;
 
   PlaceErrors first_own;  ///< Each at places of its own that its fits did not see.

@@ -194,6 +194,9 @@ Result<Comparison> compareMethods(const CalibrationTable& table, const Compariso
     FT_TRY_VOID(addSplits(comparison, table, options, partOf(control, surroundings_end, 1.0)));
     control.progress(1.0);
   }
+  // Whichever correction the sensors get, it stands on the same places.
+  if (comparison.verdict.is_folding) comparison.verdict.apply_position = comparison.verdict.position.apply = false;
+  noteFloors(comparison);
   writeVerdictText(comparison);
   return comparison;
 }

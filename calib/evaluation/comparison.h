@@ -77,6 +77,7 @@ struct MethodScore {
   Validation validated;  ///< What it was scored with; not the comparison's for a costly method under loo.
   FitFreedom freedom;
   bool tuned_inside = true;            ///< Its fits chose nothing from the places they were scored on.
+  bool folds_back = false;             ///< Another is as good and does not: never called best.
   int n_folds = 0;                     ///< Fits that were scored; fewer than asked for a costly method.
   bool closed_form = false;            ///< Held out by downdating one fit rather than by fitting anew.
   double in_sample_rms = 0;            ///< On the rows it was fitted to, all at once. Not a verdict.
@@ -131,6 +132,7 @@ struct Verdict {
   bool apply_position = false;
   bool apply_orientation = false;
   bool is_inside_out = false;  ///< Much of the volume is: axes or places of the readings are wrong. Nothing applies.
+  bool is_folding = false;     ///< The best correction alone folds back over much of the volume: it is not applied.
   std::string mirrored;        ///< Where some sensors' readings are mirror images of their places, who and why.
   double gain_low90 = 0;       ///< Of the best position method: 1 - RMS after / RMS before, over the same places.
   double gain_high90 = 0;

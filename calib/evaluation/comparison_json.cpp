@@ -100,6 +100,7 @@ json verdictToJson(const Verdict& verdict) {
   return {{"apply_position", verdict.apply_position},
           {"apply_orientation", verdict.apply_orientation},
           {"inside_out", verdict.is_inside_out},
+          {"folding", verdict.is_folding},
           {"mirrored", nullUnless(!verdict.mirrored.empty(), verdict.mirrored)},
           {"gain_low90", ifFinite(verdict.gain_low90)},
           {"gain_high90", ifFinite(verdict.gain_high90)},

@@ -1,5 +1,8 @@
 #include "calib/evaluation/surroundings.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "calib/calibration/alignment.h"
 #include "calib/calibration/coincident_places.h"
 #include "calib/calibration/corrector.h"
@@ -22,11 +25,11 @@ Result<void> unlessStopped(const RunControl& control, double done) {
   return {};
 }
 
-/// The best position method fitted to all rows it may see; none where that fails.
-Result<std::optional<FoldBack>> foldBack(const Comparison& comparison, const HeldOutJob& job,
-                                         const RunControl& control) {
+/// A position method fitted to all rows it may see, no correction where none is told; none where that fails.
+Result<std::optional<FoldBack>> foldBack(std::optional<std::size_t> row, const Comparison& comparison,
+                                         const HeldOutJob& job, const RunControl& control) {
   calibration::CorrectorChoice choice;
-  if (const auto row = comparison.best_position_row) {
+  if (row) {
     choice.position_id = comparison.position[*row].method;
     choice.position_settings = comparison.position[*row].settings;
   }
@@ -34,6 +37,47 @@ Result<std::optional<FoldBack>> foldBack(const Comparison& comparison, const Hel
   if (!corrector && corrector.error().code == ErrorCode::kCancelled) return tl::unexpected(corrector.error());
   if (!corrector) return std::optional<FoldBack>();
   return std::optional(foldBackOf(*corrector));
+}
+
+/// Methods that err as little as the best, as far as these places tell, the better ones first.
+std::vector<std::size_t> asGoodAsBest(const Comparison& comparison) {
+  const std::vector<MethodScore>& scores = comparison.position;
+  const double most_mm = (1.0 + kNeededGain) * scores[*comparison.best_position_row].stats.rms;
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < scores.size(); ++row)
+    if (row != *comparison.best_position_row && !scores[row].skipped && isRanked(scores[row], comparison) &&
+        scores[row].stats.rms <= most_mm && scores[row].rms_to_best_low90 <= 0.0)
+      rows.push_back(row);
+  std::stable_sort(rows.begin(), rows.end(),
+                   [&](std::size_t a, std::size_t b) { return scores[a].stats.rms < scores[b].stats.rms; });
+  return rows;
+}
+
+/// Asks whether the best correction folds back; where it does so by itself and another that is as good does not, that
+/// one is the best.
+Result<void> judgeFolds(Comparison& comparison, const HeldOutJob& job, const RunControl& control) {
+  FT_TRY(comparison.fold_back, foldBack(comparison.best_position_row, comparison, job, control));
+  if (!comparison.best_position_row || !comparison.fold_back || !foldsByItself(*comparison.fold_back)) return {};
+  std::vector<std::size_t> folding = {*comparison.best_position_row};
+  for (const std::size_t row : asGoodAsBest(comparison)) {
+    FT_TRY(auto fold_back, foldBack(row, comparison, job, control));
+    if (!fold_back) continue;
+    if (foldsByItself(*fold_back)) {
+      folding.push_back(row);
+      continue;
+    }
+    for (const std::size_t one : folding) {
+      MethodScore& score = comparison.position[one];
+      score.folds_back = true;
+      score.notes.push_back(
+          "Folds back between the places: different readings go to one place there. Another method errs as little and "
+          "does not.");
+    }
+    comparison.fold_back = std::move(fold_back);
+    pickBest(comparison);
+    break;
+  }
+  return {};
 }
 
 /// What each way to bring the measured errors to a grid costs by itself.
@@ -86,9 +130,7 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   quiet.progress = [](double) {};
   comparison.coverage = coverageOf(withPlacesJoined(table));
   if (auto going = unlessStopped(control, 0.1); !going) return going;
-  auto fold_back = foldBack(comparison, job, quiet);
-  if (!fold_back) return tl::unexpected(fold_back.error());
-  comparison.fold_back = *std::move(fold_back);
+  FT_TRY_VOID(judgeFolds(comparison, job, quiet));
   refuseInsideOut(comparison, job.nodes);
   judgePlaces(comparison);
   if (auto going = unlessStopped(control, 0.4); !going) return going;
@@ -102,7 +144,8 @@ Result<void> addSurroundings(Comparison& comparison, const CalibrationTable& tab
   if (auto going = unlessStopped(control, 0.8); !going) return going;
   FT_TRY(const auto with_half_mm, comparison.verdict.apply_position ? rmsWithHalf_mm(comparison, job, quiet)
                                                                     : Result<std::optional<double>>(std::nullopt));
-  if (!comparison.verdict.is_inside_out) comparison.verdict.limited_by = limitedBy(comparison, job, with_half_mm);
+  if (!comparison.verdict.is_inside_out && !comparison.verdict.is_folding)
+    comparison.verdict.limited_by = limitedBy(comparison, job, with_half_mm);
   return unlessStopped(control, 1.0);
 }
 

@@ -23,7 +23,9 @@ std::optional<std::size_t> bestRow(const std::vector<MethodScore>& scores, doubl
   std::optional<std::size_t> best;
   double lowest = before_rms;
   for (std::size_t row = 0; row < scores.size(); ++row) {
-    if (scores[row].skipped || !isRanked(scores[row], comparison) || !(scores[row].stats.rms < lowest - kTie)) continue;
+    if (scores[row].skipped || scores[row].folds_back || !isRanked(scores[row], comparison) ||
+        !(scores[row].stats.rms < lowest - kTie))
+      continue;
     lowest = scores[row].stats.rms;
     best = row;
   }
@@ -63,35 +65,22 @@ std::string placesText(const Comparison& comparison) {
              : text;
 }
 
-/// Cells of the grid, or points between the places where the correction was asked.
-struct FoldCount {
-  std::size_t n_folded = 0;
-  std::size_t n_judged = 0;
-  /// No room of known physics and no real recording comes near a quarter.
-  bool isTooMany() const { return 4 * n_folded > n_judged; }
-};
-
-FoldCount countFolds(const FoldBack& fold_back, bool of_grid) {
-  FoldCount count;
-  for (const FoldBackCell& cell : fold_back.cells) {
-    if (cell.nodes.empty() == of_grid) continue;
-    ++count.n_judged;
-    count.n_folded += cell.one_to_one ? 0 : 1;
-  }
-  return count;
-}
-
 /// What a map that turns much of the volume inside out means. A distorted field folds back near metal at most.
 std::string insideOutText(const Comparison& comparison) {
   if (!comparison.verdict.mirrored.empty()) return comparison.verdict.mirrored;
-  const FoldBack& fold_back = *comparison.fold_back;
-  const bool of_grid = countFolds(fold_back, true).isTooMany();
-  const FoldCount count = countFolds(fold_back, of_grid);
-  return "the readings are turned inside out in " + std::to_string(count.n_folded) + " of " +
-         std::to_string(count.n_judged) + (of_grid ? " cells of the grid" : " points between the places") +
+  const FoldCount count = foldsOfPlaces(*comparison.fold_back);
+  return "the readings are turned inside out " + std::string(comparison.fold_back->n_places > 0 ? "around " : "in ") +
+         std::to_string(count.n_folded) + " of " + std::to_string(count.n_judged) +
+         (comparison.fold_back->n_places > 0 ? " places" : " cells of the grid") +
          ", far more than a field does: axes are swapped or mirrored, readings stand at places that are not theirs, or "
-         "rig or "
-         "transmitter was moved on the way";
+         "rig or transmitter was moved on the way";
+}
+
+/// What the best correction does between the places, where it alone folds back.
+std::string foldingText(const FoldBack& fold_back) {
+  const FoldCount count = foldsOfCorrection(fold_back);
+  return "the correction folds back at " + std::to_string(count.n_folded) + " of " + std::to_string(count.n_judged) +
+         " points between the places, though these do not: different readings go to one place there";
 }
 
 /// Where a method that is not ranked has the smaller figure, that it was not judged.
@@ -118,9 +107,15 @@ std::string positionText(const Comparison& comparison, const std::string& do_not
   if (comparison.verdict.is_inside_out)
     return do_not_apply + name + " would take the error from " + before + " to " + after + " (" +
            placesText(comparison) + "), but " + insideOutText(comparison);
+  const bool folds = comparison.fold_back && foldsByItself(*comparison.fold_back);
+  if (comparison.verdict.is_folding)
+    return do_not_apply + name + " would take the error from " + before + " to " + after + " (" +
+           placesText(comparison) + "), but " + foldingText(*comparison.fold_back) +
+           ", and places nearer to each other are needed to tell what the field does between them";
   if (test.apply)
     return "Apply " + name + ": error before " + before + ", after " + after + " (" + placesText(comparison) +
-           "), gain " + percentText(test.gain) + " % (" + intervalText(test) + ")";
+           "), gain " + percentText(test.gain) + " % (" + intervalText(test) + ")" +
+           (folds ? ", but " + foldingText(*comparison.fold_back) : "");
   return do_not_apply + "the best method, " + name + ", takes the error from " + before + " to " + after + " (" +
          placesText(comparison) + "), a gain of " + percentText(test.gain) + " % (" + intervalText(test) + ")" +
          whyNot(test, comparison);
@@ -231,6 +226,9 @@ void pickBest(Comparison& comparison) {
   tellDistanceToBest(comparison.position, comparison.best_position_row, comparison.before_place_mm);
   tellDistanceToBest(comparison.orientation, comparison.best_orientation_row, comparison.before_place_deg);
   verdict.apply_orientation = verdict.orientation.apply;
+}
+
+void noteFloors(Comparison& comparison) {
   if (comparison.before_position_mm.rms <= comparison.floor_position_mm)
     comparison.notes.push_back("The position error before correction is no larger than noise and jig tolerance make.");
   if (const auto row = comparison.best_position_row;
@@ -245,12 +243,10 @@ void refuseInsideOut(Comparison& comparison, std::span<const Node> nodes) {
   Verdict& verdict = comparison.verdict;
   verdict.mirrored = calibration::mirroredText(nodes);
   const auto& fold_back = comparison.fold_back;
-  const bool folds =
-      fold_back && (countFolds(*fold_back, true).isTooMany() || countFolds(*fold_back, false).isTooMany());
-  if (!folds && verdict.mirrored.empty()) return;
-  verdict.is_inside_out = true;
-  verdict.apply_position = verdict.position.apply = false;
-  verdict.apply_orientation = verdict.orientation.apply = false;
+  verdict.is_inside_out = !verdict.mirrored.empty() || (fold_back && foldsOfPlaces(*fold_back).isTooMany());
+  verdict.is_folding = !verdict.is_inside_out && fold_back && foldsOfCorrection(*fold_back).isTooMany();
+  if (verdict.is_inside_out || verdict.is_folding) verdict.apply_position = verdict.position.apply = false;
+  if (verdict.is_inside_out) verdict.apply_orientation = verdict.orientation.apply = false;
 }
 
 void writeVerdictText(Comparison& comparison) {

@@ -26,13 +26,17 @@ void judgePosition(Verdict& verdict, const GainTest& test);
 /// @param of_best the best one's errors of the places, mm or deg
 void tellDistanceTo(const std::vector<double>& of_best, std::vector<MethodScore>& scores);
 
-/// Picks the best of the ranked methods by held-out RMS (nothing wins unless it beats the error before), tests their
-/// gain, and tells how far the others are from the best.
+/// Picks the best of the ranked methods that do not fold back by held-out RMS (nothing wins unless it beats the error
+/// before), tests their gain, and tells how far the others are from the best.
 void pickBest(Comparison& comparison);
 
-/// Nothing is applied where more than a quarter of the grid's cells fold back, or the correction does at more than a
-/// quarter of the points between the places, or where a sensor's readings are a mirror image of its places: the axes or
-/// the places of the readings are wrong then, and a correction that hides it must not be believed.
+/// What is to be noted where the floor is above what is left, or what was there before.
+void noteFloors(Comparison& comparison);
+
+/// Nothing is applied where more than a quarter of the grid's cells fold back (of places without a grid: of those), or
+/// where a sensor's readings are a mirror image of its places: the axes or the places of the readings are wrong then,
+/// and a correction that hides it must not be believed. No position is corrected where the correction alone folds back
+/// at more than a quarter of the points between the places.
 /// @param nodes rows that count
 void refuseInsideOut(Comparison& comparison, std::span<const Node> nodes);
 

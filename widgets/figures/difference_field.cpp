@@ -4,7 +4,9 @@ namespace fieldtrue::widgets {
 
 ErrorField differenceField(const evaluation::CalibrationDifference& difference, std::size_t most) {
   ErrorField field;
-  field.title = QStringLiteral("Change from the first to the second");
+  field.title = difference.n_orientations > 1
+                    ? QStringLiteral("Largest change from the first to the second, of all orientations")
+                    : QStringLiteral("Change from the first to the second");
   const std::size_t step = difference.points.size() / most + 1;
   for (std::size_t i = 0; i < difference.points.size(); ++i) {
     const bool is_worst = i == difference.worst;

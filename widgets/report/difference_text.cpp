@@ -17,6 +17,13 @@ std::string heldOut(const evaluation::PlaceErrors& errors) {
          errorFigure(errors.rms_90_mm.high) + ") at " + std::to_string(errors.mm.size()) + " places";
 }
 
+std::string atMost(const evaluation::CalibrationDifference& difference) {
+  const std::string most = mm(difference.max_mm) + " at most";
+  if (difference.n_orientations == 0) return most;
+  return most + ", in " + std::to_string(difference.n_orientations) +
+         (difference.n_orientations == 1 ? " orientation" : " orientations");
+}
+
 std::string statedSetup(const Setup& setup) { return setup.empty() ? "not stated" : setupText(setup); }
 
 }  // namespace
@@ -27,7 +34,7 @@ std::vector<DifferenceFact> differenceFacts(const evaluation::CalibrationDiffere
       {"Set-up of the second", statedSetup(difference.second_setup)},
       {"The same set-up", std::string(nameOf(difference.setup_matches))},
       {"Corrections differ by",
-       mm(difference.rms_mm) + " RMS, 95 % below " + mm(difference.p95_mm) + ", " + mm(difference.max_mm) + " at most"},
+       mm(difference.rms_mm) + " RMS, 95 % below " + mm(difference.p95_mm) + ", " + atMost(difference)},
       {"Rigid motion taken out", mm(difference.moved_mm) + " and " + deg(difference.turned_deg)},
       {"With that motion", mm(difference.whole_rms_mm) + " RMS, " + mm(difference.whole_max_mm) + " at most"},
       {"What both are unsure of",

@@ -138,7 +138,8 @@ std::string cautionText(const evaluation::Comparison& comparison) {
   const evaluation::MethodScore* best = bestPosition(comparison);
   if (!comparison.verdict.apply_position || best == nullptr) return {};
   std::string text;
-  if (comparison.fold_back && comparison.fold_back->n_folded > 0) text = "the field folds back";
+  if (comparison.fold_back && comparison.fold_back->n_folded > 0)
+    text = evaluation::foldsByItself(*comparison.fold_back) ? "the correction folds back" : "the field folds back";
   if (best->stats.max >= comparison.before_position_mm.max)
     text += (text.empty() ? "" : " and ") + std::string("the worst place is no better");
   if (comparison.validated_share < 0.5)

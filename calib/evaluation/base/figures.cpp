@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calib/core/number_text.h"
+#include "calib/core/pose.h"
 
 namespace fieldtrue::evaluation {
 
@@ -17,6 +18,12 @@ std::string percentText(double fraction) { return fixedText(100.0 * fraction, st
 
 std::string pointText(const Eigen::Vector3d& point_m) {
   return "(" + fixedText(point_m.x(), 2) + ", " + fixedText(point_m.y(), 2) + ", " + fixedText(point_m.z(), 2) + ") m";
+}
+
+std::string turnText(const Eigen::Quaterniond& q) {
+  const Eigen::Quaterniond shown = canonical(q);
+  return "(w " + fixedText(shown.w(), 2) + ", x " + fixedText(shown.x(), 2) + ", y " + fixedText(shown.y(), 2) +
+         ", z " + fixedText(shown.z(), 2) + ")";
 }
 
 std::string countText(std::size_t count, const std::string& one, const std::string& several) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@ std::string percentText(double fraction);
 
 /// "(0.10, -0.25, 1.30) m".
 std::string pointText(const Eigen::Vector3d& point_m);
+/// "(w 0.50, x 0.50, y -0.50, z 0.50)".
+std::string turnText(const Eigen::Quaterniond& q);
 
 /// "1 place", "3 places".
 std::string countText(std::size_t count, const std::string& one, const std::string& several);

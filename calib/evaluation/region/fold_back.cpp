@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "calib/calibration/alignment.h"
 #include "calib/core/number_text.h"
@@ -191,6 +192,74 @@ std::vector<FoldBackCell> judgeCorrector(const calibration::Corrector& corrector
   return cells;
 }
 
+/// Neighbours that a linear map is fitted to; it needs four, and noise of few would turn it.
+constexpr std::size_t kNeighbours = 12;
+
+/// The places nearest to one, itself among them.
+std::vector<std::size_t> nearestPlaces(const std::vector<Eigen::Vector3d>& p_true_m, std::size_t to) {
+  std::vector<std::size_t> order(p_true_m.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const std::size_t n = std::min(order.size(), kNeighbours + 1);
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(n), order.end(),
+                    [&](std::size_t a, std::size_t b) {
+                      const auto far_m2 = [&](std::size_t i) { return (p_true_m[i] - p_true_m[to]).squaredNorm(); };
+                      return far_m2(a) < far_m2(b);
+                    });
+  order.resize(n);
+  return order;
+}
+
+/// Places of no grid, by the linear map from true to tracked positions around each.
+void judgePlacesAlone(const correctors::FitData& data, FoldBack& fold_back) {
+  if (data.dimension < 3) return;
+  const correctors::Places places = correctors::mergePlaces(data);
+  for (std::size_t i = 0; i < places.p_true_m.size(); ++i) {
+    Eigen::Matrix3d true_m2 = Eigen::Matrix3d::Zero(), both_m2 = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d middle_true_m = Eigen::Vector3d::Zero(), middle_tracked_m = Eigen::Vector3d::Zero();
+    const std::vector<std::size_t> near = nearestPlaces(places.p_true_m, i);
+    for (const std::size_t k : near) {
+      middle_true_m += places.p_true_m[k] / static_cast<double>(near.size());
+      middle_tracked_m += places.p_tracked_m[k] / static_cast<double>(near.size());
+    }
+    for (const std::size_t k : near) {
+      const Eigen::Vector3d from_middle_m = places.p_true_m[k] - middle_true_m;
+      true_m2 += from_middle_m * from_middle_m.transpose();
+      both_m2 += (places.p_tracked_m[k] - middle_tracked_m) * from_middle_m.transpose();
+    }
+    const Eigen::FullPivLU<Eigen::Matrix3d> spread(true_m2);
+    if (!spread.isInvertible()) continue;
+    ++fold_back.n_places;
+    // The map is both_m2 true_m2^-1, and the determinant of a spread is positive.
+    fold_back.n_places_folded += both_m2.determinant() < 0.0;
+  }
+}
+
+FoldCount countCells(const FoldBack& fold_back, bool of_grid) {
+  FoldCount count;
+  for (const FoldBackCell& cell : fold_back.cells) {
+    if (cell.nodes.empty() == of_grid) continue;
+    ++count.n_judged;
+    count.n_folded += cell.one_to_one ? 0 : 1;
+  }
+  return count;
+}
+
+std::optional<double> smallestDeterminant(const FoldBack& fold_back, bool of_grid) {
+  std::optional<double> smallest;
+  for (const FoldBackCell& cell : fold_back.cells)
+    if (cell.nodes.empty() != of_grid) smallest = std::min(smallest.value_or(cell.determinant), cell.determinant);
+  return smallest;
+}
+
+/// "smallest determinant 0.10 of the field and 0.32 of the correction".
+std::string determinantText(const FoldBack& fold_back) {
+  const auto& of_field = fold_back.smallest_determinant;
+  const auto& of_correction = fold_back.smallest_correction_determinant;
+  return "smallest determinant " + (of_field ? significantText(*of_field, 2) + " of the field" : std::string()) +
+         (of_field && of_correction ? " and " : "") +
+         (of_correction ? significantText(*of_correction, 2) + " of the correction" : std::string());
+}
+
 std::string whereText(const FoldBackCell& cell, const PlaceNames& names) {
   return (cell.nodes.empty() ? std::string() : "between " + names.list(cell.nodes, 8) + ", ") + "around " +
          pointText(cell.center_m);
@@ -205,9 +274,8 @@ std::string sentence(const FoldBack& fold_back, std::size_t n_grid, std::size_t 
   const std::string doubtful = n_doubtful == 0 ? std::string()
                                                : "; " + countText(n_doubtful, "cell folds", "cells fold") +
                                                      " by no more than jig tolerance and noise explain";
-  const std::string figures = looked_at + ", smallest determinant " +
-                              significantText(fold_back.smallest_determinant, 2) + ", worst condition " +
-                              fixedText(fold_back.worst_condition, 1);
+  const std::string figures =
+      looked_at + ", " + determinantText(fold_back) + ", worst condition " + fixedText(fold_back.worst_condition, 1);
   if (fold_back.n_folded == 0 && fold_back.n_near_fold > 0) {
     const auto nearest = std::find_if(fold_back.cells.begin(), fold_back.cells.end(),
                                       [](const FoldBackCell& cell) { return cell.is_near_fold; });
@@ -216,23 +284,34 @@ std::string sentence(const FoldBack& fold_back, std::size_t n_grid, std::size_t 
            ": readings hardly change with the place there, and the correction multiplies their noise" + doubtful + ".";
   }
   if (fold_back.n_folded == 0) return "The field does not fold back (" + figures + ")" + doubtful + ".";
-  const auto folded_cells = static_cast<std::size_t>(
-      std::count_if(fold_back.cells.begin(), fold_back.cells.begin() + static_cast<std::ptrdiff_t>(n_grid),
-                    [](const FoldBackCell& cell) { return !cell.one_to_one; }));
-  const std::size_t folded_probes = static_cast<std::size_t>(fold_back.n_folded) - folded_cells;
+  const FoldCount of_places = foldsOfPlaces(fold_back);
+  const std::size_t folded_probes = foldsOfCorrection(fold_back).n_folded;
   const auto worst = std::find_if(fold_back.cells.begin(), fold_back.cells.end(),
                                   [](const FoldBackCell& cell) { return !cell.one_to_one; });
-  if (folded_cells == 0)
+  if (of_places.n_folded == 0)
     return "The measured places do not fold back, but the correction does at " + std::to_string(folded_probes) +
            " of " + std::to_string(n_probes) + " points between them, worst " + whereText(*worst, names) +
            ": it sends different readings to one place there" + doubtful + ".";
-  return "The field folds back in " + std::to_string(folded_cells) + " of " + std::to_string(n_grid) +
-         " cells of the grid and at " + std::to_string(folded_probes) + " of " + std::to_string(n_probes) +
-         " points between the places, worst " + whereText(*worst, names) +
-         ": a reading there stands for more than one place and no correction is unique" + doubtful + ".";
+  return std::string("The field folds back ") + (n_grid > 0 ? "in " : "around ") + std::to_string(of_places.n_folded) +
+         " of " + std::to_string(of_places.n_judged) + (n_grid > 0 ? " cells of the grid" : " places") + " and at " +
+         std::to_string(folded_probes) + " of " + std::to_string(n_probes) + " points between the places, worst " +
+         whereText(*worst, names) + ": a reading there stands for more than one place and no correction is unique" +
+         doubtful + ".";
 }
 
 }  // namespace
+
+FoldCount foldsOfPlaces(const FoldBack& fold_back) {
+  const FoldCount of_grid = countCells(fold_back, true);
+  if (of_grid.n_judged > 0) return of_grid;
+  return {static_cast<std::size_t>(fold_back.n_places_folded), static_cast<std::size_t>(fold_back.n_places)};
+}
+
+FoldCount foldsOfCorrection(const FoldBack& fold_back) { return countCells(fold_back, false); }
+
+bool foldsByItself(const FoldBack& fold_back) {
+  return foldsOfPlaces(fold_back).n_folded == 0 && foldsOfCorrection(fold_back).n_folded > 0;
+}
 
 FoldBack foldBackOf(const calibration::Corrector& corrector) {
   const Pose& reference_from_tracker = corrector.alignment().reference_from_tracker;
@@ -252,20 +331,21 @@ FoldBack foldBackOf(const calibration::Corrector& corrector) {
   fold_back.cells = std::move(grid.cells);
   const std::size_t n_grid = fold_back.cells.size();
   std::move(probes.begin(), probes.end(), std::back_inserter(fold_back.cells));
-  bool is_first = true;
   for (const FoldBackCell& cell : fold_back.cells) {
     fold_back.n_folded += !cell.one_to_one;
     fold_back.n_near_fold += cell.is_near_fold;
     fold_back.worst_condition = std::max(fold_back.worst_condition, cell.condition);
-    fold_back.smallest_determinant =
-        is_first ? cell.determinant : std::min(fold_back.smallest_determinant, cell.determinant);
-    is_first = false;
   }
+  if (n_grid == 0) judgePlacesAlone(data, fold_back);
+  fold_back.smallest_determinant = smallestDeterminant(fold_back, true);
+  fold_back.smallest_correction_determinant = smallestDeterminant(fold_back, false);
   fold_back.text = sentence(fold_back, n_grid, grid.n_doubtful, PlaceNames(corrector.table().nodes));
   return fold_back;
 }
 
 namespace {
+
+json orNothing(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
 
 json toJson(const FoldBackCell& cell) {
   return {{"center_m", {cell.center_m.x(), cell.center_m.y(), cell.center_m.z()}},
@@ -288,7 +368,11 @@ json toJson(const FoldBack& fold_back) {
       {"n_judged", fold_back.cells.size()},
       {"n_folded", fold_back.n_folded},
       {"worst_condition", std::isfinite(fold_back.worst_condition) ? json(fold_back.worst_condition) : json(nullptr)},
-      {"smallest_determinant", fold_back.smallest_determinant},
+      {"smallest_determinant", orNothing(fold_back.smallest_determinant)},
+      {"n_correction_folded", foldsOfCorrection(fold_back).n_folded},
+      {"smallest_correction_determinant", orNothing(fold_back.smallest_correction_determinant)},
+      {"n_places_judged", fold_back.n_places},
+      {"n_places_folded", fold_back.n_places_folded},
       {"n_near_fold", fold_back.n_near_fold},
       {"folded", std::move(folded)},
       {"near_fold", std::move(near)},

@@ -74,7 +74,7 @@ class FoldBackTest : public QObject {
       FT_VERIFY_MATCH(near(cell.determinant, is_last ? 2.0 : 1.0, 1e-9));
       FT_VERIFY_MATCH(near(cell.condition, is_last ? 2.0 : 1.0, 1e-9));
     }
-    FT_VERIFY_MATCH(near(fold_back.smallest_determinant, 1.0, 1e-6));
+    FT_VERIFY_MATCH(near(fold_back.smallest_determinant.value(), 1.0, 1e-6));
     FT_VERIFY_MATCH(near(fold_back.worst_condition, 2.0, 1e-9));
   }
 
@@ -169,7 +169,7 @@ class FoldBackTest : public QObject {
     // An affine map that mirrors: readings run against the truth along x everywhere.
     const FoldBack fold_back = judged(gridWithColumns({1.3, 1.1, 0.9, 0.7, 0.5}), "affine");
     QCOMPARE(fold_back.n_folded, static_cast<int>(fold_back.cells.size()));
-    FT_VERIFY_MATCH(near(fold_back.smallest_determinant, -1.0, 1e-6));
+    FT_VERIFY_MATCH(near(fold_back.smallest_determinant.value(), -1.0, 1e-6));
   }
 
   void scatteredPlacesAreJudgedByTheCorrection() {

@@ -25,6 +25,18 @@ CalibrationTable bentTable(double distortion_m, double placing_sd_m, std::array<
   return syntheticTable(options, {.seed = 3, .position_sd_m = 0.0001, .placing_sd_m = placing_sd_m});
 }
 
+/// Moves every place across x by up to 0.1 m, and its reading with it, so that they make no grid.
+void scatter(CalibrationTable& table) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> by_m(-0.1, 0.1);
+  for (Node& node : table.nodes) {
+    const Eigen::Vector3d shift_m(0.0, by_m(random), by_m(random));
+    node.index.reset();
+    node.reference_from_sensor.position_m += shift_m;
+    node.tracker_from_sensor.position_m += shift_m;
+  }
+}
+
 Comparison compared(const CalibrationTable& table, std::vector<MethodText> methods) {
   ComparisonOptions options;
   options.position_methods = std::move(methods);
@@ -198,6 +210,57 @@ class VerdictTest : public QObject {
     // Held out, the correction of swapped axes looks splendid: nothing but the fold tells.
     QVERIFY(slip == 2 || verdict.position.gain > 0.9);
     QVERIFY(!verdict.position.apply);
+  }
+
+  void aCorrectionThatFoldsByItselfIsNoFaultOfTheReadings_data() {
+    QTest::addColumn<bool>("in_a_grid");
+    QTest::newRow("grid") << true;
+    QTest::newRow("no grid") << false;
+  }
+  void aCorrectionThatFoldsByItselfIsNoFaultOfTheReadings() {
+    QFETCH(bool, in_a_grid);
+    // Over 0.6 m readings are x - 0.97 / k sin(k x), k one wave: their determinant is 1 - 0.97 cos(k x), 0.03 at least.
+    // Seven columns do not tell how steeply the place follows the reading at either face.
+    SyntheticOptions options;
+    options.counts = {7, 7, 7};
+    options.pitch_m = Eigen::Vector3d::Constant(0.1);
+    CalibrationTable table = syntheticTable(options);
+    const double x_low_m = table.nodes.front().reference_from_sensor.position_m.x();
+    if (!in_a_grid) scatter(table);
+    for (Node& node : table.nodes) {
+      const double k = 2.0 * 3.14159265358979 / 0.6;
+      node.tracker_from_sensor = node.reference_from_sensor;
+      Eigen::Vector3d& p_m = node.tracker_from_sensor.position_m;
+      p_m.x() -= 0.97 / k * std::sin(k * (p_m.x() - x_low_m));
+    }
+    table.metadata.jig_tolerance_m = 5e-5;
+    const Comparison comparison = compared(table, {{"affine", {}}, {"rbf", {}}});
+    const Verdict& verdict = comparison.verdict;
+    QVERIFY2(verdict.is_folding && !verdict.is_inside_out && !verdict.apply_position, verdict.text.c_str());
+    FT_VERIFY_MATCH(
+        holdsAll(verdict.text, {"but the correction folds back at ", "different readings go to one place"}));
+    QVERIFY2(verdict.text.find("inside out") == std::string::npos, verdict.text.c_str());
+    const FoldBack& fold_back = *comparison.fold_back;
+    QVERIFY(foldsByItself(fold_back) && *fold_back.smallest_correction_determinant < 0.0);
+    QCOMPARE(fold_back.smallest_determinant.has_value(), in_a_grid);
+    // Of a cell of the first column: (0.1 - 0.97 / k sin(2 pi / 6)) / 0.1.
+    if (in_a_grid) FT_VERIFY_MATCH(near(*fold_back.smallest_determinant, 0.1978, 1e-3));
+    const auto json = toJson(comparison);
+    QVERIFY(json.at("verdict").at("folding") == true && json.at("verdict").at("inside_out") == false);
+  }
+
+  void readingsAtOtherPlacesAreToldWithoutAGridToo() {
+    CalibrationTable table = bentTable(0.03, 0.0);
+    std::vector<Pose> readings;
+    scatter(table);
+    for (const Node& node : table.nodes) readings.push_back(node.tracker_from_sensor);
+    QVERIFY(!compared(table, {{"affine", {}}}).verdict.is_inside_out);
+    std::shuffle(readings.begin(), readings.end(), std::mt19937_64(5));
+    for (std::size_t i = 0; i < table.nodes.size(); ++i)
+      if (i % 3 != 0) table.nodes[i].tracker_from_sensor = readings[i];
+    const Verdict verdict = compared(table, {{"none", {}}, {"affine", {}}}).verdict;
+    QVERIFY2(verdict.is_inside_out && !verdict.apply_position, verdict.text.c_str());
+    FT_VERIFY_MATCH(holdsAll(verdict.text, {"the readings are turned inside out around ", " of 125 places"}));
   }
 
   void aRigMovedOnTheWayIsNotApplied() {
