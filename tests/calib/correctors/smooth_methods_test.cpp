@@ -218,7 +218,9 @@ class SmoothMethodsTest : public QObject {
     QCOMPARE(model.error().code, ErrorCode::kTooFewNodes);
     FT_VERIFY_MATCH(holdsAll(model.error().message, {"6", "5"}));
     // Three places lie in a plane, of which five would do; a fourth off it asks for six.
-    const auto of_three = Method(text).fit(fitDataOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, linear_m));
+    FitData three = fitDataOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, linear_m);
+    three.dimension = 2;
+    const auto of_three = Method(text).fit(three);
     QVERIFY(!of_three);
     FT_VERIFY_MATCH(holdsAll(of_three.error().message, {"at least 6 places, or 5 that lie in one plane, got 3"}));
   }
