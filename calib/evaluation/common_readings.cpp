@@ -124,8 +124,8 @@ Found climb(const Corrector& first, const Corrector& second, double step_m, Foun
       has_moved = false;
       const Found from = at;
       for (int side = 0; side < 27; ++side) {
-        const Eigen::Vector3d towards(side % 3 - 1, side / 3 % 3 - 1, side / 9 - 1);
-        const Reading next{from.reading.p_m + length_m * towards.normalized(), from.reading.held};
+        const Eigen::Vector3i towards(side % 3 - 1, side / 3 % 3 - 1, side / 9 - 1);
+        const Reading next{from.reading.p_m + length_m * towards.cast<double>().normalized(), from.reading.held};
         if (towards.isZero() || !coversBoth(first, second, next.p_m)) continue;
         if (const double there = figure(next); there > at.figure) {
           at = {next, there};
