@@ -30,6 +30,10 @@ void addTraces(const std::vector<identify::Trace>& traces, const identify::Thres
       report.findings.push_back({"", "What no known effect explains looks as if " + trace.text + ".", {}});
 }
 
+void addOnce(int node, std::vector<int>& nodes) {
+  if (std::find(nodes.begin(), nodes.end(), node) == nodes.end()) nodes.push_back(node);
+}
+
 /// Each flagged place once, the one that stands out most first.
 std::vector<int> flaggedPlaces(const GapReport& report) {
   std::vector<const GapNode*> flagged;
@@ -38,8 +42,7 @@ std::vector<int> flaggedPlaces(const GapReport& report) {
   std::stable_sort(flagged.begin(), flagged.end(),
                    [](const GapNode* a, const GapNode* b) { return a->excess > b->excess; });
   std::vector<int> nodes;
-  for (const GapNode* node : flagged)
-    if (std::find(nodes.begin(), nodes.end(), node->node) == nodes.end()) nodes.push_back(node->node);
+  for (const GapNode* node : flagged) addOnce(node->node, nodes);
   return nodes;
 }
 
@@ -77,8 +80,7 @@ void addStrays(const HowFar& far, const identify::GapRows& rows, GapReport& repo
   std::stable_sort(strays.begin(), strays.end(),
                    [&](std::size_t a, std::size_t b) { return far.size_m[a] > far.size_m[b]; });
   std::vector<int> nodes;
-  for (const std::size_t i : strays)
-    if (std::find(nodes.begin(), nodes.end(), rows.rows[i].node) == nodes.end()) nodes.push_back(rows.rows[i].node);
+  for (const std::size_t i : strays) addOnce(rows.rows[i].node, nodes);
   report.findings.push_back({"",
                              (nodes.size() == 1 ? "Beside what is named, one place does not fit the others: "
                                                 : "Beside what is named, places do not fit the others: ") +

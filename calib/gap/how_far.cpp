@@ -123,19 +123,18 @@ RowNoise noiseLeftBy(const identify::GapSearch& search, const identify::Structur
   const double share_rad2 = share(search.floorPlacingSd_rad(), search.placingSd_rad());
   const std::size_t count = rows.rows.size();
   RowNoise noise{std::vector<double>(count), std::vector<double>(count), std::vector<double>(count), {}};
-  const bool belong_together = search.belongTogether();
+  if (!search.belongTogether()) {
+    for (std::size_t i = 0; i < count; ++i) setAllowed(search, i, noise);
+    return noise;
+  }
   for (std::size_t i = 0; i < count; ++i) {
-    if (!belong_together) {
-      setAllowed(search, i, noise);
-      continue;
-    }
     const identify::Vector6d& left = structure.noise[i];
     const Eigen::Vector3d left_m = search.whitening().position[i].triangularView<Eigen::Lower>().solve(left.head<3>());
     noise.square_m2[i] = share_m2 * left_m.squaredNorm();
     noise.whitened[i] = left.squaredNorm();
     noise.square_rad2[i] = share_rad2 * (left.tail<3>() / search.whitening().rotation[i]).squaredNorm();
   }
-  if (belong_together) noise.strays = straysAmong(structure.noise, rows.has_orientation, search.thresholds());
+  noise.strays = straysAmong(structure.noise, rows.has_orientation, search.thresholds());
   for (const std::size_t i : noise.strays) setAllowed(search, i, noise);
   return noise;
 }
