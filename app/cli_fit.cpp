@@ -21,8 +21,6 @@
 namespace fieldtrue::cli {
 namespace {
 
-constexpr double kMmPerM = 1000.0;
-
 struct FitOptions {
   std::string nodes;
   std::string position;

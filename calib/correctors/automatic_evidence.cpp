@@ -70,6 +70,11 @@ bool isField(const AutomaticCandidate& candidate) { return candidate.method->id 
 
 std::size_t sourcesOfField(const PositionModel& field) { return field.parameters().at("sources").size(); }
 
+/// Of those beside the field.
+bool countsItsUnknowns(const AutomaticCandidate& candidate) {
+  return candidate.complexity < simplicity::kPhysical || candidate.method->id == "polynomial";
+}
+
 double unknownsOf(const AutomaticCandidate& candidate, const PositionModel& model) {
   if (isField(candidate)) return kOfMotion + kOfSource * static_cast<double>(sourcesOfField(model));
   if (candidate.method->id == "rigid") return kOfMotion;
@@ -159,7 +164,7 @@ Result<WholeFits> fitWhole(const std::vector<AutomaticCandidate>& candidates, co
   double best_nats = -HUGE_VAL;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     // One that places left out leave undetermined passes near every place whatever the errors are.
-    if (candidates[i].complexity >= simplicity::kPhysical || scores[i].skipped) continue;
+    if (!countsItsUnknowns(candidates[i]) || scores[i].skipped) continue;
     FT_TRY_VOID(fitTo(fits.models[i], candidates[i], data, control));
     if (fits.models[i] == nullptr) continue;
     best_nats = std::max(best_nats, evidenceOf(i, scoreOfFit(*fits.models[i], data, folds.shares)));

@@ -5,8 +5,6 @@
 
 namespace fieldtrue::evaluation {
 
-inline constexpr double kMmPerM = 1000.0;
-
 /// The change of corrected positions over the common readings, and the rigid motion that is taken out of it.
 void measureField(const calibration::Corrector& first, const calibration::Corrector& second,
                   const CommonReadings& common, CalibrationDifference& to);

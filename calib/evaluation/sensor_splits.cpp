@@ -142,13 +142,14 @@ bool isOneFarWorse(const std::vector<SensorScore>& separate) {
   return most->stats.rms > kFarWorse * least->stats.rms;
 }
 
-/// The same of each sensor's errors in shares of what the shared correction leaves of it.
+/// The same of each sensor's errors in shares of what the shared correction leaves of it. In all, the sensors may not
+/// be surely worse for it: what one scatters makes either correction the smaller by chance.
 bool isLowerInShares(SensorSplit& split, const MethodScore& shared, const MethodScore& separate) {
   if (shared.sensors.empty() || shared.sensors.size() != separate.sensors.size()) return false;
   const std::vector<double> shares = inShares(shared.sensors, shared.sensors);
   split.separate_less_shared_in_shares =
       pairedDifference(inShares(separate.sensors, shared.sensors), shares, separate.freedom.positions_a_place);
-  return isOneFarWorse(separate.sensors) && split.separate <= split.shared &&
+  return isOneFarWorse(separate.sensors) && !(split.separate_less_shared.low90 > kTie) &&
          isLower(split.separate_less_shared_in_shares, rootMeanSquare(shares));
 }
 

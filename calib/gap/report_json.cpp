@@ -12,8 +12,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kMmPerM = 1000.0;
-
 json numberToJson(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json numberToJson(const std::optional<double>& value) { return value ? numberToJson(*value) : json(nullptr); }

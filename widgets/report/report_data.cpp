@@ -16,8 +16,6 @@
 namespace fieldtrue::widgets {
 namespace {
 
-constexpr double kMmPerM = 1000.0;
-
 std::optional<double> sd_mm(const Node& node) {
   if (!node.covariance_m2) return std::nullopt;
   return kMmPerM * std::sqrt(node.covariance_m2->trace());

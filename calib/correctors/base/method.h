@@ -39,8 +39,9 @@ class HoldOutFits {
 /// Where a method comes from. Baselines are looked at beside all others.
 enum class MethodOrigin { kBaseline, kSurvey, kLater };
 
-/// Ranks in simplicity, above none, rigid, affine and polynomials by degree (0 to 7). Physical and smoothing fits are
-/// alike in it: which errs less decides.
+/// Ranks in simplicity, above none, rigid, affine and polynomials of degree 2 and 3 (0 to 4). Physical and smoothing
+/// fits are alike in it, and so are polynomials of a higher degree, whose terms are half as many as the places of a
+/// small table and run away beyond them: which errs less decides.
 namespace simplicity {
 inline constexpr int kPhysical = 10;       ///< Fields that obey the physics.
 inline constexpr int kSmoothing = 10;      ///< Smoothing fits that follow any field.

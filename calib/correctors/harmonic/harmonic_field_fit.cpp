@@ -39,10 +39,17 @@ struct Chosen {
   std::vector<double> variances;  ///< Prior variance of each tensor.
 };
 
+/// How a fit goes from step to step. Neither way is the surer one: where one goes astray, the other may not.
+enum class Way {
+  kCareful,  ///< Holds on to what it has: takes no step that loses it, and no fewer sources than speak for themselves.
+  kBold      ///< Begins anew where the linear model says so.
+};
+
 class Fitter {
  public:
-  Fitter(const FitData& data, const HarmonicOptions& options, const RunControl& control, const Pose& field_from_truth)
-      : data_(data), options_(options), control_(control), field_from_truth_(field_from_truth) {
+  Fitter(const FitData& data, const HarmonicOptions& options, const RunControl& control, const Pose& field_from_truth,
+         Way way)
+      : data_(data), options_(options), control_(control), way_(way), field_from_truth_(field_from_truth) {
     double left_m2 = 0.0;
     for (std::size_t i = 0; i < data.size(); ++i)
       left_m2 += (field_from_truth * data.p_true_m[i] - data.p_tracked_m[i]).squaredNorm() /
@@ -55,7 +62,7 @@ class Fitter {
 
   Result<HarmonicFit> run() {
     take(rigidMisfit(DisturbedField()));
-    const double without_sources_m2 = misfit_m2_;
+    without_sources_m2_ = misfit_m2_;
     int n_final = 0;
     for (int step = 0; step < kMostSteps && n_final < kStepsOnceFinal; ++step) {
       n_final += is_choice_final_ ? 1 : 0;
@@ -65,8 +72,22 @@ class Fitter {
       // Where no tolerance is stated jig_sd_m_ is all that a rigid motion leaves, which is no measure of the noise.
       if (step > 0 && moved_m < kSettled * std::sqrt(std::min(1.0, noise_factor_)) * jig_sd_m_) break;
     }
-    if (misfit_m2_ > without_sources_m2) forgetSources();
+    if (misfit_m2_ > without_sources_m2_) forgetSources();
     return HarmonicFit{DisturbedField(sources()), field_from_truth_, posterior()};
+  }
+
+  /// Whether a step promised far less than the field found leaves: then it went astray.
+  bool isAstray() const {
+    constexpr double kFarMore = 4.0;  // Of the mean square.
+    return misfit_m2_ > kFarMore * promised_m2_;
+  }
+
+  /// What the field leaves and what its sources cost [nats], less being better.
+  /// @source Schwarz 1978, Annals of Statistics 6 461
+  double cost_nats() const {
+    const double n = 3.0 * static_cast<double>(data_.size());
+    const double unknowns = static_cast<double>(kPerChosen) * static_cast<double>(chosen_.sites.size());
+    return 0.5 * (n * std::log(misfit_m2_) + unknowns * std::log(n));
   }
 
  private:
@@ -176,6 +197,9 @@ class Fitter {
     corrected_m_ = std::move(misfit.corrected_m);
   }
 
+  /// Variance below which no fit is closer than another, in units of the one stated.
+  double leastNoise() const { return data_.jig_sd_m > 0.0 ? 1.0 : 0.0; }
+
   /// Variance of the noise, in units of the one stated, for one step's choice of sources: while the field is far off,
   /// what the linearisation misses counts as noise too, or sources would be placed to imitate it.
   double noiseForStep() const {
@@ -183,19 +207,37 @@ class Fitter {
     return std::max(noise_factor_, kMissed * kMissed * misfit_m2_ / (jig_sd_m_ * jig_sd_m_));
   }
 
+  /// The sources of one step: those that a search from none finds or, near enough for the linearisation to hold, the
+  /// present ones where it misses what they do together.
+  GroupSelection choose(const GroupedSystem& system, const Linearisation& linear) const {
+    constexpr double kNear = 0.25;                                           // Of the mean square without sources.
+    const auto n_present = static_cast<Eigen::Index>(chosen_.sites.size());  // The first candidates, see refine().
+    GroupSelectionOptions options{options_.least_gain, options_.most_sources,
+                                  noiseForStep(),      data_.jig_sd_m <= 0.0,
+                                  n_present,           is_choice_final_ ? variancesIn(linear) : std::vector<double>()};
+    GroupSelection found = selectGroups(system, options, control_);
+    const auto n_missed = n_present - static_cast<Eigen::Index>(found.groups.size());
+    if (way_ == Way::kBold || is_choice_final_ || n_missed <= 0 || misfit_m2_ > kNear * without_sources_m2_)
+      return found;
+    options.chosen_variances = variancesIn(linear);
+    GroupSelection present = selectGroups(system, options, control_);
+    const double gain_nats = 0.5 * system.n_rows() * std::log(found.noise_factor / present.noise_factor);
+    const double cost_nats = 0.5 * static_cast<double>(kPerChosen * n_missed) * std::log(system.n_rows());
+    if (gain_nats <= cost_nats) return found;
+    present.gain = std::move(found.gain);
+    return present;
+  }
+
   /// One step: chooses sources, moves the truth, refines the candidates. @return RMS change of the corrected positions
   double improve(const Linearisation& linear, int step) {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(linear.rigid);
     const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(linear.rigid.rows(), 6);
     const GroupedSystem system(linear.design, basis, linear.y, box_.extent_m());
-    const bool unknown = data_.jig_sd_m <= 0.0;
-    const auto n_chosen = static_cast<Eigen::Index>(chosen_.sites.size());  // The first candidates, see refine().
-    const GroupSelection selection =
-        selectGroups(system,
-                     {options_.least_gain, options_.most_sources, noiseForStep(), unknown, n_chosen,
-                      is_choice_final_ ? variancesIn(linear) : std::vector<double>()},
-                     control_);
+    const GroupSelection selection = choose(system, linear);
+    const bool may_lose = step == 0 || way_ == Way::kBold;
+    const double noise_before = may_lose ? std::numeric_limits<double>::infinity() : noise_factor_;
     noise_factor_ = std::clamp(selection.noise_factor, 1e-16, 1e16);
+    promised_m2_ = std::min(promised_m2_, std::max(leastNoise(), noise_factor_) * jig_sd_m_ * jig_sd_m_);
 
     Eigen::VectorXd effect = Eigen::VectorXd::Zero(linear.y.size());
     for (std::size_t k = 0; k < selection.groups.size(); ++k)
@@ -204,7 +246,8 @@ class Fitter {
     const Eigen::VectorXd change = effect - linear.present_effect;
     const Eigen::Matrix<double, 6, 1> motion = qr.solve(linear.y - effect);
     moveTruth(motion);
-    const bool whole = keep(selection, linear);
+    const bool whole = keep(selection, linear, noise_before);
+    if (!whole) noise_factor_ = std::min(noise_factor_, noise_before);
     choices_.add(placesOfSources_m(), misfit_m2_);
     is_choice_final_ = is_choice_final_ || choices_.isLastFinal();
     refine(selection.gain, step);
@@ -222,14 +265,16 @@ class Fitter {
   }
 
   /// Takes the sources chosen; or, where the corrected positions would come out farther from the truth than they are, a
-  /// part of the way there. @return whether it went all the way
-  bool keep(const GroupSelection& selection, const Linearisation& linear) {
+  /// part of the way there. @param noise_before noise factor of the step before @return whether it went all the way
+  bool keep(const GroupSelection& selection, const Linearisation& linear, double noise_before) {
     const Chosen before = std::move(chosen_);
     const Chosen after = chosenBy(selection, linear);
     chosen_ = after;
     Misfit misfit = rigidMisfit(DisturbedField(sources()));
-    // Near the end the likelihood may well give up a little of the fit for fewer sources.
-    const double enough_m2 = std::max(1.1 * misfit_m2_, 1.5 * noise_factor_ * jig_sd_m_ * jig_sd_m_);
+    // Near the end the likelihood may well give up a little of the fit for fewer sources; but noise that a step finds
+    // because a source came to stand among the places allows nothing.
+    const double noise_m2 = std::min(noise_factor_, noise_before) * jig_sd_m_ * jig_sd_m_;
+    const double enough_m2 = std::max(1.1 * misfit_m2_, 1.5 * noise_m2);
     bool whole = true;
     for (double share = 0.5; !(misfit.mean_square_m2 <= enough_m2) && share > 0.05; share *= 0.5) {
       chosen_ = blended(before, after, share);
@@ -358,6 +403,7 @@ class Fitter {
   const FitData& data_;
   const HarmonicOptions& options_;
   const RunControl& control_;
+  Way way_;
   Pose field_from_truth_;
   Box box_;
   Eigen::Vector3d center_m_ = Eigen::Vector3d::Zero();
@@ -367,15 +413,22 @@ class Fitter {
   Chosen chosen_;
   HarmonicChoices choices_;  ///< Of every step.
   bool is_choice_final_ = false;
-  double misfit_m2_ = 0.0;                    ///< Of the field found so far.
-  std::vector<Eigen::Vector3d> corrected_m_;  ///< By the field found so far.
+  double misfit_m2_ = 0.0;  ///< Of the field found so far.
+  double without_sources_m2_ = 0.0;
+  double promised_m2_ = std::numeric_limits<double>::infinity();  ///< Least that the linear model of a step left.
+  std::vector<Eigen::Vector3d> corrected_m_;                      ///< By the field found so far.
 };
 
 }  // namespace
 
 Result<HarmonicFit> fitHarmonicField(const FitData& data, const HarmonicOptions& options, const RunControl& control) {
   FT_TRY(const auto field_from_truth, fitRigid(data.p_true_m, data.p_tracked_m));
-  return Fitter(data, options, control, field_from_truth).run();
+  Fitter careful(data, options, control, field_from_truth, Way::kCareful);
+  FT_TRY(auto fit, careful.run());
+  if (!careful.isAstray()) return fit;
+  Fitter bold(data, options, control, field_from_truth, Way::kBold);
+  FT_TRY(auto other, bold.run());
+  return bold.cost_nats() < careful.cost_nats() ? std::move(other) : std::move(fit);
 }
 
 }  // namespace fieldtrue::correctors

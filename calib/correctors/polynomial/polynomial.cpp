@@ -40,7 +40,11 @@ PositionMethod polynomialPosition() {
       .read = readPolynomialPosition,
       .hold_out = holdOutPolynomial,
       .origin = MethodOrigin::kSurvey,
-      .tries = {{"degree=2", 3}, {"degree=3", 4}, {"degree=4", 5}, {"degree=5", 6}, {"degree=6", 7}}};
+      .tries = {{"degree=2", 3},
+                {"degree=3", 4},
+                {"degree=4", simplicity::kSmoothing},
+                {"degree=5", simplicity::kSmoothing},
+                {"degree=6", simplicity::kSmoothing}}};
 }
 
 }  // namespace fieldtrue::correctors

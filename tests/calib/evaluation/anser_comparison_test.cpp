@@ -144,6 +144,13 @@ class AnserComparisonTest : public QObject {
     FT_VERIFY_OK(comparison);
     QCOMPARE(toText(comparison->validation), std::string("kfold:10"));
     QCOMPARE(comparison->validation_places, 41);
+    double least_mm = comparison->before_position_mm.rms, auto_mm = 0.0;
+    for (const MethodScore& score : comparison->position) {
+      if (score.method == "auto") auto_mm = score.stats.rms;
+      if (!score.skipped) least_mm = std::min(least_mm, score.stats.rms);
+    }
+    QVERIFY2(auto_mm > 0.0 && auto_mm <= 1.15 * least_mm,
+             qPrintable(QString("auto %1 mm, least %2 mm").arg(auto_mm).arg(least_mm)));
     const auto best = comparison->best_position_row;
     if (best) {
       const MethodScore& score = comparison->position[*best];

@@ -35,6 +35,7 @@ struct TwoSensors {
   double noise_2_m = 0.0;    ///< And of the second.
   bool side_by_side = true;  ///< So far apart along y, else both at the same place.
   double apart_m = 0.1;
+  unsigned seed = 5;
 };
 
 /// What a tracker reads of a true pose in its own frame.
@@ -51,7 +52,7 @@ CalibrationTable twoSensors(const TwoSensors& how) {
   SyntheticOptions options;
   options.smooth_distortion_m = how.smooth_m;
   CalibrationTable table = syntheticTable(options);
-  std::mt19937 random(5);
+  std::mt19937 random(how.seed);
   std::normal_distribution<double> standard;
   std::vector<Node> second = table.nodes;
   for (std::size_t i = 0; i < table.nodes.size(); ++i) {
@@ -257,11 +258,19 @@ class SensorsTest : public QObject {
     FT_VERIFY_MATCH(near(split->separate, refitted->position.front().stats.rms, 1e-6));
   }
 
-  /// 20 mm an axis of the first drown what a gain of 2 % makes of the second, unless each is measured by its own.
+  void aNoisySensorHidesNoneOfTheOthers_data() {
+    QTest::addColumn<unsigned>("seed");
+    for (const unsigned seed : {5U, 6U, 7U, 8U}) QTest::addRow("draw %u", seed) << seed;
+  }
+  /// 20 mm an axis of the first drown what a gain of 2 % makes of the second, unless each is measured by its own; which
+  /// of the corrections leaves less in all is chance then.
   void aNoisySensorHidesNoneOfTheOthers() {
-    const Comparison comparison = compared(
-        twoSensors({.smooth_m = 0.02, .gain = 0.02, .noise_1_m = 0.02, .noise_2_m = 0.001}), "polynomial:degree=3");
+    QFETCH(unsigned, seed);
+    const Comparison comparison =
+        compared(twoSensors({.smooth_m = 0.02, .gain = 0.02, .noise_1_m = 0.02, .noise_2_m = 0.001, .seed = seed}),
+                 "polynomial:degree=3");
     QVERIFY(comparison.split.has_value());
+    qInfo("apart %.3f mm, shared %.3f mm", comparison.split->separate, comparison.split->shared);
     QVERIFY(comparison.split->separate_less_shared.high90 > 0.0);
     QVERIFY2(isApart(comparison.split), comparison.split->text.c_str());
     FT_VERIFY_MATCH(holdsAll(comparison.split->text,
