@@ -160,8 +160,8 @@ struct Folder {
     }
     replaceFile(path / "answers.json", json{{"sessions", records}}.dump());
     json foretold = json::array();
-    const std::vector<std::pair<const char*, double>> left = {
-        {"s04", 0.15}, {"s05", 0.75}, {"s06", 0.2}, {"s07", 1.0}, {"s08", 0.3}};
+    const std::vector<std::pair<const char*, double>> left = {{"s04", 0.15}, {"s05", 0.75}, {"s06", 0.2},
+                                                              {"s07", 1.0},  {"s08", 0.3},  {"s10", 0.6}};
     for (const auto& [file, after_m2] : left)
       foretold.push_back({{"file", file}, {"inside", {{"n", 150}, {"start_m2", 1.0}, {"after_m2", after_m2}}}});
     replaceFile(path / "foretold.json", json{{"sessions", foretold}}.dump());
@@ -270,6 +270,9 @@ void BlindScoreTest::countsByHand_data() {
   row("Detection", "effects of the catalogue missed (no_gap)", "all", 2.0 / 6.0, 6);  // s07 s18
   row("Outside", "called unexplained or partly explained", "all", 0.5, 2);            // s09
   row("Outside", "called unexplained or partly explained", "rho 1.4 and more", 1.0, 1);
+  row("Outside", "called explained, and more than half is left", "all", 0.5, 2);  // s10
+  row("Outside", "called explained, and more than half is left", "rho 2.8", 0.0, 1);
+  row("Outside", "called no_gap", "all", 0.0, 2);
   row("Outside", "in the catalogue, but so called", "all", 2.0 / 6.0, 6);  // s06 s18
   row("Location", "compact_metal, median", "rho 1.4", 5.0, 1);             // 3-4-5 triangle
   row("Location", "these four, 90 %", "all", 5.0, 1);

@@ -15,6 +15,21 @@ Sessions ofControl(const Sessions& controls, const std::string& name) {
   return where(controls, [&](const Session& session) { return session.control == name; });
 }
 
+/// Whether it was put to places that no table held, where its scene can be.
+bool isForetold(const Session& session) {
+  return session.answer.left_inside.has_value() || session.answer.cannot_be_simulated;
+}
+
+/// What else is said of kinds that no cause of the catalogue is: that all is explained, by what takes away less than
+/// half at unseen places, or that there is no gap.
+/// @param share of sessions that pass a test, with its interval
+template <class Share>
+void addOtherAnswers(Section& section, const Sessions& some, const Share& share) {
+  if (!where(some, isForetold).empty())
+    section.addByStrength("called explained, and more than half is left", "share", some, share(explainsInVain));
+  section.addByStrength("called no_gap", "share", some, share(isSilent));
+}
+
 bool isAsWanted(const Session& session) {
   if (!session.answer.is_answered) return false;
   const Wanted wanted = wantedOf(session.control).value_or(Wanted::kNoCause);
@@ -52,6 +67,8 @@ void addAbstention(std::vector<Figure>& figures, const Sessions& single, const S
   for (const std::string& id : firstIds(off))
     section.add("so called from rho 1.4 up, by kind", id, "share",
                 shareOf(fromStrength(ofFirstId(off, id), 1.4), isAbstention));
+  addOtherAnswers(section, off,
+                  [](const Test& test) { return [test](const Sessions& some) { return shareOf(some, test); }; });
   section.addShares("in the catalogue, but so called", single, orUnanswered(isAbstention),
                     {std::nullopt, atMost(0.10), atMost(0.05), atMost(0.05)});
 }
@@ -67,6 +84,7 @@ void addUnforeseen(std::vector<Figure>& figures, const Sessions& single, const S
                         {std::nullopt, std::nullopt, atLeast(0.85), atLeast(0.90)});
   section.addByStrength("a body of metal named", "share", unforeseen, by_kind(names_metal),
                         {std::nullopt, atMost(0.25), atMost(0.15), atMost(0.10)});
+  addOtherAnswers(section, unforeseen, by_kind);
   const Sessions unnamed = where(
       unforeseen, [](const Session& session) { return !session.effects.front().id.starts_with("unforeseen:near:"); });
   section.addByStrength("the same, kinds that no text of the project comes near", "share", unnamed,

@@ -190,6 +190,13 @@ std::optional<double> leftWidth(const Session& session) {
   return *answer.remaining_high90 - *answer.remaining_low90;
 }
 
+bool explainsInVain(const Session& session) {
+  constexpr double kHalf = 0.5;
+  const Answer& answer = session.answer;
+  if (!answer.is_answered || answer.verdict != "explained") return false;
+  return answer.cannot_be_simulated || (answer.left_inside && *answer.left_inside > kHalf);
+}
+
 std::optional<double> leftStatedOff(const Session& session) {
   const Answer& answer = session.answer;
   if (namedCauses(session).empty() || !answer.left_inside || !answer.remaining_fraction) return std::nullopt;

@@ -73,6 +73,9 @@ std::optional<double> foretoldShrinkage(const Session& session, bool is_inside);
 std::optional<bool> leftIsCovered(const Session& session);
 /// Of the stated 90 % interval of what is left; nothing where none is stated.
 std::optional<double> leftWidth(const Session& session);
+/// Whether all is called explained while `foretell` found more than half of the excess left inside, or a scene that
+/// cannot be simulated.
+bool explainsInVain(const Session& session);
 /// Stated less found share of what is left inside.
 std::optional<double> leftStatedOff(const Session& session);
 
