@@ -78,8 +78,9 @@ class Fitter {
 
   /// Whether a step promised far less than the field found leaves: then it went astray.
   bool isAstray() const {
-    constexpr double kFarMore = 4.0;  // Of the mean square.
-    return misfit_m2_ > kFarMore * promised_m2_;
+    constexpr double kFarMore = 4.0;       // Of the mean square.
+    constexpr double kClosest_m2 = 1e-10;  // (10 um)^2: no closer fit is asked of exact data.
+    return misfit_m2_ > kFarMore * std::max(promised_m2_, kClosest_m2);
   }
 
   /// What the field leaves and what its sources cost [nats], less being better.
@@ -207,6 +208,9 @@ class Fitter {
     return std::max(noise_factor_, kMissed * kMissed * misfit_m2_ / (jig_sd_m_ * jig_sd_m_));
   }
 
+  /// As the residual shows it, where exact data leave none.
+  static double noiseOf(const GroupSelection& selection) { return std::clamp(selection.noise_factor, 1e-16, 1e16); }
+
   /// The sources of one step: those that a search from none finds or, near enough for the linearisation to hold, the
   /// present ones where it misses what they do together.
   GroupSelection choose(const GroupedSystem& system, const Linearisation& linear) const {
@@ -221,7 +225,7 @@ class Fitter {
       return found;
     options.chosen_variances = variancesIn(linear);
     GroupSelection present = selectGroups(system, options, control_);
-    const double gain_nats = 0.5 * system.n_rows() * std::log(found.noise_factor / present.noise_factor);
+    const double gain_nats = 0.5 * system.n_rows() * std::log(noiseOf(found) / noiseOf(present));
     const double cost_nats = 0.5 * static_cast<double>(kPerChosen * n_missed) * std::log(system.n_rows());
     if (gain_nats <= cost_nats) return found;
     present.gain = std::move(found.gain);
@@ -236,7 +240,7 @@ class Fitter {
     const GroupSelection selection = choose(system, linear);
     const bool may_lose = step == 0 || way_ == Way::kBold;
     const double noise_before = may_lose ? std::numeric_limits<double>::infinity() : noise_factor_;
-    noise_factor_ = std::clamp(selection.noise_factor, 1e-16, 1e16);
+    noise_factor_ = noiseOf(selection);
     promised_m2_ = std::min(promised_m2_, std::max(leastNoise(), noise_factor_) * jig_sd_m_ * jig_sd_m_);
 
     Eigen::VectorXd effect = Eigen::VectorXd::Zero(linear.y.size());
@@ -426,7 +430,9 @@ Result<HarmonicFit> fitHarmonicField(const FitData& data, const HarmonicOptions&
   Fitter careful(data, options, control, field_from_truth, Way::kCareful);
   FT_TRY(auto fit, careful.run());
   if (!careful.isAstray()) return fit;
-  Fitter bold(data, options, control, field_from_truth, Way::kBold);
+  RunControl quiet = control;
+  quiet.progress = [](double) {};
+  Fitter bold(data, options, quiet, field_from_truth, Way::kBold);
   FT_TRY(auto other, bold.run());
   return bold.cost_nats() < careful.cost_nats() ? std::move(other) : std::move(fit);
 }
