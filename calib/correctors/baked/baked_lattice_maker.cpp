@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <random>
+#include <set>
 
 #include "calib/correctors/baked/baked_lattice_samples.h"
 
@@ -18,6 +20,26 @@ constexpr double kKeptBelow = 0.8;
 constexpr int kFirstCells = 4;
 constexpr int kMostTrials = 16;
 constexpr std::size_t kBlock = 512;
+/// Of the region, what may be left out where the correction bends too sharply for any lattice: beside metal, mostly
+/// beyond the places.
+constexpr double kMostLeftOut = 0.02;
+constexpr int kMostLookedAgain = 12;
+
+/// Cells of a lattice that it does not follow the correction in.
+struct Holes {
+  std::set<std::array<int, 3>> cells;
+  double share = 0.0;        ///< Of the region.
+  double deviation_m = 0.0;  ///< Largest at the points that were looked at beside them.
+  std::size_t n_points = 0;
+};
+
+std::array<int, 3> cellAt(const LatticeParts& parts, const Eigen::Vector3d& p_m) {
+  const Eigen::Vector3d t = (p_m - parts.origin_m) / parts.spacing_m;
+  std::array<int, 3> cell;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    cell[axis] = std::clamp(static_cast<int>(t[static_cast<Eigen::Index>(axis)]) - 1, 0, latticeCells(parts, axis) - 1);
+  return cell;
+}
 
 /// Points of the region, and where the correction takes them.
 struct Probes {
@@ -46,7 +68,7 @@ class LatticeBaker {
         wanted_m_(kKeptBelow * max_deviation_m),
         max_deviation_m_(max_deviation_m),
         control_(control) {
-    drawProbes(places_m);
+    probes_ = drawnProbes(1, {places_m.begin(), places_m.end()});
   }
 
   Result<std::unique_ptr<BakedLattice>> bake() {
@@ -66,8 +88,13 @@ class LatticeBaker {
         n_points += centers.p_m.size();
       }
       if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
-      if (deviation_m <= wanted_m_) return finished(lattice, deviation_m, n_points);
-      if (spacing_m <= finest_m) return unreachable(lattice, deviation_m);
+      if (deviation_m <= wanted_m_) return finished(lattice, deviation_m, n_points, {});
+      if (spacing_m <= finest_m) {
+        const std::optional<Holes> holes = holesOf(lattice);
+        if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "Stopped on request");
+        if (!holes) return unreachable(lattice, deviation_m);
+        return finished(lattice, holes->deviation_m, holes->n_points, *holes);
+      }
       if (last_spacing_m > 0.0)
         order = std::clamp(std::log(last_deviation_m / deviation_m) / std::log(last_spacing_m / spacing_m), 0.5, 4.0);
       last_spacing_m = spacing_m;
@@ -80,17 +107,61 @@ class LatticeBaker {
   }
 
  private:
-  void drawProbes(std::span<const Eigen::Vector3d> places_m) {
-    std::vector<Eigen::Vector3d> points_m(places_m.begin(), places_m.end());
-    std::mt19937_64 generator(1);
+  /// @param seed of the points drawn in the region; @param more points beside them
+  Probes drawnProbes(std::uint64_t seed, const std::vector<Eigen::Vector3d>& more_m) const {
+    std::vector<Eigen::Vector3d> points_m = more_m;
+    std::mt19937_64 generator(seed);
     // The generator's own bits, since the standard leaves its distributions to each library.
     const auto uniform = [&] { return static_cast<double>(generator() >> 11) * 0x1p-53; };
-    for (std::size_t draw = 0; draw < kMostDraws && points_m.size() < kRandomProbes + places_m.size(); ++draw) {
+    for (std::size_t draw = 0; draw < kMostDraws && points_m.size() < kRandomProbes + more_m.size(); ++draw) {
       const double a = uniform(), b = uniform(), c = uniform();
       const Eigen::Vector3d p_m = box_.low_m + Eigen::Vector3d(a, b, c).cwiseProduct(box_.high_m - box_.low_m);
       if (region_.contains(p_m)) points_m.push_back(p_m);
     }
-    probes_ = evaluated(points_m);
+    return evaluated(points_m);
+  }
+
+  /// The cells in which a lattice is off by more than is wanted, at points drawn anew until none is found. A cell
+  /// beside one of them is off too where nobody looked, so that the six around it go with it.
+  /// @return nothing where they are more of the region than may be left out
+  std::optional<Holes> holesOf(const BakedLattice& lattice) const {
+    Holes holes;
+    for (int look = 0; look < kMostLookedAgain; ++look) {
+      if (control_.stop.stop_requested()) return std::nullopt;
+      const Probes probes = look == 0 ? probes_ : look == 1 ? cellCenters(lattice) : drawnProbes(1 + look, {});
+      const std::size_t before = holes.cells.size();
+      double largest_m = 0.0;
+      std::size_t n_out = 0;
+      holes.n_points += probes.p_m.size();
+      for (std::size_t i = 0; i < probes.p_m.size(); ++i) {
+        const std::array<int, 3> cell = cellAt(lattice.parts(), probes.p_m[i]);
+        const double off_m = (lattice.displacement_m(probes.p_m[i]) - probes.displacement_m[i]).norm();
+        if (holes.cells.contains(cell)) {
+          ++n_out;
+        } else if (off_m > wanted_m_) {
+          ++n_out;
+          largest_m = std::max(largest_m, off_m);
+          addHole(holes, cell, lattice.parts());
+        } else {
+          holes.deviation_m = std::max(holes.deviation_m, off_m);
+        }
+      }
+      holes.share = std::max(holes.share, static_cast<double>(n_out) / static_cast<double>(probes.p_m.size()));
+      if (holes.share > kMostLeftOut) return std::nullopt;
+      if (look >= 2 && holes.cells.size() == before) break;
+      if (look + 1 == kMostLookedAgain && largest_m > max_deviation_m_) return std::nullopt;
+    }
+    return holes;
+  }
+
+  static void addHole(Holes& holes, const std::array<int, 3>& cell, const LatticeParts& parts) {
+    holes.cells.insert(cell);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (const int step : {-1, 1}) {
+        std::array<int, 3> beside = cell;
+        beside[axis] += step;
+        if (beside[axis] >= 0 && beside[axis] < latticeCells(parts, axis)) holes.cells.insert(beside);
+      }
   }
 
   /// Of the points, those that the correction covers, with its displacement there.
@@ -146,8 +217,8 @@ class LatticeBaker {
     return coarse_m;
   }
 
-  Result<std::unique_ptr<BakedLattice>> finished(const BakedLattice& lattice, double deviation_m,
-                                                 std::size_t n_points) const {
+  Result<std::unique_ptr<BakedLattice>> finished(const BakedLattice& lattice, double deviation_m, std::size_t n_points,
+                                                 const Holes& holes) const {
     LatticeParts parts = lattice.parts();
     const bool with_uncertainty = !probes_.p_m.empty() && model_.uncertainty_m(probes_.p_m.front()).has_value();
     if (with_uncertainty) {
@@ -155,7 +226,11 @@ class LatticeBaker {
       parts = std::move(sampled);
     }
     markProbedCells(parts);
+    leaveOut(holes, parts);
     parts.note = noteOf(parts, deviation_m, n_points);
+    if (!holes.cells.empty())
+      parts.note += " Not covered by the lattice: " + shareText(holes.share) +
+                    " of the region, where the correction bends too sharply for it.";
     control_.progress(1.0);
     return std::make_unique<BakedLattice>(std::move(parts));
   }
@@ -164,13 +239,22 @@ class LatticeBaker {
   void markProbedCells(LatticeParts& parts) const {
     if (parts.covered.empty()) return;
     for (const Eigen::Vector3d& p_m : probes_.p_m) {
-      const Eigen::Vector3d t = (p_m - parts.origin_m) / parts.spacing_m;
-      std::array<int, 3> cell;
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        cell[axis] =
-            std::clamp(static_cast<int>(t[static_cast<Eigen::Index>(axis)]) - 1, 0, latticeCells(parts, axis) - 1);
-      parts.covered[latticeCellIndex(parts, cell)] = true;
+      parts.covered[latticeCellIndex(parts, cellAt(parts, p_m))] = true;
     }
+  }
+
+  static void leaveOut(const Holes& holes, LatticeParts& parts) {
+    if (holes.cells.empty()) return;
+    const auto n = static_cast<std::size_t>(latticeCells(parts, 0)) * static_cast<std::size_t>(latticeCells(parts, 1)) *
+                   static_cast<std::size_t>(latticeCells(parts, 2));
+    if (parts.covered.empty()) parts.covered.assign(n, true);
+    for (const std::array<int, 3>& cell : holes.cells) parts.covered[latticeCellIndex(parts, cell)] = false;
+  }
+
+  static std::string shareText(double share) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2g %%", 100.0 * share);
+    return text;
   }
 
   static std::string lengthText(double length_m) {

@@ -15,7 +15,8 @@ namespace fieldtrue::correctors {
 /// The lattice spans the bounding box of the places and twice the region's margin. Its coefficients come from samples
 /// by the five-point filter (1, -10, 54, -10, 1)/36 along each axis, so that every cubic polynomial is reproduced and a
 /// sharp bend reaches no farther than the samples around it. Samples that the correction does not cover are continued
-/// from those that it does.
+/// from those that it does. Where the finest lattice misses the bound in no more than a fiftieth of the region, those
+/// cells are left out: the lattice does not cover them, and its note says how much they are.
 /// @param region where the lattice must hold
 /// @param places_m tracked positions of the fit
 /// @param max_deviation_m bound of |baked - correction| [m]

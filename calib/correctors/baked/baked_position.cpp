@@ -63,7 +63,7 @@ double largestDeviation_m(const PositionModel& model, const PositionModel& baked
                           const RunControl& control) {
   std::vector<double> deviation_m(poses.size(), 0.0);
   control.parallel_for(poses.size(), [&](std::size_t i) {
-    if (model.covers(poses[i].position_m))
+    if (model.covers(poses[i].position_m) && baked.covers(poses[i].position_m))
       deviation_m[i] = (model.displacementAt_m(poses[i]) - baked.displacementAt_m(poses[i])).norm();
   });
   return deviation_m.empty() ? 0.0 : *std::max_element(deviation_m.begin(), deviation_m.end());

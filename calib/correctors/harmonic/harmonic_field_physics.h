@@ -25,8 +25,9 @@ class DisturbedField {
 
   std::span<const FieldSource> sources() const { return sources_; }
   /// @param p_true_m transmitter frame [m], not at the transmitter or at a source
-  Eigen::Matrix3d at(const Eigen::Vector3d& p_true_m) const;
-  Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m) const;
+  /// @param share of what the sources add
+  Eigen::Matrix3d at(const Eigen::Vector3d& p_true_m, double share = 1.0) const;
+  Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m, double share = 1.0) const;
   /// d tracked / d true, by central differences of 0.1 mm.
   Eigen::Matrix3d trackedJacobian(const Eigen::Vector3d& p_true_m) const;
   /// The place whose tracked position is the one given, by Broyden's method from there; where the field folds back and
@@ -50,10 +51,11 @@ class HeldField {
   /// Where the field counts for a true position: held at the box, and not the transmitter itself, where it has no
   /// value.
   Eigen::Vector3d heldPosition_m(const Eigen::Vector3d& p_true_m) const;
-  Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m) const;
+  Eigen::Vector3d trackedPosition_m(const Eigen::Vector3d& p_true_m, double share = 1.0) const;
   /// As DisturbedField::truePosition_m; where Broyden's method finds none, by Levenberg's and Marquardt's from the
-  /// tracked position and from the box's centre. While a field is being fitted that would find places far off, behind
-  /// sources that do not stay.
+  /// tracked position and from the box's centre. Where the way was not straight, several places may be tracked there:
+  /// it is the one that comes from the tracked position as the sources grow. While a field is being fitted that would
+  /// find places far off, behind sources that do not stay.
   /// @source Marquardt 1963, Journal of the Society for Industrial and Applied Mathematics 11 431
   Eigen::Vector3d truePosition_m(const Eigen::Vector3d& p_tracked_m) const;
 
