@@ -238,9 +238,7 @@ class LatticeBaker {
   /// A covered sliver between the samples leaves no trace in them.
   void markProbedCells(LatticeParts& parts) const {
     if (parts.covered.empty()) return;
-    for (const Eigen::Vector3d& p_m : probes_.p_m) {
-      parts.covered[latticeCellIndex(parts, cellAt(parts, p_m))] = true;
-    }
+    for (const Eigen::Vector3d& p_m : probes_.p_m) parts.covered[latticeCellIndex(parts, cellAt(parts, p_m))] = true;
   }
 
   static void leaveOut(const Holes& holes, LatticeParts& parts) {

@@ -1,5 +1,7 @@
 #include "calib/correctors/baked/turning_lattices.h"
 
+#include <algorithm>
+
 #include "calib/correctors/baked/baked_lattice.h"
 #include "calib/correctors/radial/rbf_field.h"
 #include "calib/correctors/radial/turn_correlation.h"
@@ -51,6 +53,12 @@ TurningLattices::TurningLattices(std::unique_ptr<PositionModel> still,
     : still_(std::move(still)), turning_(std::move(turning)), basis_(std::move(basis)) {
   FT_CHECK(turning_.size() == basis_.size() && basis_.size() <= TurnBasis::kMostFunctions);
   FT_CHECK(basis_.centers.size() <= TurnBasis::kMostCenters);
+}
+
+bool TurningLattices::covers(const Eigen::Vector3d& p_tracked_m) const {
+  return still_->covers(p_tracked_m) &&
+         std::all_of(turning_.begin(), turning_.end(),
+                     [&](const std::unique_ptr<PositionModel>& part) { return part->covers(p_tracked_m); });
 }
 
 Eigen::Vector3d TurningLattices::displacement_m(const Eigen::Vector3d& p_tracked_m) const {

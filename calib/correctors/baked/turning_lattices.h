@@ -45,7 +45,7 @@ class TurningLattices : public PositionModel {
   std::optional<double> uncertainty_m(const Eigen::Vector3d& p_tracked_m) const override {
     return still_->uncertainty_m(p_tracked_m);
   }
-  bool covers(const Eigen::Vector3d& p_tracked_m) const override { return still_->covers(p_tracked_m); }
+  bool covers(const Eigen::Vector3d& p_tracked_m) const override;
   std::string note() const override;
   nlohmann::json parameters() const override;
 
