@@ -128,7 +128,9 @@ class LatticeBaker {
     Holes holes;
     for (int look = 0; look < kMostLookedAgain; ++look) {
       if (control_.stop.stop_requested()) return std::nullopt;
-      const Probes probes = look == 0 ? probes_ : look == 1 ? cellCenters(lattice) : drawnProbes(1 + look, {});
+      const Probes probes = look == 0   ? probes_
+                            : look == 1 ? cellCenters(lattice)
+                                        : drawnProbes(1U + static_cast<std::uint64_t>(look), {});
       const std::size_t before = holes.cells.size();
       double largest_m = 0.0;
       std::size_t n_out = 0;
