@@ -103,10 +103,15 @@ double memory_bytes(std::size_t n_rows) {
   return 8.0 * kUnknowns * (3.0 * static_cast<double>(n_rows) + 2.0 * kUnknowns);
 }
 
-std::string noteOf(const FitData& data, const HarmonicFit& fit) {
+constexpr const char* kNoDisturbance = "No disturbance stands out from the noise: only the alignment is corrected";
+constexpr const char* kNoSuchField =
+    "No field of sources outside the places was found that leaves less than none: only the alignment is corrected";
+
+/// @param without_sources what is said where there are none
+std::string noteOf(const FitData& data, const HarmonicFit& fit, const char* without_sources) {
   const std::string plane = planeNote(data, "nothing is claimed off it");
   if (!plane.empty() || !fit.field.sources().empty()) return plane;
-  return "No disturbance stands out from the noise: only the alignment is corrected";
+  return without_sources;
 }
 
 double largestError_m(const FitData& data, const Pose& field_from_truth) {
@@ -127,6 +132,23 @@ SoftBox boxOf(const FitData& data, const HarmonicFit& fit) {
   return box;
 }
 
+std::unique_ptr<PositionModel> modelOf(const FitData& data, const HarmonicFit& fit, const char* without_sources) {
+  return std::make_unique<HarmonicField>(HeldField(fit.field, boxOf(data, fit)), fit.field_from_truth,
+                                         largestError_m(data, fit.field_from_truth), fit.posterior,
+                                         noteOf(data, fit, without_sources));
+}
+
+/// Of what a model leaves at the places; of what there is, without one.
+double squaresLeft_m2(const FitData& data, const PositionModel* model) {
+  double sum_m2 = 0.0;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const Eigen::Vector3d& p_m = data.p_tracked_m[i];
+    const Eigen::Vector3d move_m = model == nullptr ? Eigen::Vector3d::Zero() : model->displacement_m(p_m);
+    sum_m2 += (p_m + move_m - data.p_true_m[i]).squaredNorm();
+  }
+  return sum_m2;
+}
+
 Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Settings& settings,
                                                    const RunControl& control) {
   FT_TRY_VOID(checkPositions(data, kName));
@@ -135,9 +157,14 @@ Result<std::unique_ptr<PositionModel>> fitHarmonic(const FitData& data, const Se
                                   memory_bytes(data.size()), control.stop));
   const HarmonicOptions options{numberSetting(settings, "least_gain"),
                                 static_cast<std::size_t>(integerSetting(settings, "most_sources"))};
-  FT_TRY(auto fit, fitHarmonicField(data, options, control));
-  return std::make_unique<HarmonicField>(HeldField(fit.field, boxOf(data, fit)), fit.field_from_truth,
-                                         largestError_m(data, fit.field_from_truth), fit.posterior, noteOf(data, fit));
+  FT_TRY(const auto fit, fitHarmonicField(data, options, control));
+  auto model = modelOf(data, fit, kNoDisturbance);
+  if (fit.field.sources().empty() || squaresLeft_m2(data, model.get()) <= squaresLeft_m2(data, nullptr)) return model;
+  // Readings that no dipole tracker gives can lead the fit to a field that folds back over most of them.
+  HarmonicOptions without = options;
+  without.most_sources = 0;
+  FT_TRY(const auto rigid, fitHarmonicField(data, without, control));
+  return modelOf(data, rigid, kNoSuchField);
 }
 
 FieldPosterior posteriorFrom(const JsonReader& parameters, const std::vector<FieldSource>& sources) {

@@ -100,6 +100,26 @@ class HarmonicFloorTest : public QObject {
     }
   }
 
+  /// Stretched, bent and swaying as no dipole tracker is: a field that makes it worse at the places themselves is none.
+  void leavesNoMoreThanNothing() {
+    for (unsigned seed = 1; seed <= 12; ++seed) {
+      RandomGeometry random(seed);
+      FitData data;
+      for (int i = 0; i < 60; ++i) {
+        const Eigen::Vector3d p_m(random.between(0.6, 2.6), random.between(-1.0, 1.0), random.between(-0.8, 0.8));
+        data.p_true_m.push_back(p_m);
+        data.p_tracked_m.emplace_back(1.3 * p_m.x() + 0.1 * p_m.y() * p_m.y(), 1.2 * p_m.y(),
+                                      p_m.z() + 0.3 * std::sin(2.0 * p_m.x()));
+        data.node.push_back(i);
+      }
+      const Pose motion = fitRigid(data.p_true_m, data.p_tracked_m).value();
+      for (Eigen::Vector3d& p_m : data.p_true_m) p_m = motion * p_m;
+      const auto model = fitPosition("harmonic_field", data);
+      FT_VERIFY_OK(model);
+      QVERIFY2(rmsOf_m(data, model->get()) <= rmsOf_m(data, nullptr) + 1e-9, qPrintable(QString::number(seed)));
+    }
+  }
+
   /// Beside strong sources several places are tracked to one reading. The one that is meant goes on from the reading as
   /// the sources grow, which is followed here in forty parts by Newton's method.
   void findsThePlaceThatGrowsFromTheReading() {
