@@ -11,6 +11,7 @@
 #include "calib/correctors/harmonic/harmonic_field_choices.h"
 #include "calib/correctors/harmonic/harmonic_field_evidence.h"
 #include "calib/correctors/harmonic/harmonic_field_sites.h"
+#include "calib/correctors/harmonic/harmonic_field_step.h"
 #include "calib/field/dipole_field.h"
 #include "calib/field/tracker_model.h"
 
@@ -21,23 +22,6 @@ constexpr int kMostSteps = 30;
 constexpr int kStepsOnceFinal = 6;           ///< By then it has settled, or never will.
 constexpr double kSettled = 0.04;            ///< Of the noise's SD.
 constexpr std::size_t kCandidatesKept = 60;  ///< Of the first step's, by what each would still add.
-
-/// The linear model of one step, rows whitened, unknowns scaled so that each source moves the places by about its
-/// amplitude.
-struct Linearisation {
-  Eigen::MatrixXd design;                          ///< d corrected / d amplitude, 3 rows a place.
-  Eigen::Matrix<double, Eigen::Dynamic, 6> rigid;  ///< d corrected / d (shift, turn) that does the same to the truth.
-  Eigen::VectorXd y;                               ///< True minus corrected, plus what the present amplitudes do.
-  Eigen::VectorXd present_effect;                  ///< What the present amplitudes do.
-  std::vector<double> scale;                       ///< Of each source: amplitude over tensor.
-};
-
-/// Sources of the field found so far.
-struct Chosen {
-  std::vector<Eigen::Index> sites;  ///< Into the candidates.
-  std::vector<TensorAmplitudes> tensors;
-  std::vector<double> variances;  ///< Prior variance of each tensor.
-};
 
 /// How a fit goes from step to step. Neither way is the surer one: where one goes astray, the other may not.
 enum class Way {
@@ -67,7 +51,7 @@ class Fitter {
     for (int step = 0; step < kMostSteps && n_final < kStepsOnceFinal; ++step) {
       n_final += is_choice_final_ ? 1 : 0;
       if (control_.stop.stop_requested()) return fail(ErrorCode::kCancelled, "The harmonic field's fit was stopped");
-      const double moved_m = improve(linearise(step == 0 ? firstRows() : rowsAtField()), step);
+      const double moved_m = improve(linearisedAt(step == 0 ? firstRows() : rowsAtField()), step);
       control_.progress(static_cast<double>(step + 1) / kMostSteps);
       // Where no tolerance is stated jig_sd_m_ is all that a rigid motion leaves, which is no measure of the noise.
       if (step > 0 && moved_m < kSettled * std::sqrt(std::min(1.0, noise_factor_)) * jig_sd_m_) break;
@@ -135,43 +119,8 @@ class Fitter {
     return factor.inverse();
   }
 
-  Linearisation linearise(const std::vector<PlaceRow>& rows) const {
-    const auto n = static_cast<Eigen::Index>(rows.size());
-    const auto n_sites = static_cast<Eigen::Index>(sites_.size());
-    Linearisation linear;
-    linear.design.resize(3 * n, kPerSource * n_sites);
-    linear.rigid.resize(3 * n, 6);
-    linear.y.resize(3 * n);
-    linear.scale.resize(sites_.size());
-    control_.parallel_for(sites_.size(), [&](std::size_t s) {
-      auto columns = linear.design.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(s));
-      const SourceBasis source(sites_[s].at_m);
-      double sum = 0.0;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const PlaceRow& row = rows[static_cast<std::size_t>(i)];
-        const Eigen::Matrix<double, 3, kPerSource> effect = effectOfSource(row.derivative, source);
-        sum += effect.squaredNorm();
-        columns.middleRows<3>(3 * i).noalias() = row.whitening * effect;
-      }
-      linear.scale[s] = std::sqrt(sum / static_cast<double>(n));
-      columns /= linear.scale[s];
-    });
-    linear.present_effect = Eigen::VectorXd::Zero(3 * n);
-    for (std::size_t k = 0; k < chosen_.sites.size(); ++k)
-      linear.present_effect += linear.design.middleCols<kPerSource>(kPerSource * chosen_.sites[k]) *
-                               (linear.scale[static_cast<std::size_t>(chosen_.sites[k])] * chosen_.tensors[k]);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const PlaceRow& row = rows[static_cast<std::size_t>(i)];
-      const Eigen::Vector3d p_true_m = row.derivative.at_m + row.true_minus_corrected_m;
-      linear.rigid.middleRows<3>(3 * i) = row.whitening * effectOfMotion(p_true_m, center_m_);
-      linear.y.segment<3>(3 * i) = row.whitening * row.true_minus_corrected_m;
-    }
-    linear.y += linear.present_effect;
-    // What has come to stand among the places is not offered again.
-    for (std::size_t s = 0; s < sites_.size(); ++s)
-      if (!isAllowedSite(sites_[s], box_))
-        linear.design.middleCols<kPerSource>(kPerSource * static_cast<Eigen::Index>(s)).setZero();
-    return linear;
+  Linearisation linearisedAt(const std::vector<PlaceRow>& rows) const {
+    return linearised(rows, sites_, chosen_, box_, center_m_, control_);
   }
 
   /// How far the truth is from the positions that a field corrects, after the best rigid motion.
@@ -216,14 +165,15 @@ class Fitter {
   GroupSelection choose(const GroupedSystem& system, const Linearisation& linear) const {
     constexpr double kNear = 0.25;                                           // Of the mean square without sources.
     const auto n_present = static_cast<Eigen::Index>(chosen_.sites.size());  // The first candidates, see refine().
-    GroupSelectionOptions options{options_.least_gain, options_.most_sources,
-                                  noiseForStep(),      data_.jig_sd_m <= 0.0,
-                                  n_present,           is_choice_final_ ? variancesIn(linear) : std::vector<double>()};
+    GroupSelectionOptions options{
+        options_.least_gain, options_.most_sources,
+        noiseForStep(),      data_.jig_sd_m <= 0.0,
+        n_present,           is_choice_final_ ? variancesIn(linear, chosen_) : std::vector<double>()};
     GroupSelection found = selectGroups(system, options, control_);
     const auto n_missed = n_present - static_cast<Eigen::Index>(found.groups.size());
     if (way_ == Way::kBold || is_choice_final_ || n_missed <= 0 || misfit_m2_ > kNear * without_sources_m2_)
       return found;
-    options.chosen_variances = variancesIn(linear);
+    options.chosen_variances = variancesIn(linear, chosen_);
     GroupSelection present = selectGroups(system, options, control_);
     const double gain_nats = 0.5 * system.n_rows() * std::log(noiseOf(found) / noiseOf(present));
     const double cost_nats = 0.5 * static_cast<double>(kPerChosen * n_missed) * std::log(system.n_rows());
@@ -288,48 +238,6 @@ class Fitter {
     if (!whole) field_from_truth_ = misfit.field_from_truth;
     take(std::move(misfit));
     return whole;
-  }
-
-  /// Prior variances of the sources chosen, in a step's scale.
-  std::vector<double> variancesIn(const Linearisation& linear) const {
-    std::vector<double> variances;
-    for (std::size_t k = 0; k < chosen_.sites.size(); ++k) {
-      const double scale = linear.scale[static_cast<std::size_t>(chosen_.sites[k])];
-      variances.push_back(chosen_.variances[k] * scale * scale);
-    }
-    return variances;
-  }
-
-  static Chosen chosenBy(const GroupSelection& selection, const Linearisation& linear) {
-    Chosen chosen;
-    chosen.sites = selection.groups;
-    for (std::size_t k = 0; k < chosen.sites.size(); ++k) {
-      const double scale = linear.scale[static_cast<std::size_t>(chosen.sites[k])];
-      chosen.tensors.push_back(selection.amplitudes.segment(kPerSource * static_cast<Eigen::Index>(k), kPerSource) /
-                               scale);
-      chosen.variances.push_back(selection.prior_variance[static_cast<Eigen::Index>(k)] / (scale * scale));
-    }
-    return chosen;
-  }
-
-  static Chosen blended(const Chosen& before, const Chosen& after, double share) {
-    Chosen blend;
-    const auto add = [&blend](const Chosen& part, double weight) {
-      for (std::size_t k = 0; k < part.sites.size(); ++k) {
-        const auto found = std::find(blend.sites.begin(), blend.sites.end(), part.sites[k]);
-        const auto at = static_cast<std::size_t>(found - blend.sites.begin());
-        if (found == blend.sites.end()) {
-          blend.sites.push_back(part.sites[k]);
-          blend.tensors.push_back(weight * part.tensors[k]);
-          blend.variances.push_back(part.variances[k]);
-        } else {
-          blend.tensors[at] += weight * part.tensors[k];
-        }
-      }
-    };
-    add(after, share);
-    add(before, 1.0 - share);
-    return blend;
   }
 
   void forgetSources() {
