@@ -25,11 +25,16 @@ constexpr int kBrowserMs = 60000;
 constexpr int kA4_px = 702;
 
 /// Puts what does not fit into the document's attribute `data-cut`: how far the page, or a part that would scroll or
-/// hide, is wider than its room.
+/// hide, is wider than its room. On a busy machine fonts still change after the page is loaded, so that what was
+/// measured last counts.
 constexpr const char* kMeasure = R"(<script>
-window.addEventListener('load', function () {  // Before that fonts may still be changing.
-var cut = [];
+window.addEventListener('load', function () {
 document.querySelectorAll('details').forEach(function (d) { d.open = true; });
+document.fonts.ready.then(measure);
+setInterval(measure, 500);
+});
+function measure() {
+var cut = [];
 var page = document.documentElement;
 if (page.scrollWidth > page.clientWidth) cut.push('page ' + page.scrollWidth + ' in ' + page.clientWidth);
 document.querySelectorAll('body *').forEach(function (e) {
@@ -39,7 +44,7 @@ document.querySelectorAll('body *').forEach(function (e) {
     cut.push(e.tagName + ' ' + e.scrollWidth + ' in ' + e.clientWidth + ': ' + e.textContent.slice(0, 30));
 });
 page.setAttribute('data-cut', cut.length + ' parts. ' + cut.slice(0, 5).join('; '));
-});
+}
 </script></body>)";
 
 QString browser() { return QStandardPaths::findExecutable(QStringLiteral("chromium")); }
@@ -123,7 +128,8 @@ class ReportLayoutTest : public QObject {
     QProcess chromium;
     chromium.start(browser(), {"--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
                                "--disable-background-networking", "--disable-component-update", "--disable-sync",
-                               "--hide-scrollbars", "--user-data-dir=" + folder_.filePath(QStringLiteral("profile")),
+                               "--hide-scrollbars", "--virtual-time-budget=5000",
+                               "--user-data-dir=" + folder_.filePath(QStringLiteral("profile")),
                                QStringLiteral("--window-size=%1,900").arg(width), "--dump-dom", "file://" + path});
     QVERIFY2(chromium.waitForFinished(kBrowserMs), qPrintable(chromium.errorString()));
     const QString page = QString::fromUtf8(chromium.readAllStandardOutput());
