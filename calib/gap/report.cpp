@@ -41,9 +41,11 @@ bool isNameless(const std::string& effect) {
   return effect == "none" || effect == kUnnamedSmooth || effect == kUnnamedScattered;
 }
 
-bool isSureOfMost(const GapReport& report) {
-  return !report.selected.empty() && report.remaining.high90 &&
-         *report.remaining.high90 < identify::Thresholds{}.unexplained_left;
+bool isSurelyExplained(const GapReport& report) {
+  const identify::Thresholds thresholds;
+  const Remaining& left = report.remaining;
+  return !report.selected.empty() && left.low90 && left.high90 && *left.high90 <= thresholds.partly_left &&
+         *left.high90 - *left.low90 <= thresholds.unexplained_left - thresholds.partly_left;
 }
 
 std::string howFarOffText(const GapReport& report) {

@@ -252,9 +252,10 @@ struct GapReport {
   std::vector<Prediction> predictions;
 };
 
-/// Whether the selected causes take more than half of the squared gap, 95 % sure; where not, *explained* means only
-/// that these places show nothing else.
-bool isSureOfMost(const GapReport& report);
+/// Whether the selected causes leave no more of the squared gap than *explained* allows, 95 % sure, by an interval that
+/// is narrower than what is between that and *unexplained*; where not, the word means only that these places show
+/// nothing else.
+bool isSurelyExplained(const GapReport& report);
 
 /// One sentence: how far readings lie off that no fit saw, with the causes that are named added: the middle, 90 and 95
 /// % of them, and the worst.

@@ -80,6 +80,13 @@ std::string fallText(const GapReport& report) {
          " at most, 95 % sure)";
 }
 
+std::string reservedText(const GapReport& report) {
+  const std::optional<double>& most_left = report.remaining.high90;
+  const bool is_most = !most_left || *most_left > identify::Thresholds{}.unexplained_left;
+  return ", as far as these places can tell; " + fallText(report) + ", so " +
+         (is_most ? "more than half" : "a smaller part") + " may have another cause";
+}
+
 }  // namespace
 
 double scatteredShare(const identify::GapSearch& search, const identify::GapRows& stated, const GapReport& report) {
@@ -153,10 +160,7 @@ std::string verdictText(const GapReport& report, const std::string& thing) {
              plainText(report.position_rms_mm, report.floor_position_mm, "mm") + ").";
     case GapVerdict::kExplained:
       return "The " + thing + " (" + gap + ") is explained by: " + causesText(report) +
-             (isSureOfMost(report) ? "; " + fallText(report)
-                                   : ", as far as these places can tell; " + fallText(report) +
-                                         ", so more than half may have another cause") +
-             ".";
+             (isSurelyExplained(report) ? "; " + fallText(report) : reservedText(report)) + ".";
     case GapVerdict::kPartlyExplained:
       return "The " + thing + " (" + gap + ") is partly explained by: " + causesText(report) + "; " + fallText(report) +
              ", the rest has another cause.";

@@ -49,6 +49,7 @@ class BlindJudgementTest : public QObject {
   void onlyEffectsAreNamed();
   void stopsAtWhatAnAnswerExplains();
   void unforeseenKindsByHand();
+  void explainedWithoutReserveByHand();
   void controlsAreHeldToWhatIsWanted();
 };
 
@@ -121,6 +122,41 @@ void BlindJudgementTest::unforeseenKindsByHand() {
   QCOMPARE(figureOf(board, section, "a body of metal named from rho 1.4 up, by kind", "new:b").value, 0.9);
   QCOMPARE(figureOf(board, section, "true causes of the catalogue so called", "rho 1.4").value, 0.5);
   QCOMPARE(board.confusion.counts.at("outside the catalogue").at("unexplained"), std::size_t(10));
+}
+
+/// Of five causes called explained the interval of two ends where the word does and is not wide; one of these leaves
+/// 0.3.
+void BlindJudgementTest::explainedWithoutReserveByHand() {
+  std::vector<Session> sessions;
+  const auto add = [&](std::optional<double> low90, std::optional<double> high90, double left) {
+    sessions.push_back(answeredSession("single", "coil_gain", "explained", {"coil_gain"}));
+    sessions.back().answer.remaining_low90 = low90;
+    sessions.back().answer.remaining_high90 = high90;
+    sessions.back().answer.left_inside = left;
+  };
+  add(-0.1, 0.15, 0.1);
+  add(0.05, 0.1, 0.3);
+  add(0.1, 0.2, 0.3);
+  add(-0.3, 0.1, 0.05);
+  add({}, {}, 0.05);
+  sessions.push_back(answeredSession("single", "coil_gain", "partly_explained", {"coil_gain"}));
+  sessions.back().answer.remaining_low90 = sessions.back().answer.remaining_high90 = 0.1;
+  sessions.push_back(answeredSession("off", "off:a", "explained", {"coil_gain"}));
+  sessions.back().answer.remaining_low90 = 0.1;
+  sessions.back().answer.remaining_high90 = 0.9;
+  sessions.back().answer.left_inside = 0.6;
+  sessions.push_back(sessions.back());
+  sessions.back().answer.remaining_high90 = 0.1;
+  const Scoreboard board = scoreboardOf(sessions);
+  const auto share = [&](const std::string& section, const std::string& name) {
+    return figureOf(board, section, name, "all");
+  };
+  const std::string foretold = "At places that no table held";
+  QCOMPARE(share(foretold, "called explained without reserve").value, 2.0 / 6.0);
+  QCOMPARE(share(foretold, "called explained without reserve").count, std::size_t(6));
+  QCOMPARE(share(foretold, "of these, more than 0.15 is left").value, 0.5);
+  QCOMPARE(share("Outside", "called explained, and more than half is left").value, 1.0);
+  QCOMPARE(share("Outside", "so called without reserve, and more than half is left").value, 0.5);
 }
 
 void BlindJudgementTest::controlsAreHeldToWhatIsWanted() {

@@ -39,6 +39,8 @@ void addForetold(std::vector<Figure>& figures, const Sessions& single) {
                       return off && std::abs(*off) <= 0.1;
                     },
                     {std::nullopt, std::nullopt, atLeast(0.9), atLeast(0.9)});
+  section.addShares("called explained without reserve", single, explainsSurely);
+  section.addShares("of these, more than 0.15 is left", where(single, explainsSurely), leavesAPart);
 }
 
 }  // namespace blind

@@ -25,8 +25,12 @@ bool isForetold(const Session& session) {
 /// @param share of sessions that pass a test, with its interval
 template <class Share>
 void addOtherAnswers(Section& section, const Sessions& some, const Share& share) {
-  if (!where(some, isForetold).empty())
+  if (!where(some, isForetold).empty()) {
     section.addByStrength("called explained, and more than half is left", "share", some, share(explainsInVain));
+    section.addByStrength(
+        "so called without reserve, and more than half is left", "share", some,
+        share([](const Session& session) { return explainsSurely(session) && explainsInVain(session); }));
+  }
   section.addByStrength("called no_gap", "share", some, share(isSilent));
 }
 

@@ -7,6 +7,10 @@
 namespace blind {
 namespace {
 
+/// Shares of the excess above which the file contract calls it partly explained, and unexplained.
+constexpr double kPartlyLeft = 0.15;
+constexpr double kMostLeft = 0.5;
+
 constexpr std::array<std::string_view, 3> kFloorEffects = {"range_noise", "correlated_samples", "quantization"};
 constexpr std::array<std::string_view, 5> kSignalEffects = {"range_noise", "correlated_samples", "quantization",
                                                             "mains_interference", "hemisphere_flip"};
@@ -191,10 +195,20 @@ std::optional<double> leftWidth(const Session& session) {
 }
 
 bool explainsInVain(const Session& session) {
-  constexpr double kHalf = 0.5;
   const Answer& answer = session.answer;
   if (!answer.is_answered || answer.verdict != "explained") return false;
-  return answer.cannot_be_simulated || (answer.left_inside && *answer.left_inside > kHalf);
+  return answer.cannot_be_simulated || (answer.left_inside && *answer.left_inside > kMostLeft);
+}
+
+bool explainsSurely(const Session& session) {
+  const Answer& answer = session.answer;
+  return answer.is_answered && answer.verdict == "explained" && answer.remaining_low90 && answer.remaining_high90 &&
+         *answer.remaining_high90 <= kPartlyLeft &&
+         *answer.remaining_high90 - *answer.remaining_low90 <= kMostLeft - kPartlyLeft;
+}
+
+bool leavesAPart(const Session& session) {
+  return session.answer.cannot_be_simulated || session.answer.left_inside.value_or(0.0) > kPartlyLeft;
 }
 
 std::optional<double> leftStatedOff(const Session& session) {

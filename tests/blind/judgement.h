@@ -76,6 +76,11 @@ std::optional<double> leftWidth(const Session& session);
 /// Whether all is called explained while `foretell` found more than half of the excess left inside, or a scene that
 /// cannot be simulated.
 bool explainsInVain(const Session& session);
+/// Whether all is called explained without reserve: the stated interval of what is left ends where the word does, and
+/// is not wide.
+bool explainsSurely(const Session& session);
+/// Whether `foretell` found more left inside than *explained* allows.
+bool leavesAPart(const Session& session);
 /// Stated less found share of what is left inside.
 std::optional<double> leftStatedOff(const Session& session);
 

@@ -175,7 +175,7 @@ std::string gapHeadline(const gap::GapReport& report) {
       return is_change ? "Nothing changed since the earlier recording" : "The simulation matches the recording";
     case gap::GapVerdict::kExplained:
       return std::string(is_change ? "Changed, and explained" : "Explained") +
-             (gap::isSureOfMost(report) ? "" : " as far as these places can tell") + names;
+             (gap::isSurelyExplained(report) ? "" : " as far as these places can tell") + names;
     case gap::GapVerdict::kPartlyExplained:
       return (is_change ? "Changed, and partly explained" : "Partly explained") + names;
     case gap::GapVerdict::kUnexplained:

@@ -418,8 +418,9 @@ void GapPage::showWords() {
                          ? tr("The simulation holds %n effect(s).", nullptr, static_cast<int>(scene_->effects.size()))
                          : tr("The simulation is an ideal tracker in free space."));
   const std::optional<gap::GapReport>& report = shown();
-  const bool matches = report_ && (report_->verdict == gap::GapVerdict::kNoGap ||
-                                   (report_->verdict == gap::GapVerdict::kExplained && gap::isSureOfMost(*report_)));
+  const bool matches =
+      report_ && (report_->verdict == gap::GapVerdict::kNoGap ||
+                  (report_->verdict == gap::GapVerdict::kExplained && gap::isSurelyExplained(*report_)));
   header_->setProperty("state", !report_ ? "" : matches ? "apply" : "leave");
   for (QWidget* widget : {header_, static_cast<QWidget*>(headline_)}) restyle(*widget);
   QString next;

@@ -53,8 +53,9 @@ class GapVerdictTest : public QObject {
     QVERIFY(verdictOf(leaving(value, low90), false, false, {}) == GapVerdict::kNoGap);
   }
 
-  /// A wide interval leaves the verdict, and is told: half of what was there, and perhaps all of it, may be left.
-  void saysWhereMostMayBeLeft() {
+  /// A wide interval leaves the verdict, and is told: half of what was there, or more than the verdict allows, may be
+  /// left.
+  void saysWhereMuchMayBeLeft() {
     GapReport report;
     report.verdict = GapVerdict::kExplained;
     SelectedEffect plate;
@@ -64,18 +65,31 @@ class GapVerdictTest : public QObject {
     report.remaining.excess2_before_mm2 = 400.0;
     report.remaining.fraction = 0.25;
     const QString unsure = "as far as these places can tell; on places the fit did not see";
+    report.remaining.low90 = 0.0;
     for (const Left high90 : {Left(0.64), Left()}) {
       report.remaining.high90 = high90;
-      QVERIFY(!isSureOfMost(report));
+      QVERIFY(!isSurelyExplained(report));
       const QString text = QString::fromStdString(verdictText(report, "gap"));
       QVERIFY2(text.contains(unsure) && text.endsWith("so more than half may have another cause."), qPrintable(text));
     }
     report.remaining.high90 = 0.36;
-    QVERIFY(isSureOfMost(report));
+    QVERIFY(!isSurelyExplained(report));
+    const QString reserved = QString::fromStdString(verdictText(report, "gap"));
+    QVERIFY2(reserved.contains(unsure) && reserved.endsWith("goes from 20 mm to 10 mm (12 mm at most, 95 % sure), so a "
+                                                            "smaller part may have another cause."),
+             qPrintable(reserved));
+    report.remaining.fraction = 0.0625;
+    report.remaining.high90 = 0.1225;
+    QVERIFY(isSurelyExplained(report));
     const QString text = QString::fromStdString(verdictText(report, "gap"));
-    QVERIFY2(text.endsWith("goes from 20 mm to 10 mm (12 mm at most, 95 % sure)."), qPrintable(text));
+    QVERIFY2(text.endsWith("plate; on places the fit did not see, what stands above the noise goes from 20 mm to 5 mm "
+                           "(7 mm at most, 95 % sure)."),
+             qPrintable(text));
+    report.remaining.low90 = -0.3;  // Too wide.
+    QVERIFY(!isSurelyExplained(report));
+    report.remaining.low90 = 0.0;
     report.selected.clear();
-    QVERIFY(!isSureOfMost(report));
+    QVERIFY(!isSurelyExplained(report));
   }
 
   /// The figures in brackets show the gap: by size, by rotation, or neither, where only its structure does.
