@@ -25,8 +25,11 @@ double unmodelledPlaceSd_m(const effects::FittedEffect& fitted, const identify::
   return std::min(sd_m, thresholds.widest_place_m);
 }
 
-/// No interval of a searched parameter reaches beyond where it may be searched.
+/// No interval of a searched parameter reaches beyond where it may be searched, and no radius is below nothing.
 void keepWithinSearch(const effects::EffectFit& fit, GapCandidate& candidate) {
+  for (Estimate& estimate : candidate.parameters)
+    if (estimate.name == "radius_m" && estimate.low90 && estimate.value >= 0.0)
+      estimate.low90 = std::max(*estimate.low90, 0.0);
   for (const effects::FitParameter& bound : fit.searched()) {
     for (Estimate& estimate : candidate.parameters) {
       if (estimate.name != bound.name || !estimate.low90 || !estimate.high90) continue;

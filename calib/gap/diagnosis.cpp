@@ -58,6 +58,12 @@ void addSequence(const HowFar& far, GapReport& report) {
     return added;
   };
   for (std::size_t s = 0; s < far.excess_m2.size(); ++s) report.sequence.push_back(step(s));
+  // What is left in the end has one interval, that of the verdict.
+  const Bounded left = far.remaining();
+  const double start_m2 = far.excess_m2.front().value;
+  if (far.by_rotation || report.selected.empty() || !left.low90 || !left.high90 || !(start_m2 > 0.0)) return;
+  report.sequence.back().low90_mm = signedRoot_mm(*left.low90 * start_m2);
+  report.sequence.back().high90_mm = signedRoot_mm(*left.high90 * start_m2);
 }
 
 Remaining remainingOf(const HowFar& far, const identify::GapRows& rows, const identify::Thresholds& thresholds) {

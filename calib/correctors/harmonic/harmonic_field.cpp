@@ -39,12 +39,14 @@ Eigen::Vector3d believed_m(const Eigen::Vector3d& shift_m, double largest_m) {
 class HarmonicField : public PositionModel {
  public:
   /// @param largest_m distance of a reading from the truth, at the places fitted
-  HarmonicField(HeldField field, const Pose& field_from_truth, double largest_m, FieldPosterior posterior,
-                std::string note)
+  /// @param unmodelled_m RMS of what noise and tolerance leave unexplained there
+  HarmonicField(HeldField field, const Pose& field_from_truth, double largest_m, double unmodelled_m,
+                FieldPosterior posterior, std::string note)
       : field_(std::move(field)),
         field_from_truth_(field_from_truth),
         truth_from_field_(inverse(field_from_truth)),
         largest_m_(largest_m),
+        unmodelled_m_(unmodelled_m),
         posterior_(std::move(posterior)),
         note_(std::move(note)) {}
 
@@ -60,7 +62,7 @@ class HarmonicField : public PositionModel {
     const Eigen::Vector3d shift_m = p_m - p_tracked_m;
     const double disbelieved_m = (shift_m - believed_m(shift_m, largest_m_)).norm();
     const PlaceDerivative place = PlaceDerivative::at(field_.field(), field_.heldPosition_m(p_m));
-    return std::min(std::hypot(kOfChoice * posterior_.sd_m(place), disbelieved_m),
+    return std::min(std::hypot(kOfChoice * posterior_.sd_m(place), disbelieved_m, unmodelled_m_),
                     kOfChoice * std::hypot(posterior_.sdOfMotion_m(p_m), kMostOfLargest * largest_m_));
   }
 
@@ -82,6 +84,7 @@ class HarmonicField : public PositionModel {
             {"turned_about_m", jsonOf(posterior_.about_m)},
             {"covariance_root", std::move(root)},
             {"largest_m", largest_m_},
+            {"unmodelled_m", unmodelled_m_},
             {"low_m", jsonOf(field_.box().low_m)},
             {"high_m", jsonOf(field_.box().high_m)},
             {"reach_m", field_.box().reach_m},
@@ -93,6 +96,7 @@ class HarmonicField : public PositionModel {
   Pose field_from_truth_;
   Pose truth_from_field_;
   double largest_m_;
+  double unmodelled_m_;
   FieldPosterior posterior_;
   std::string note_;
 };
@@ -132,10 +136,34 @@ SoftBox boxOf(const FitData& data, const HarmonicFit& fit) {
   return box;
 }
 
+/// What a field leaves at the places beyond what their noise and tolerance allow, as an RMS: by the distance below
+/// which nine in ten are, so that a few slips of the hand do not count. Nothing where no tolerance is stated, nor where
+/// it is no more than places of so many scatter by.
+double unmodelled_m(const FitData& data, const HarmonicFit& fit, const HeldField& field) {
+  constexpr double kNineInTen = 6.2514 / 3.0;  // Quantile of chi-square of three over three.
+  constexpr double kStandsOut = 2.0;           // Of the variance.
+  if (!(data.jig_sd_m > 0.0)) return 0.0;
+  std::vector<double> squares_m2;
+  double noise_m2 = 3.0 * data.jig_sd_m * data.jig_sd_m;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    squares_m2.push_back(
+        (field.truePosition_m(data.p_tracked_m[i]) - fit.field_from_truth * data.p_true_m[i]).squaredNorm());
+    if (!data.noise_m2.empty()) noise_m2 += data.noise_m2[i].trace() / static_cast<double>(data.size());
+  }
+  const auto ninth = squares_m2.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(squares_m2.size()));
+  std::nth_element(squares_m2.begin(), ninth, squares_m2.end());
+  const double left_m2 = *ninth / kNineInTen;
+  return left_m2 > kStandsOut * noise_m2 ? std::sqrt(left_m2 - noise_m2) : 0.0;
+}
+
+/// @param without_sources what is said where there are none
 std::unique_ptr<PositionModel> modelOf(const FitData& data, const HarmonicFit& fit, const char* without_sources) {
-  return std::make_unique<HarmonicField>(HeldField(fit.field, boxOf(data, fit)), fit.field_from_truth,
-                                         largestError_m(data, fit.field_from_truth), fit.posterior,
-                                         noteOf(data, fit, without_sources));
+  HeldField field(fit.field, boxOf(data, fit));
+  const double more_m = unmodelled_m(data, fit, field);
+  const char* const why = more_m > 0.0 ? kNoSuchField : without_sources;
+  return std::make_unique<HarmonicField>(std::move(field), fit.field_from_truth,
+                                         largestError_m(data, fit.field_from_truth), more_m, fit.posterior,
+                                         noteOf(data, fit, why));
 }
 
 /// Of what a model leaves at the places; of what there is, without one.
@@ -196,9 +224,12 @@ std::unique_ptr<PositionModel> readHarmonicFieldPosition(const JsonReader& param
   if (!(box.reach_m >= 0.0)) parameters["reach_m"].refuse("0 or above");
   const double largest_m = parameters["largest_m"].number();
   if (!(largest_m >= 0.0)) parameters["largest_m"].refuse("0 or above");
+  const auto more = parameters.find("unmodelled_m");  // Earlier versions did not tell.
+  const double more_m = more ? more->number() : 0.0;
+  if (!(more_m >= 0.0)) more->refuse("0 or above");
   FieldPosterior posterior = posteriorFrom(parameters, sources);
   return std::make_unique<HarmonicField>(HeldField(DisturbedField(std::move(sources)), box),
-                                         parameters["field_from_truth"].pose(), largest_m, std::move(posterior),
+                                         parameters["field_from_truth"].pose(), largest_m, more_m, std::move(posterior),
                                          parameters["note"].text());
 }
 
