@@ -79,16 +79,17 @@ class HarmonicField : public PositionModel {
     for (Eigen::Index row = 0; row < posterior_.root.rows(); ++row)
       for (Eigen::Index column = row; column < posterior_.root.cols(); ++column)
         root.push_back(posterior_.root(row, column));
-    return {{"sources", jsonOf(sources)},
-            {"field_from_truth", jsonOf(field_from_truth_)},
-            {"turned_about_m", jsonOf(posterior_.about_m)},
-            {"covariance_root", std::move(root)},
-            {"largest_m", largest_m_},
-            {"unmodelled_m", unmodelled_m_},
-            {"low_m", jsonOf(field_.box().low_m)},
-            {"high_m", jsonOf(field_.box().high_m)},
-            {"reach_m", field_.box().reach_m},
-            {"note", note_}};
+    nlohmann::json stored = {{"sources", jsonOf(sources)},
+                             {"field_from_truth", jsonOf(field_from_truth_)},
+                             {"turned_about_m", jsonOf(posterior_.about_m)},
+                             {"covariance_root", std::move(root)},
+                             {"largest_m", largest_m_},
+                             {"low_m", jsonOf(field_.box().low_m)},
+                             {"high_m", jsonOf(field_.box().high_m)},
+                             {"reach_m", field_.box().reach_m},
+                             {"note", note_}};
+    if (unmodelled_m_ > 0.0) stored["unmodelled_m"] = unmodelled_m_;
+    return stored;
   }
 
  private:
@@ -224,7 +225,7 @@ std::unique_ptr<PositionModel> readHarmonicFieldPosition(const JsonReader& param
   if (!(box.reach_m >= 0.0)) parameters["reach_m"].refuse("0 or above");
   const double largest_m = parameters["largest_m"].number();
   if (!(largest_m >= 0.0)) parameters["largest_m"].refuse("0 or above");
-  const auto more = parameters.find("unmodelled_m");  // Earlier versions did not tell.
+  const auto more = parameters.find("unmodelled_m");
   const double more_m = more ? more->number() : 0.0;
   if (!(more_m >= 0.0)) more->refuse("0 or above");
   FieldPosterior posterior = posteriorFrom(parameters, sources);

@@ -146,6 +146,9 @@ class HarmonicFloorTest : public QObject {
       n_within += error_m < kNineInTen * (*model)->uncertainty_m(p_m).value() ? 1 : 0;
     }
     QVERIFY2(n_within >= 15, qPrintable(QString("%1 of 20").arg(n_within)));
+    const auto read = findPositionMethod("harmonic_field").value()->load((*model)->parameters());
+    FT_VERIFY_OK(read);
+    QCOMPARE((*read)->uncertainty_m(fresh.p_tracked_m[0]), (*model)->uncertainty_m(fresh.p_tracked_m[0]));
   }
 
   /// Beside strong sources several places are tracked to one reading. The one that is meant goes on from the reading as
