@@ -151,6 +151,17 @@ class ReportContractTest : public QObject {
     QVERIFY(isNear(remaining["excess2_after_mm2"], excess2));
     if (remaining["of"] == "position" && !selected.empty())
       QVERIFY(isNear(remaining["fraction_of_start"], excess2 / remaining["excess2_before_mm2"].get<double>()));
+    // What is left has one interval, in the sentence's millimetres and as a share.
+    if (remaining["of"] == "position" && !selected.empty() && remaining["fraction_high90"].is_number()) {
+      for (const auto& [share, mm] :
+           {std::pair("fraction_low90", "low90_mm"), std::pair("fraction_high90", "high90_mm")})
+        QVERIFY(isNear(sequence.back()[mm],
+                       signedRoot(remaining[share].get<double>() * remaining["excess2_before_mm2"].get<double>())));
+    }
+    for (const json& candidate : report["candidates"]) {
+      const json radius_m = candidate.value("parameters", json::object()).value("radius_m", json::object());
+      if (radius_m.contains("low90") && radius_m["low90"].is_number()) QVERIFY(radius_m["low90"] >= 0.0);
+    }
     if (selected.empty()) QCOMPARE(remaining["fraction_of_start"].get<double>(), 1.0);
     // The floor beside it.
     const double floor_mm = report["gap"]["floor_position_mm"];
