@@ -11,6 +11,7 @@
 #include "calib/correctors/harmonic/harmonic_field_choices.h"
 #include "calib/correctors/harmonic/harmonic_field_evidence.h"
 #include "calib/correctors/harmonic/harmonic_field_sites.h"
+#include "calib/correctors/harmonic/harmonic_field_slips.h"
 #include "calib/correctors/harmonic/harmonic_field_step.h"
 #include "calib/field/dipole_field.h"
 #include "calib/field/tracker_model.h"
@@ -57,7 +58,7 @@ class Fitter {
       if (step > 0 && moved_m < kSettled * std::sqrt(std::min(1.0, noise_factor_)) * jig_sd_m_) break;
     }
     if (misfit_m2_ > without_sources_m2_) forgetSources();
-    return HarmonicFit{DisturbedField(sources()), field_from_truth_, posterior()};
+    return HarmonicFit{DisturbedField(sources()), field_from_truth_, posterior(), jig_sd_m_, noise_factor_};
   }
 
   /// Whether a step promised far less than the field found leaves: then it went astray.
@@ -331,9 +332,8 @@ class Fitter {
   std::vector<Eigen::Vector3d> corrected_m_;                      ///< By the field found so far.
 };
 
-}  // namespace
-
-Result<HarmonicFit> fitHarmonicField(const FitData& data, const HarmonicOptions& options, const RunControl& control) {
+/// Of the two ways the likelier one.
+Result<HarmonicFit> fitOfLikelierWay(const FitData& data, const HarmonicOptions& options, const RunControl& control) {
   FT_TRY(const auto field_from_truth, fitRigid(data.p_true_m, data.p_tracked_m));
   Fitter careful(data, options, control, field_from_truth, Way::kCareful);
   FT_TRY(auto fit, careful.run());
@@ -343,6 +343,18 @@ Result<HarmonicFit> fitHarmonicField(const FitData& data, const HarmonicOptions&
   Fitter bold(data, options, quiet, field_from_truth, Way::kBold);
   FT_TRY(auto other, bold.run());
   return bold.cost_nats() < careful.cost_nats() ? std::move(other) : std::move(fit);
+}
+
+}  // namespace
+
+Result<HarmonicFit> fitHarmonicField(const FitData& data, const HarmonicOptions& options, const RunControl& control) {
+  FT_TRY(auto fit, fitOfLikelierWay(data, options, control));
+  const auto eased = options.most_sources > 0 ? easedOfSlips(data, fit) : std::nullopt;
+  if (!eased) return fit;
+  RunControl quiet = control;
+  quiet.progress = [](double) {};
+  FT_TRY(auto other, fitOfLikelierWay(*eased, options, quiet));
+  return robustCost_nats(data, other) < robustCost_nats(data, fit) ? std::move(other) : std::move(fit);
 }
 
 }  // namespace fieldtrue::correctors

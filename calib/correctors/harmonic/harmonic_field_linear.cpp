@@ -121,6 +121,11 @@ Eigen::Matrix<double, 3, 6> effectOfMotion(const Eigen::Vector3d& p_m, const Eig
   return effect;
 }
 
+Eigen::Matrix3d FieldPosterior::covariance_m2(const PlaceDerivative& place) const {
+  const Eigen::MatrixXd effects = allEffects(place, sources, about_m) * root.triangularView<Eigen::Upper>();
+  return effects * effects.transpose();
+}
+
 double FieldPosterior::sd_m(const PlaceDerivative& place) const {
   const Eigen::MatrixXd effects = allEffects(place, sources, about_m);
   return (effects * root.triangularView<Eigen::Upper>()).norm();

@@ -66,7 +66,9 @@ struct FieldPosterior {
   Eigen::Vector3d about_m = Eigen::Vector3d::Zero();  ///< Of the motion's turn.
   Eigen::MatrixXd root;                               ///< Upper triangular W, covariance = W W^T.
 
-  /// Root of the trace of the covariance of the corrected position [m].
+  /// Covariance of the corrected position [m^2].
+  Eigen::Matrix3d covariance_m2(const PlaceDerivative& place) const;
+  /// Root of its trace [m].
   double sd_m(const PlaceDerivative& place) const;
   /// The same of a place that the sources do not reach.
   double sdOfMotion_m(const Eigen::Vector3d& p_m) const;
