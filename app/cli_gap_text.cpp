@@ -36,7 +36,8 @@ std::string joined(const std::vector<std::string>& texts, const std::string& ski
 }
 
 std::string gapLine(const gap::GapReport& report) {
-  std::string text = "Gap " + millimetres(report.position_rms_mm) + " RMS over " + std::to_string(report.input.places) +
+  std::string text = (report.against ? "Difference from what the earlier recording foretells " : "Gap ") +
+                     millimetres(report.position_rms_mm) + " RMS over " + std::to_string(report.input.places) +
                      " places, floor " + millimetres(report.floor_position_mm);
   if (report.orientation_rms_deg) {
     text += "; orientation " + fixedText(*report.orientation_rms_deg, 3) + " deg";
@@ -81,10 +82,14 @@ std::string candidatesText(const gap::GapReport& report) {
 
 std::string sequenceText(const gap::GapReport& report) {
   if (report.sequence.size() < 2) return "";
-  std::vector<Row> rows{{"held out", "gap above the floor", "90 % interval [mm]"}};
+  const bool of_rotation = report.remaining.is_of_rotation;
+  std::vector<Row> rows{
+      {"held out", "gap above the floor", of_rotation ? "90 % interval [deg]" : "90 % interval [mm]"}};
   for (const gap::GapStep& step : report.sequence) {
-    rows.push_back({step.effect.empty() ? "start" : "+ " + step.effect, millimetres(step.excess_mm),
-                    interval(step.low90_mm, step.high90_mm, 1.0, 2)});
+    rows.push_back({step.effect.empty() ? "start" : "+ " + step.effect,
+                    of_rotation ? fixedText(step.excess_deg.value_or(0.0), 3) + " deg" : millimetres(step.excess_mm),
+                    of_rotation ? interval(step.low90_deg, step.high90_deg, 1.0, 3)
+                                : interval(step.low90_mm, step.high90_mm, 1.0, 2)});
   }
   return alignedColumns(rows);
 }

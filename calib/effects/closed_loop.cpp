@@ -114,7 +114,7 @@ constexpr double kNearestToWire_m = 0.06;
 
 class ClosedLoopFit final : public EffectFit {
  public:
-  explicit ClosedLoopFit(const FitDesign& design) : search_(design), chart_(search_.trackerFromRig()) {}
+  explicit ClosedLoopFit(const FitDesign& design) : search_(design) {}
 
   std::string name() const override { return "loop"; }
 
@@ -129,19 +129,11 @@ class ClosedLoopFit final : public EffectFit {
   std::vector<FitParameter> linear() const override { return {{"strength", "", 0.0, 2.0}}; }
 
   std::vector<Eigen::VectorXd> starts() const override {
-    constexpr double kDiagonal = 0.57735026918962576;
-    const Eigen::Vector3d normals[] = {{1, 0, 0},
-                                       {0, 1, 0},
-                                       {0, 0, 1},
-                                       {kDiagonal, kDiagonal, kDiagonal},
-                                       {kDiagonal, -kDiagonal, -kDiagonal},
-                                       {-kDiagonal, kDiagonal, -kDiagonal},
-                                       {-kDiagonal, -kDiagonal, kDiagonal}};
     std::vector<Eigen::VectorXd> starts;
     for (const Eigen::Vector3d& p_m : search_.around_m(0.95, {0.3, 0.75})) {
-      for (const Eigen::Vector3d& normal : normals) {
+      for (const Eigen::Vector3d& normal : firstNormals()) {
         Eigen::VectorXd start(6);
-        start << p_m, chart_.angles_rad(search_.trackerFromRig() * normal), 0.25;
+        start << p_m, chart_.angles_rad(normal), 0.25;
         if (allows(start)) starts.push_back(start);
       }
     }

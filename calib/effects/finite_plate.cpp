@@ -233,12 +233,16 @@ const UnitSquare& unitSquare(int along) {
   return *squares[i];
 }
 
+/// How a square that is fitted is turned in its plane: with its sides, or its diagonals, along an axis of the tracker.
+/// Every square is within 22.5 degrees of one of them.
+enum class Sides { kAlong, kAcross };
+
 class FinitePlateFit final : public EffectFit {
  public:
-  FinitePlateFit(const FitDesign& design, bool is_ferromagnetic)
-      : search_(design), chart_(search_.trackerFromRig()), is_ferromagnetic_(is_ferromagnetic) {}
+  FinitePlateFit(const FitDesign& design, bool is_ferromagnetic, Sides sides)
+      : search_(design), is_ferromagnetic_(is_ferromagnetic), sides_(sides) {}
 
-  std::string name() const override { return is_ferromagnetic_ ? "ferromagnetic" : "conductive"; }
+  std::string name() const override { return material() + (sides_ == Sides::kAlong ? "" : ", turned"); }
 
   bool searchesPlace() const override { return true; }
   std::vector<FitParameter> searched() const override {
@@ -252,10 +256,12 @@ class FinitePlateFit final : public EffectFit {
 
   std::vector<Eigen::VectorXd> starts() const override {
     std::vector<Eigen::VectorXd> starts;
+    // Turned squares begin where the others end, and from the axes.
+    const auto normals = sides_ == Sides::kAlong ? firstNormals() : firstNormals().first(3);
     for (const Eigen::Vector3d& p_m : search_.around_m(0.95, {0.3, 0.75})) {
-      for (int axis = 0; axis < 3; ++axis) {
+      for (const Eigen::Vector3d& normal : normals) {
         Eigen::VectorXd start(6);
-        start << p_m, chart_.angles_rad(search_.trackerFromRig() * Eigen::Vector3d::Unit(axis)), kFirstSize_m;
+        start << p_m, chart_.angles_rad(normal), kFirstSize_m;
         if (allows(start)) starts.push_back(start);
       }
     }
@@ -295,14 +301,14 @@ class FinitePlateFit final : public EffectFit {
     const Eigen::Vector3d side = frame.tracker_from_plate.col(0);
     const Eigen::Vector3d& center_m = frame.center_m;
     FittedEffect fitted;
-    fitted.material = name();
+    fitted.material = material();
     fitted.location_m = center_m;
     fitted.parameters = {{"center_m", {center_m.x(), center_m.y(), center_m.z()}},
                          {"normal", {normal.x(), normal.y(), normal.z()}},
                          {"side", {side.x(), side.y(), side.z()}},
                          {"length_m", searched[5]},
                          {"width_m", searched[5]},
-                         {"material", name()},
+                         {"material", material()},
                          {"strength", linear[0]}};
     fitted.values = {{"center_x_m", "m", center_m.x()}, {"center_y_m", "m", center_m.y()},
                      {"center_z_m", "m", center_m.z()}, {"normal_x", "", normal.x()},
@@ -310,7 +316,7 @@ class FinitePlateFit final : public EffectFit {
                      {"size_m", "m", searched[5]},      {"strength", "", linear[0]}};
     fitted.is_plausible = linear[0] >= 0.0 && linear[0] <= 1.1;
     if (linear[0] < 0.0) {
-      fitted.doubt = "a " + name() + " plate that answers with the wrong sign";
+      fitted.doubt = "a " + material() + " plate that answers with the wrong sign";
     } else if (!fitted.is_plausible) {
       fitted.doubt =
           "a plate " + formatNumber(std::round(10.0 * linear[0]) / 10.0) + " times as strong as an ideal one";
@@ -321,20 +327,26 @@ class FinitePlateFit final : public EffectFit {
  private:
   PlateFrame frameAt(const Eigen::VectorXd& searched) const {
     const Eigen::Vector3d normal = chart_.direction(searched[3], searched[4]);
-    const Eigen::Vector3d x = search_.trackerFromRig() * Eigen::Vector3d::UnitX();
-    const Eigen::Vector3d y = search_.trackerFromRig() * Eigen::Vector3d::UnitY();
-    return frameOf(searched.head<3>(), normal, std::abs(normal.dot(x)) < 0.75 ? x : y, searched[5], searched[5]);
+    const Eigen::Vector3d side = std::abs(normal.x()) < 0.75 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+    const PlateFrame frame = frameOf(searched.head<3>(), normal, side, searched[5], searched[5]);
+    if (sides_ == Sides::kAlong) return frame;
+    const Eigen::Vector3d diagonal = frame.tracker_from_plate.col(0) + frame.tracker_from_plate.col(1);
+    return frameOf(frame.center_m, normal, diagonal, searched[5], searched[5]);
   }
+
+  std::string material() const { return is_ferromagnetic_ ? "ferromagnetic" : "conductive"; }
 
   RoomSearch search_;
   DirectionChart chart_;
   bool is_ferromagnetic_;
+  Sides sides_;
 };
 
 std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
   std::vector<std::unique_ptr<EffectFit>> ways;
-  ways.push_back(std::make_unique<FinitePlateFit>(design, false));
-  ways.push_back(std::make_unique<FinitePlateFit>(design, true));
+  for (const Sides sides : {Sides::kAlong, Sides::kAcross})
+    for (const bool is_ferromagnetic : {false, true})
+      ways.push_back(std::make_unique<FinitePlateFit>(design, is_ferromagnetic, sides));
   return ways;
 }
 

@@ -75,7 +75,7 @@ constexpr double kFarthest_m = 20.0;
 
 class MetalPlaneFit final : public EffectFit {
  public:
-  explicit MetalPlaneFit(const FitDesign& design) : search_(design), chart_(search_.trackerFromRig()) {}
+  explicit MetalPlaneFit(const FitDesign& design) : search_(design) {}
 
   std::string name() const override { return "plane"; }
 
@@ -89,9 +89,10 @@ class MetalPlaneFit final : public EffectFit {
 
   std::vector<Eigen::VectorXd> starts() const override {
     std::vector<Eigen::VectorXd> starts;
-    for (int axis = 0; axis < 6; ++axis) {
-      const Eigen::Vector3d toward =
-          search_.trackerFromRig() * Eigen::Vector3d((axis % 2 == 0 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis / 2));
+    for (int n = 0; n < 27; ++n) {  // Towards the faces, edges and corners of a cube.
+      const Eigen::Vector3d to(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if (to.isZero()) continue;
+      const Eigen::Vector3d toward = to.normalized();
       const double nearest_m = search_.farthestAlong_m(toward);
       for (const double gap : {0.12, 0.22, 0.4, 0.7, 1.2, 2.0, 3.5}) {
         const double gap_m = std::max(0.08, gap * search_.extent_m());

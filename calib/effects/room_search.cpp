@@ -1,6 +1,7 @@
 #include "calib/effects/room_search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -27,7 +28,6 @@ RoomSearch::RoomSearch(const FitDesign& design) : box_m_(design.places_m) {
     places_m_.push_back(setting.tracker_from_sensor.position_m);
     box_m_.extend(places_m_.back());
   }
-  if (!design.settings.empty()) tracker_from_rig_ = design.settings.front().tracker_from_reference.orientation;
   if (!box_m_.isEmpty()) extent_m_ = std::max(extent_m_, box_m_.sizes().maxCoeff());
   if (box_m_.isEmpty()) box_m_.extend(Eigen::Vector3d::Zero());
   keep_away_m_ = std::max(kNearestToPlace_m, 0.5 * design.pitch_m);
@@ -96,7 +96,7 @@ std::vector<Eigen::Vector3d> RoomSearch::aboutTransmitter_m() const {
           const Eigen::Vector3d direction(i, j, k);
           const double squared = direction.squaredNorm();
           if (squared != 1.0 && squared != 3.0) continue;
-          const Eigen::Vector3d p_m = radius_m * (tracker_from_rig_ * direction.normalized());
+          const Eigen::Vector3d p_m = radius_m * direction.normalized();
           if (isClear(p_m, 1.0) && !box_m_.contains(p_m)) found_m.push_back(p_m);
         }
       }
@@ -105,9 +105,9 @@ std::vector<Eigen::Vector3d> RoomSearch::aboutTransmitter_m() const {
   return found_m;
 }
 
-DirectionChart::DirectionChart(const Eigen::Quaterniond& tracker_from_rig)
-    : tracker_from_chart_(tracker_from_rig * Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(),
-                                                                                Eigen::Vector3d(1.0, 1.0, 0.0))) {}
+DirectionChart::DirectionChart()
+    : tracker_from_chart_(
+          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d(1.0, 1.0, 0.0))) {}
 
 Eigen::Vector3d DirectionChart::direction(double latitude_rad, double longitude_rad) const {
   const double around = std::cos(latitude_rad);
@@ -122,6 +122,18 @@ Eigen::Vector2d DirectionChart::angles_rad(const Eigen::Vector3d& direction) con
 
 std::vector<FitParameter> DirectionChart::parameters() {
   return {{"latitude_rad", "rad", -0.5 * kPi, 0.5 * kPi}, {"longitude_rad", "rad", -2.0 * kPi, 2.0 * kPi}};
+}
+
+std::span<const Eigen::Vector3d> firstNormals() {
+  constexpr double kDiagonal = 0.57735026918962576;
+  static const std::array<Eigen::Vector3d, 7> normals = {{{1, 0, 0},
+                                                          {0, 1, 0},
+                                                          {0, 0, 1},
+                                                          {kDiagonal, kDiagonal, kDiagonal},
+                                                          {kDiagonal, -kDiagonal, -kDiagonal},
+                                                          {-kDiagonal, kDiagonal, -kDiagonal},
+                                                          {-kDiagonal, -kDiagonal, kDiagonal}}};
+  return normals;
 }
 
 Eigen::VectorXd joined(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {

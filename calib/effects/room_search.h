@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <span>
 #include <vector>
 
 #include "calib/effects/effect_fit.h"
@@ -9,7 +10,8 @@
 namespace fieldtrue::effects {
 
 /// Where a fit may look for a thing that stands in the room: around the places of the sensor and about the
-/// transmitter, never on one of them.
+/// transmitter, never on one of them. All of it is laid out along the tracker's axes: which way the rig's frame is
+/// turned changes nothing of what is found.
 class RoomSearch {
  public:
   explicit RoomSearch(const FitDesign& design);
@@ -20,7 +22,6 @@ class RoomSearch {
   double extent_m() const { return extent_m_; }
   const Eigen::AlignedBox3d& box_m() const { return box_m_; }
   const std::vector<Eigen::Vector3d>& places_m() const { return places_m_; }
-  const Eigen::Quaterniond& trackerFromRig() const { return tracker_from_rig_; }
 
   double nearestPlace_m(const Eigen::Vector3d& p_m) const;
   /// Farthest that any place, or the transmitter, lies in a direction [m].
@@ -44,16 +45,15 @@ class RoomSearch {
   std::vector<Eigen::Vector3d> places_m_;
   Eigen::AlignedBox3d box_m_;
   Eigen::AlignedBox3d bounds_m_;
-  Eigen::Quaterniond tracker_from_rig_ = Eigen::Quaterniond::Identity();
   double keep_away_m_ = 0.12;
   double extent_m_ = 0.4;
 };
 
-/// Directions as two angles, latitude and longitude about a pole that lies between two axes of the rig, so that the
-/// angles are smooth near every axis and every diagonal of the rig's frame.
+/// Directions as two angles, latitude and longitude about a pole that lies between two axes of the tracker, so that the
+/// angles are smooth near every axis and every diagonal of its frame.
 class DirectionChart {
  public:
-  explicit DirectionChart(const Eigen::Quaterniond& tracker_from_rig);
+  DirectionChart();
   /// Unit vector, tracker frame.
   Eigen::Vector3d direction(double latitude_rad, double longitude_rad) const;
   /// Latitude and longitude [rad] of a unit vector.
@@ -64,6 +64,9 @@ class DirectionChart {
  private:
   Eigen::Quaterniond tracker_from_chart_;
 };
+
+/// Unit normals from which a flat thing is looked for: the tracker's axes, and the diagonals between three of them.
+std::span<const Eigen::Vector3d> firstNormals();
 
 /// A searched vector from its parts.
 Eigen::VectorXd joined(const Eigen::VectorXd& a, const Eigen::VectorXd& b);

@@ -199,7 +199,7 @@ void findEquivalents(const identify::GapSearch& search, const identify::EffectSe
                      std::vector<GapCandidate>& candidates) {
   const std::vector<identify::TriedEffect>& tried = selection.alternatives;
   identify::GapModel rest = selection.model.model;
-  if (!rest.terms.empty()) rest = identify::withoutTerm(std::move(rest), selection.leading);
+  if (!rest.terms.empty()) rest = identify::withoutTerm(std::move(rest), 0);
   const std::vector<identify::Vector6d> without =
       identify::whitenedResiduals(search.physics(), search.refined(rest).model, search.whitening());
   std::vector<Eigen::VectorXd> signals;
@@ -271,11 +271,10 @@ void addNameless(const Judgement& judgement, bool has_gap, double floor_excess, 
       1.0 - floor_excess);
 }
 
-/// Which of the selected terms a candidate is: of an effect that was selected twice the leading one.
+/// Which of the selected terms a candidate is: of an effect that was selected twice the first one.
 std::optional<std::size_t> selectedAs(const identify::GapSearch& search, const identify::EffectSelection& selection,
                                       const std::string& effect) {
   const auto is = [&](std::size_t t) { return search.ways()[selection.ways[t]].effect->id == effect; };
-  if (selection.leading < selection.ways.size() && is(selection.leading)) return selection.leading;
   for (std::size_t t = 0; t < selection.ways.size(); ++t)
     if (is(t)) return t;
   return std::nullopt;
@@ -323,7 +322,7 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
   findEquivalents(search, selection, candidates);
   for (GapCandidate& c : candidates)
     if (const auto t = selectedAs(search, selection, c.effect)) c.shrinkage = shrinkageOfStep(judgement.far, *t);
-  const std::string named = selection.ways.empty() ? "" : search.ways()[selection.ways[selection.leading]].effect->id;
+  const std::string named = selection.ways.empty() ? "" : search.ways()[selection.ways.front()].effect->id;
   putLeadingFirst(named, candidates);
   const MostEvidence most_of = mostEvidence(search, selection, candidates);
   addNameless(judgement, has_gap, scattered_share, most_of, search.thresholds(), candidates);
@@ -336,6 +335,29 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
 Shrinkage shrinkageOfStep(const HowFar& far, std::size_t effect) {
   return shrinkageOf(far.excess_m2[effect].value, far.excess_m2[effect + 1].value, far.left_of_before[effect + 1]);
 }
+
+namespace {
+
+/// The leading effect is the candidate that it is.
+void takeOver(const std::vector<GapCandidate>& candidates, SelectedEffect& leading) {
+  for (const GapCandidate& c : candidates) {
+    if (c.effect != leading.effect) continue;
+    leading.equivalents = c.equivalents;
+    leading.probability = c.probability;
+    leading.bic_gain = c.bic_gain;
+  }
+}
+
+/// An effect that stands beside the leading one is weighed against its absence.
+void setBeside(const identify::GapSearch& search, const identify::GapModel& model, std::size_t term,
+               SelectedEffect& effect) {
+  const identify::RefinedModel rest = search.refined(identify::withoutTerm(model, term));
+  effect.bic_gain = search.bicOf(rest.model) - search.bicOf(model);
+  effect.probability = 1.0 / (1.0 + std::exp(-0.5 * effect.bic_gain / search.thresholds().temperature));
+  effect.equivalents = {effect.effect};
+}
+
+}  // namespace
 
 std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, const Judgement& judgement,
                                              const std::vector<GapCandidate>& candidates, const RunControl& control) {
@@ -350,13 +372,10 @@ std::vector<SelectedEffect> describeSelected(const identify::GapSearch& search, 
     widenPlaced(fittedOf(selection.model.model.terms[t]), search.thresholds(), effect);
     keepWithinSearch(*selection.model.model.terms[t].fit, effect);
     effect.credit_fraction = credit[t];
-    effect.equivalents = {effect.effect};
-    effect.probability = 1.0;
-    for (const GapCandidate& c : candidates) {
-      if (c.effect != effect.effect || selectedAs(search, selection, c.effect) != t) continue;
-      effect.equivalents = c.equivalents;
-      effect.probability = c.probability;
-      effect.bic_gain = c.bic_gain;
+    if (t == 0) {
+      takeOver(candidates, effect);
+    } else {
+      setBeside(search, selection.model.model, t, effect);
     }
     effect.shrinkage = shrinkageOfStep(judgement.far, t);
     effect.excess2_before_mm2 = 1e6 * judgement.far.excess_m2[t].value;

@@ -49,21 +49,52 @@ void takeFromScene(const simulation::Scene* scene, const TableMetadata& metadata
     rows.stated_tracker_from_reference = inverse(scene->reference_from_tracker);
 }
 
-void addSequence(const HowFar& far, GapReport& report) {
-  const auto step = [&](std::size_t s) {
-    const Bounded& excess = far.excess_m2[s];
-    GapStep added{s == 0 ? "" : report.selected[s - 1].effect, signedRoot_mm(excess.value), {}, {}};
-    if (excess.low90) added.low90_mm = signedRoot_mm(*excess.low90);
-    if (excess.high90) added.high90_mm = signedRoot_mm(*excess.high90);
-    return added;
-  };
-  for (std::size_t s = 0; s < far.excess_m2.size(); ++s) report.sequence.push_back(step(s));
-  // What is left in the end has one interval, that of the verdict.
+/// What stands above the floor after each step, in mm or degrees.
+struct Step {
+  std::optional<double> excess, low90, high90;
+};
+
+/// @param unit what one metre, or one radian, is
+std::vector<Step> stepsOf(const std::vector<Bounded>& excess, double unit) {
+  const auto root = [unit](double square) { return unit * std::copysign(std::sqrt(std::abs(square)), square); };
+  std::vector<Step> steps;
+  for (const Bounded& one : excess) {
+    Step step{root(one.value), {}, {}};
+    if (one.low90) step.low90 = root(*one.low90);
+    if (one.high90) step.high90 = root(*one.high90);
+    steps.push_back(step);
+  }
+  return steps;
+}
+
+/// What is left in the end has one interval, that of the verdict.
+void boundAsRemaining(const HowFar& far, const std::vector<Bounded>& excess, double unit, std::vector<Step>& steps) {
   const Bounded left = far.remaining();
-  const double start_m2 = far.excess_m2.front().value;
-  if (far.by_rotation || report.selected.empty() || !left.low90 || !left.high90 || !(start_m2 > 0.0)) return;
-  report.sequence.back().low90_mm = signedRoot_mm(*left.low90 * start_m2);
-  report.sequence.back().high90_mm = signedRoot_mm(*left.high90 * start_m2);
+  const double start = excess.front().value;
+  if (steps.size() < 2 || !left.low90 || !left.high90 || !(start > 0.0)) return;
+  const std::vector<Step> ends = stepsOf({{*left.low90 * start, {}, {}}, {*left.high90 * start, {}, {}}}, unit);
+  steps.back().low90 = ends.front().excess;
+  steps.back().high90 = ends.back().excess;
+}
+
+void addSequence(const HowFar& far, bool has_orientation, GapReport& report) {
+  constexpr double kMillimetres = 1e3;
+  std::vector<Step> in_mm = stepsOf(far.excess_m2, kMillimetres);
+  std::vector<Step> in_deg = stepsOf(far.excess_rad2, kDegPerRad);
+  if (far.by_rotation) {
+    boundAsRemaining(far, far.excess_rad2, kDegPerRad, in_deg);
+  } else {
+    boundAsRemaining(far, far.excess_m2, kMillimetres, in_mm);
+  }
+  for (std::size_t s = 0; s < in_mm.size(); ++s) {
+    GapStep step{s == 0 ? "" : report.selected[s - 1].effect, *in_mm[s].excess, in_mm[s].low90, in_mm[s].high90};
+    if (has_orientation) {
+      step.excess_deg = in_deg[s].excess;
+      step.low90_deg = in_deg[s].low90;
+      step.high90_deg = in_deg[s].high90;
+    }
+    report.sequence.push_back(std::move(step));
+  }
 }
 
 Remaining remainingOf(const HowFar& far, const identify::GapRows& rows, const identify::Thresholds& thresholds) {
@@ -181,7 +212,7 @@ void describeJudgement(const identify::GapSearch& search, const Judgement& judge
   if (belongs_together && has_gap && rows.has_dipoles) report.source_shape = sourceShapeOf(search, judgement.selection);
   if (report.source_shape && report.source_shape->shape != Shape::kUnclear)
     report.findings.push_back({"", sourceShapeText(*report.source_shape), {}});
-  addSequence(judgement.far, report);
+  addSequence(judgement.far, rows.has_orientation, report);
   report.remaining = remainingOf(judgement.far, rows, search.thresholds());
 }
 

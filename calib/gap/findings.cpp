@@ -17,7 +17,9 @@ constexpr std::size_t kMostNamed = 10;  ///< Places of a list.
 /// What is left beside the named effects and varies smoothly, where it is worth telling.
 void addRest(const Judgement& judgement, const identify::Thresholds& thresholds, GapReport& report) {
   const double start_m2 = judgement.far.excess_m2.front().value;
-  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > thresholds.told_rest * start_m2)) return;
+  constexpr double kTold_m2 = 1e-10;  // 0.01 mm: less reads as nothing.
+  if (judgement.selection.ways.empty() || !(judgement.rest_m2 > std::max(kTold_m2, thresholds.told_rest * start_m2)))
+    return;
   report.findings.push_back({"",
                              "Beside what is named, " + shown(signedRoot_mm(judgement.rest_m2)) +
                                  " mm vary smoothly from place to place and have no name.",
@@ -71,6 +73,27 @@ void addMisfits(bool has_gap, const identify::GapRows& rows, GapReport& report) 
                                    : "; within these places it does not fall to half.";
   }
   report.findings.push_back({"", text, nodes});
+}
+
+/// Mean variance of the rows' samples alone, an axis [m^2].
+double ownVariance_m2(const identify::GapRows& rows) {
+  double sum = 0.0;
+  for (const identify::GapRow& row : rows.rows) sum += row.mean_covariance_m2.trace() / 3.0;
+  return sum / static_cast<double>(rows.rows.size());
+}
+
+/// A tolerance that is stated too large is a finding where the readings of the places, samples and placing together,
+/// scatter clearly less than it alone would make them.
+void addStatedTooLarge(const identify::GapSearch& search, const identify::GapRows& stated, GapReport& report) {
+  const double said_m = stated.placing_sd_m.value_or(0.0), seen_m = search.placingSd_m();
+  const double own_m = std::sqrt(ownVariance_m2(stated));
+  const double factor = search.thresholds().stated_too_small * search.thresholds().told_tolerance;
+  if (std::hypot(said_m, own_m) < factor * std::hypot(seen_m, own_m)) return;
+  report.findings.push_back({"",
+                             "The places are more exact than stated: " + shown(1e3 * seen_m) + " mm instead of " +
+                                 shown(1e3 * said_m) +
+                                 " mm (SD per axis). State what the jig keeps: a fit trusts the readings by it.",
+                             {}});
 }
 
 /// Beside what is named, single places that lie farther off than it and noise put them.
@@ -189,6 +212,7 @@ void addFindings(const identify::GapSearch& search, const identify::GapRows& sta
   addMisfits(has_gap, stated, report);
   addStrays(judgement.far, stated, report);
   addStatedTooSmall(search, stated, report);
+  addStatedTooLarge(search, stated, report);
   addBoundOfFloor(search, stated, report);
 }
 

@@ -162,18 +162,24 @@ class Imitator {
     if (!is_fitted_ || !isPlaced(a) || !isPlaced(b)) return best;
     for (std::size_t i = 0; i < best.size(); ++i) {
       const Eigen::VectorXd unit = a.typical.col(static_cast<Eigen::Index>(i));
-      for (const std::size_t k : mostAlike(tried[i]))
+      for (const std::size_t k : mostAlikeOfEachWay(tried[i], b))
         best[i] = std::max(best[i], fittedShare(at_, unit, strength(), b.imitations[k]));
     }
     return best;
   }
 
  private:
-  static std::vector<std::size_t> mostAlike(std::vector<std::pair<double, std::size_t>> tried) {
-    constexpr std::size_t kFitted = 2;
+  /// What is most alike on the coarse grid need not be once it is fitted: iron may pass for copper there.
+  static std::vector<std::size_t> mostAlikeOfEachWay(std::vector<std::pair<double, std::size_t>> tried,
+                                                     const Signature& by) {
     std::sort(tried.rbegin(), tried.rend());
     std::vector<std::size_t> most;
-    for (std::size_t k = 0; k < std::min(kFitted, tried.size()); ++k) most.push_back(tried[k].second);
+    const auto is_of_way = [&](std::size_t k, std::size_t other) {
+      return by.imitations[k].fit == by.imitations[other].fit;
+    };
+    for (const auto& [share, k] : tried)
+      if (std::none_of(most.begin(), most.end(), [&](std::size_t other) { return is_of_way(k, other); }))
+        most.push_back(k);
     return most;
   }
   /// Of a signal as large as the noise.

@@ -89,10 +89,10 @@ class Judge {
     }
   }
 
-  /// Whether unseen places come off worse with one effect more than without it: in units of the noise, or in the
-  /// figures that are told.
+  /// Whether unseen places come off no better with one effect more than without it in units of the noise, or worse in
+  /// the figures that are told.
   bool harms(const UnseenScores& scores, std::size_t step, const Judgement& judgement) const {
-    if (pairedDifference(scores.step[step + 1], scores.step[step], rows_).value > 0.0) return true;
+    if (pairedDifference(scores.step[step + 1], scores.step[step], rows_).value >= 0.0) return true;
     const bool in_position = isLarger(scores, step, &UnseenRow::square_m2);
     if (!rows_.has_orientation) return in_position;
     const bool in_rotation = isLarger(scores, step, &UnseenRow::square_rad2);
@@ -111,7 +111,7 @@ class Judge {
     return mean(scores.step[step + 1]) > (1.0 + kRounding) * mean(scores.step[step]);
   }
 
-  /// Where unseen places come off worse with one effect more than without it, takes out the one that the rows miss
+  /// Where unseen places come off no better with one effect more than without it, takes out the one that the rows miss
   /// least: the folds choose for themselves, so that what a step adds in them need not be what it adds in the whole.
   bool dropHarmful(const UnseenScores& scores, Judgement& judgement) {
     identify::EffectSelection& selection = judgement.selection;
@@ -148,7 +148,6 @@ class Judge {
     selection.ways.clear();
     selection.model = search_.none();
     selection.alternatives = selection.first;
-    selection.leading = 0;
   }
 
   void weigh(const UnseenScores& scores, Judgement& judgement) {

@@ -130,15 +130,29 @@ const identify::TriedEffect* triedOf(const identify::GapSearch& search, const id
   return nullptr;
 }
 
+/// What is to be told from the first candidate: what the sentence says cannot be told from it, else the next one, where
+/// the evidence is not enough.
+const GapCandidate* openRival(const std::vector<GapCandidate>& candidates, const identify::Thresholds& thresholds) {
+  const GapCandidate& first = candidates.front();
+  const auto is_alike = [&](const GapCandidate& c) {
+    const auto& names = first.equivalents;
+    return c.effect != first.effect && std::find(names.begin(), names.end(), c.effect) != names.end();
+  };
+  const auto alike = std::find_if(candidates.begin() + 1, candidates.end(), is_alike);
+  if (alike != candidates.end()) return &*alike;
+  const auto next =
+      std::find_if(candidates.begin() + 1, candidates.end(), [](const auto& c) { return !isNameless(c.effect); });
+  return next != candidates.end() && next->probability >= thresholds.open_cause ? &*next : nullptr;
+}
+
 /// The two effects that the evidence separates least, when it is not enough.
 bool proposeSeparation(const identify::GapSearch& search, const identify::EffectSelection& selection,
                        GapReport& report) {
-  const auto is_named = [](const GapCandidate& c) { return !isNameless(c.effect); };
-  if (report.candidates.empty() || !is_named(report.candidates.front())) return false;
+  if (report.candidates.empty() || isNameless(report.candidates.front().effect)) return false;
+  const GapCandidate* rival = openRival(report.candidates, search.thresholds());
+  if (rival == nullptr) return false;
   const GapCandidate& first = report.candidates.front();
-  const auto next = std::find_if(report.candidates.begin() + 1, report.candidates.end(), is_named);
-  if (next == report.candidates.end() || next->probability < search.thresholds().open_cause) return false;
-  const GapCandidate& second = *next;
+  const GapCandidate& second = *rival;
   const identify::TriedEffect* a = triedOf(search, selection, first.effect);
   const identify::TriedEffect* b = triedOf(search, selection, second.effect);
   if (a == nullptr || b == nullptr) return false;
@@ -262,19 +276,21 @@ void predictRemoval(const identify::GapSearch& search, const identify::EffectSel
   }
 }
 
+/// "Compact metal body near (1.2, 0.3, -0.5) m from the transmitter".
+std::string namedThing(const SelectedEffect& effect) {
+  if (!effect.location_m) return effects::labelOf(effect.effect);
+  const Eigen::Vector3d& p = *effect.location_m;
+  return effects::labelOf(effect.effect) + ", near (" + rounded(p.x(), 2) + ", " + rounded(p.y(), 2) + ", " +
+         rounded(p.z(), 2) + ") m from the transmitter";
+}
+
 /// Of the first effect that can be taken away with something to be seen.
 std::string interventionText(const GapReport& report) {
   const Prediction& prediction = report.predictions.front();
   const SelectedEffect& first = report.selected[prediction.selected];
-  std::string text = "Move or remove what acts as " + effects::labelOf(first.effect);
-  if (first.location_m) {
-    const Eigen::Vector3d& p = *first.location_m;
-    text += " near (" + rounded(p.x(), 2) + ", " + rounded(p.y(), 2) + ", " + rounded(p.z(), 2) +
-            ") m from the transmitter";
-  }
-  return text + " and measure " + report.names.of(prediction.node) + " again: its gap should go from " +
-         rounded(prediction.now_mm, 0) + " to " + rounded(prediction.then_mm, 0) + " +- " +
-         rounded(prediction.then_sd_mm, 0) + " mm.";
+  return "Move or remove what is named " + namedThing(first) + ", and measure " + report.names.of(prediction.node) +
+         " again: its gap should go from " + rounded(prediction.now_mm, 0) + " to " + rounded(prediction.then_mm, 0) +
+         " +- " + rounded(prediction.then_sd_mm, 0) + " mm.";
 }
 
 }  // namespace
@@ -292,8 +308,10 @@ void suggestNext(const identify::GapSearch& search, const identify::EffectSelect
   if (!report.predictions.empty()) {
     report.next_measurement = interventionText(report);
   } else if (!report.selected.empty()) {
-    report.next_measurement = "Check " + effects::labelOf(report.selected.front().effect) +
-                              " at its source, put it right or add it to the simulation, and measure ten places again.";
+    const SelectedEffect& first = report.selected.front();
+    report.next_measurement = (first.location_m ? "Look for what is named " + namedThing(first) + "; move it"
+                                                : "Check " + namedThing(first) + " at its source, put it right") +
+                              " or add it to the simulation, and measure ten places again.";
   } else if (report.hotspot) {
     const Eigen::Vector3d& p = report.hotspot->center_m;
     report.next_measurement = "Measure more closely around (" + rounded(p.x(), 2) + ", " + rounded(p.y(), 2) + ", " +

@@ -72,7 +72,7 @@ void leaveRoomForTheUnknown(const identify::Thresholds& thresholds, std::vector<
 MostEvidence mostEvidence(const identify::GapSearch& search, const identify::EffectSelection& selection,
                           const std::vector<GapCandidate>& candidates) {
   if (selection.ways.empty()) return {};
-  const std::string& leading = search.ways()[selection.ways[selection.leading]].effect->id;
+  const std::string& leading = search.ways()[selection.ways.front()].effect->id;
   for (const GapCandidate& c : candidates)
     if (c.effect == leading) return {c.bic_gain, c.bic_gain - search.thresholds().implausible_cost};
   return {};

@@ -138,6 +138,9 @@ struct GapStep {
   double excess_mm = 0.0;  ///< Held out, with this and all effects before it.
   std::optional<double> low90_mm;
   std::optional<double> high90_mm;
+  std::optional<double> excess_deg = std::nullopt;  ///< The same of rotations; none where the tracker tells none.
+  std::optional<double> low90_deg = std::nullopt;
+  std::optional<double> high90_deg = std::nullopt;
 };
 
 struct SmallestDetectable {

@@ -187,7 +187,10 @@ json stepToJson(const GapStep& step) {
   return {{"effect", step.effect},
           {"excess_mm", numberToJson(step.excess_mm)},
           {"low90_mm", numberToJson(step.low90_mm)},
-          {"high90_mm", numberToJson(step.high90_mm)}};
+          {"high90_mm", numberToJson(step.high90_mm)},
+          {"excess_deg", numberToJson(step.excess_deg)},
+          {"low90_deg", numberToJson(step.low90_deg)},
+          {"high90_deg", numberToJson(step.high90_deg)}};
 }
 
 json remainingToJson(const Remaining& remaining) {

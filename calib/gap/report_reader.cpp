@@ -177,8 +177,13 @@ void readLists(const JsonReader& reader, GapReport& report) {
   report.candidates = reader["candidates"].list(candidateFrom);
   report.selected = reader["selected"].list(selectedFrom);
   report.sequence = reader["sequence"].list([](const JsonReader& item) {
-    return GapStep{item["effect"].text(), item["excess_mm"].numberOrNan(), item["low90_mm"].optionalNumber(),
-                   item["high90_mm"].optionalNumber()};
+    GapStep step{item["effect"].text(), item["excess_mm"].numberOrNan(), item["low90_mm"].optionalNumber(),
+                 item["high90_mm"].optionalNumber()};
+    if (!item.has("excess_deg")) return step;  // Written before these were told.
+    step.excess_deg = item["excess_deg"].optionalNumber();
+    step.low90_deg = item["low90_deg"].optionalNumber();
+    step.high90_deg = item["high90_deg"].optionalNumber();
+    return step;
   });
   report.predictions = reader["predictions"].list([](const JsonReader& item) {
     const int selected = item.has("selected") ? item["selected"].integer() : 0;

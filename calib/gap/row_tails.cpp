@@ -7,33 +7,20 @@
 namespace fieldtrue::gap {
 namespace {
 
-/// Upper tail of the squared size of three whitened numbers under a Student t of them together: a third of it follows
-/// Fisher's F of 3 and `freedom` degrees, by the finite sum that the incomplete beta function is for whole a.
+/// Upper tail of the squared size of some whitened numbers under a Student t of them together: over their count it
+/// follows Fisher's F of that count and `freedom` degrees, by the finite sum that the incomplete beta function is for
+/// whole a.
 /// @param freedom even
 /// @source Abramowitz and Stegun 1964, 26.6.2 and 26.5.6
-double tailOfThree(double square, double freedom) {
+double tailOf(double square, int count, double freedom) {
+  const double half = 0.5 * count;
   const double beyond = freedom / (freedom + square);
-  double term = std::pow(1.0 - beyond, 1.5), sum = 0.0;
+  double term = std::pow(1.0 - beyond, half), sum = 0.0;
   for (int j = 0; j < static_cast<int>(0.5 * freedom); ++j) {
     sum += term;
-    term *= (1.5 + j) / (1.0 + j) * beyond;
+    term *= (half + j) / (1.0 + j) * beyond;
   }
   return std::clamp(1.0 - sum, 1e-15, 1.0);
-}
-
-/// How likely noise alone takes a row so far off, position and rotation together. Rows whose means are of few samples
-/// know their own scatter badly: the law of the residuals, not a normal one, says what is far.
-/// @source Fisher 1932, the product of two tails
-/// @param scale of the residuals under that law
-double tailOfRow(const identify::Vector6d& whitened, bool has_orientation, const identify::ResidualLaw& law,
-                 const identify::ResidualScale& scale) {
-  const auto tailOf = [&](const auto& part, double unit) {
-    return tailOfThree(part.squaredNorm() / (unit * unit), law.degrees_of_freedom);
-  };
-  const double position = tailOf(whitened.head<3>(), scale.position);
-  if (!has_orientation) return position;
-  const double both = position * tailOf(whitened.tail<3>(), scale.rotation);
-  return both * (1.0 - std::log(both));
 }
 
 /// Marks the hypotheses that may be rejected with a false-discovery rate of at most `rate`.
@@ -66,7 +53,7 @@ std::vector<std::size_t> straysOfPart(std::vector<identify::Vector6d> parts, con
     // Readings without any noise have the whitening's own.
     const double scale = std::max(1.0, identify::devianceOf(others, false, law).scale.position);
     const double square = farthest_first[k].squaredNorm() / (scale * scale);
-    const double chance = tailOfThree(square, law.degrees_of_freedom) * static_cast<double>(parts.size());
+    const double chance = tailOf(square, 3, law.degrees_of_freedom) * static_cast<double>(parts.size());
     if (square > 3.0 * thresholds.far_off * thresholds.far_off && chance < thresholds.sure_stray) strays = k + 1;
   }
   order.resize(strays);
@@ -92,8 +79,11 @@ std::vector<std::size_t> straysAmong(std::span<const identify::Vector6d> whitene
 std::vector<char> farOff(const identify::GapSearch& search, std::span<const identify::Vector6d> whitened, double rate) {
   const bool has_orientation = search.physics().rows().has_orientation;
   const identify::ResidualScale scale = identify::devianceOf(search.noiseLeft(), has_orientation, search.law()).scale;
+  const double unit2 = has_orientation ? 0.5 * (scale.position * scale.position + scale.rotation * scale.rotation)
+                                       : scale.position * scale.position;
   std::vector<double> p;
-  for (const identify::Vector6d& row : whitened) p.push_back(tailOfRow(row, has_orientation, search.law(), scale));
+  for (const identify::Vector6d& row : whitened)
+    p.push_back(tailOf(row.squaredNorm() / unit2, has_orientation ? 6 : 3, search.law().degrees_of_freedom));
   return discoveries(p, rate);
 }
 

@@ -62,6 +62,15 @@ std::string namesText(const std::vector<std::string>& effects) {
   return text;
 }
 
+constexpr const char* kNotSure = "these places cannot say how sure that is)";
+
+/// The high end of what is left; where the start is not clear enough for a share of it, of what is left by itself.
+std::optional<double> mostLeft_mm(const GapReport& report) {
+  const Remaining& remaining = report.remaining;
+  if (remaining.high90) return signedRoot_mm(1e-6 * *remaining.high90 * remaining.excess2_before_mm2);
+  return report.sequence.empty() ? std::nullopt : report.sequence.back().high90_mm;
+}
+
 /// "on places the fit did not see, what stands above the noise goes from 13 mm to 0.4 mm (0.6 mm at most, 95 % sure)".
 std::string fallText(const GapReport& report) {
   const Remaining& remaining = report.remaining;
@@ -75,9 +84,11 @@ std::string fallText(const GapReport& report) {
   } else {
     text += "what stands above the noise goes from " + mm(1.0) + " to " + mm(remaining.fraction) + " (";
   }
-  if (!remaining.high90) return text + "these places cannot say how sure that is)";
-  return text + (remaining.is_of_rotation ? shown(100.0 * *remaining.high90) + " %" : mm(*remaining.high90)) +
-         " at most, 95 % sure)";
+  if (remaining.is_of_rotation)
+    return text + (remaining.high90 ? shown(100.0 * *remaining.high90) + " % at most, 95 % sure)" : kNotSure);
+  const std::optional<double> most_mm = mostLeft_mm(report);
+  if (!most_mm) return text + kNotSure;
+  return text + (*most_mm > 0.0 ? shown(*most_mm) + " mm at most, 95 % sure)" : "95 % sure)");
 }
 
 std::string reservedText(const GapReport& report) {

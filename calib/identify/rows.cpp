@@ -8,6 +8,7 @@
 
 #include "calib/core/statistics.h"
 #include "calib/geometry/geometry.h"
+#include "calib/identify/model.h"
 
 namespace fieldtrue::identify {
 namespace {
@@ -142,8 +143,9 @@ std::vector<int> byRow(const GapRows& table, const std::vector<int>& block_of_pl
 }  // namespace
 
 std::vector<int> octantBlocks(const GapRows& table, std::size_t fewest) {
+  const Pose tracker_from_reference = initialAlignment(table).tracker_from_reference;
   std::vector<Eigen::Vector3d> p_m(table.place_nodes.size());
-  for (const GapRow& row : table.rows) p_m[row.place] = row.reference_from_sensor.position_m;
+  for (const GapRow& row : table.rows) p_m[row.place] = tracker_from_reference * row.reference_from_sensor.position_m;
   std::vector<int> block(p_m.size(), 0);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;

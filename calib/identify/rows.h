@@ -66,8 +66,8 @@ Matrix6d noiseOf(const GapRow& row, double placing_sd_m, double placing_sd_rad);
 /// The sensors whose tracked positions fit a mirror image of the true ones far better than any turn of them.
 std::vector<int> mirroredSensors(const GapRows& rows, const Thresholds& thresholds = {});
 
-/// Eight blocks of places by the octant of their true position about the median, those of fewer than `fewest` places
-/// joined with the smallest other; for each row its block.
+/// Eight blocks of places by the octant of their box they lie in, along the tracker's axes, those of fewer than
+/// `fewest` places joined with the smallest other; for each row its block.
 std::vector<int> octantBlocks(const GapRows& rows, std::size_t fewest = 3);
 /// Blocks of rows that follow each other in time, whole places kept together by their first visit.
 std::vector<int> timeBlocks(const GapRows& rows, int count = 8);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/identify/refine.h"
+
 namespace fieldtrue::identify {
 namespace {
 
@@ -196,6 +198,17 @@ ScanResult scan(const Linearized& at, const effects::EffectFit& fit, std::vector
     result.held_out_gain.push_back(tried[best].held_out[b]);
   }
   return result;
+}
+
+double heldOutGainFrom(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& searched) {
+  const Scanner scanner(at);
+  const LinearPrior prior = priorOf(fit);
+  double gain = 0.0;
+  for (std::size_t b = 0; b < at.segments().size(); ++b) {
+    const LocalFit settled = refineLocally(at, fit, searched, b);
+    gain += scanner.tryColumns(at.columns(fit, settled.searched), prior).held_out[b];
+  }
+  return gain;
 }
 
 }  // namespace fieldtrue::identify

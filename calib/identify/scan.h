@@ -28,4 +28,8 @@ std::vector<Eigen::VectorXd> startsAt(const effects::EffectFit& fit, std::span<c
 ScanResult scan(const Linearized& at, const effects::EffectFit& fit, std::vector<Eigen::VectorXd> starts,
                 std::size_t kept, const RunControl& control);
 
+/// Fall of the held-out sum of squares over all blocks where each block's other rows settle the searched parameters
+/// themselves, from the given ones: what the coarse grid is too coarse to tell.
+double heldOutGainFrom(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& searched);
+
 }  // namespace fieldtrue::identify

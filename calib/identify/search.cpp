@@ -306,10 +306,43 @@ void GapSearch::shareCenters(std::vector<TriedEffect>& tried, const Linearized& 
   });
 }
 
-void GapSearch::finish(TriedEffect& tried, double base_bic) const {
+namespace {
+
+/// Whether two fits search places and, but for the last parameter, the same shape, so that one may start where another
+/// ended.
+bool areOfOneShape(const effects::EffectFit& a, const effects::EffectFit& b) {
+  constexpr std::size_t kPlaceOnly = 3;
+  const std::vector<effects::FitParameter> of_a = a.searched(), of_b = b.searched();
+  return a.searchesPlace() && of_a.size() > kPlaceOnly + 1 && of_a.size() == of_b.size() &&
+         std::equal(of_a.begin(), of_a.end() - 1, of_b.begin(),
+                    [](const auto& x, const auto& y) { return x.name == y.name; });
+}
+
+}  // namespace
+
+void GapSearch::shareShapes(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                            const GapModel& base, const RunControl& control) const {
+  std::vector<GapTerm> ended;
+  for (const TriedEffect& one : tried) ended.push_back(one.model.terms.back());
+  control.parallel_for(tried.size(), [&](std::size_t i) {
+    const EffectWay& way = ways_[tried[i].way];
+    for (std::size_t k = 0; k < ended.size(); ++k) {
+      if (k == i || control.stop.stop_requested() || !areOfOneShape(*way.fit, *ended[k].fit)) continue;
+      const effects::FitParameter last = way.fit->searched().back();
+      Eigen::VectorXd start = ended[k].searched;
+      start.tail<1>()[0] = std::clamp(start.tail<1>()[0], last.low, last.high);
+      const ScanResult::Start from{start, 0.0};
+      if (way.fit->allows(start)) refineFrom({&from, 1}, way.needs_time ? in_time : in_space, base, tried[i]);
+    }
+  });
+}
+
+void GapSearch::finish(TriedEffect& tried, const Linearized& at, double base_bic) const {
   tried.refined = refined(tried.model);
   tried.model = tried.refined.model;
   const GapTerm& term = tried.model.terms.back();
+  if (tried.held_out_gain <= 0.0 && term.searched.size() > 0)
+    tried.held_out_gain = heldOutGainFrom(at, *term.fit, term.searched);
   tried.fitted = term.fit->describe(term.searched, term.linear);
   tried.bic_gain = base_bic - bicOf(tried.model) - (tried.fitted.is_plausible ? 0.0 : thresholds_.implausible_cost);
   if (term.effect->is_freer) tried.bic_gain -= thresholds_.share_of_freer * std::max(0.0, tried.bic_gain);
@@ -317,7 +350,8 @@ void GapSearch::finish(TriedEffect& tried, double base_bic) const {
 
 /// The linearised gain of a strong effect can be a fifth off, and flatters: whatever is near the best of those fitted
 /// exactly is fitted exactly too.
-void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const {
+void GapSearch::finishBest(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                           const RefinedModel& base, const RunControl& control) const {
   constexpr double kNear = 60.0;
   constexpr double kNearNothing = 25.0;
   constexpr double kNearShare = 0.2;
@@ -329,7 +363,10 @@ void GapSearch::finishBest(std::vector<TriedEffect>& tried, const RefinedModel& 
     for (std::size_t i = 0; i < tried.size(); ++i)
       if (tried[i].refined.model.terms.empty() && tried[i].bic_gain >= best - margin) due.push_back(i);
     if (due.empty() || control.stop.stop_requested()) return;
-    control.parallel_for(due.size(), [&](std::size_t k) { finish(tried[due[k]], base_bic); });
+    control.parallel_for(due.size(), [&](std::size_t k) {
+      TriedEffect& one = tried[due[k]];
+      finish(one, ways_[one.way].needs_time ? in_time : in_space, base_bic);
+    });
     best = 0.0;
     for (const TriedEffect& one : tried)
       if (!one.refined.model.terms.empty()) best = std::max(best, one.bic_gain);
@@ -352,8 +389,9 @@ std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunCont
   const auto better = [](const TriedEffect& a, const TriedEffect& b) { return a.bic_gain > b.bic_gain; };
   std::stable_sort(tried.begin(), tried.end(), better);
   shareCenters(tried, in_space, in_time, from, control);
+  shareShapes(tried, in_space, in_time, from, control);
   std::stable_sort(tried.begin(), tried.end(), better);
-  finishBest(tried, base, control);
+  finishBest(tried, in_space, in_time, base, control);
   for (TriedEffect& one : tried) {
     if (!one.refined.model.terms.empty()) continue;
     const GapTerm& term = one.model.terms.back();

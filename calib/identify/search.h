@@ -102,8 +102,12 @@ class GapSearch {
   /// Where one thing in the room fits well, others may fit too: each is tried at the places of the best.
   void shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
                     const GapModel& base, const RunControl& control) const;
-  void finishBest(std::vector<TriedEffect>& tried, const RefinedModel& base, const RunControl& control) const;
-  void finish(TriedEffect& tried, double base_bic) const;
+  /// Things of other physics that are searched by the same shape as well: each starts where the others ended.
+  void shareShapes(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                   const GapModel& base, const RunControl& control) const;
+  void finishBest(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
+                  const RefinedModel& base, const RunControl& control) const;
+  void finish(TriedEffect& tried, const Linearized& at, double base_bic) const;
 
   const GapRows& rows_;
   Thresholds thresholds_;

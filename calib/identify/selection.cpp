@@ -43,7 +43,6 @@ class Selector {
 
   void rankAnew(EffectSelection& selection) {
     selection.alternatives = selection.first;
-    selection.leading = 0;
     if (selection.ways.size() > 1) rankAlternatives(selection);
     holdLeading(selection);
   }
@@ -62,9 +61,36 @@ class Selector {
     for (const TriedEffect& one : tried) {
       if (one.bic_gain < least_gain) break;
       if (only_kind_ && isInRoom(one) != *only_kind_) continue;
-      if (one.fitted.is_plausible && one.held_out_gain > 0.0) return &one;
+      if (one.fitted.is_plausible && one.held_out_gain > 0.0 && !namesOneTwice(one.model)) return &one;
     }
     return nullptr;
+  }
+
+  /// Whether two terms of a model are one cause. Two things of one kind may stand in the room; nearer to each other
+  /// than the farther of them is to the nearest place, readings do not tell them from one thing of another shape.
+  bool namesOneTwice(const GapModel& model) const {
+    for (std::size_t a = 0; a < model.terms.size(); ++a) {
+      for (std::size_t b = a + 1; b < model.terms.size(); ++b) {
+        if (model.terms[a].effect != model.terms[b].effect) continue;
+        const auto first_m = placeOf_m(model.terms[a]);
+        const auto second_m = placeOf_m(model.terms[b]);
+        if (!first_m || !second_m) return true;
+        const double resolved_m = std::max(toNearestPlace_m(*first_m), toNearestPlace_m(*second_m));
+        if ((*first_m - *second_m).norm() < resolved_m) return true;
+      }
+    }
+    return false;
+  }
+
+  static std::optional<Eigen::Vector3d> placeOf_m(const GapTerm& term) {
+    return term.fit->describe(term.searched, term.linear).location_m;
+  }
+
+  double toNearestPlace_m(const Eigen::Vector3d& p_m) const {
+    double nearest_m = std::numeric_limits<double>::infinity();
+    for (const field::SensorSetting& setting : search_.design().settings)
+      nearest_m = std::min(nearest_m, (setting.tracker_from_sensor.position_m - p_m).norm());
+    return nearest_m;
   }
 
   static bool isInRoom(const TriedEffect& tried) { return tried.fitted.location_m.has_value(); }
@@ -80,7 +106,7 @@ class Selector {
         // What is added on an estimate can be dropped again once it is fitted, and would be added again for ever, for
         // less and less: where there are no more effects than before, it is an exchange, and must gain as much.
         const double least = grown.ways.size() > selection.ways.size() ? 0.0 : thresholds_.least_gain_exchange;
-        if (!(priceOf(grown) < priceOf(selection) - least)) break;
+        if (!(priceOf(grown) < priceOf(selection) - least) || namesOneTwice(grown.model.model)) break;
       }
       selection = std::move(grown);
       if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
@@ -180,41 +206,47 @@ class Selector {
     add(*best, selection);
   }
 
-  /// The effect whose absence costs most leads; the candidates are its alternatives with the others present.
+  /// The effect whose absence costs most leads, and stands first; the candidates are its alternatives with the others
+  /// present.
   void findLeading(EffectSelection& selection) {
     rankAlternatives(selection);
     const double bic = search_.bicOf(selection.model.model);
     const TriedEffect* best = firstWorth(selection.alternatives, 0.0);
     if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) return;
-    selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(selection.leading));
+    selection.ways.erase(selection.ways.begin());
     add(*best, selection);
-    selection.leading = selection.ways.size() - 1;
+    putFirst(selection.ways.size() - 1, selection);
   }
 
   void rankAlternatives(EffectSelection& selection) {
-    double most = -std::numeric_limits<double>::infinity();
+    std::vector<double> costs;
     const std::vector<RefinedModel> rests = withoutEach(selection);
-    for (std::size_t term = 0; term < rests.size(); ++term) {
-      const double cost = search_.bicOf(rests[term].model);
-      if (cost > most) {
-        most = cost;
-        selection.leading = term;
-      }
-    }
-    selection.alternatives = ranked(rests[selection.leading]);
+    for (const RefinedModel& rest : rests) costs.push_back(search_.bicOf(rest.model));
+    const auto leading = static_cast<std::size_t>(std::max_element(costs.begin(), costs.end()) - costs.begin());
+    selection.alternatives = ranked(rests[leading]);
+    putFirst(leading, selection);
+  }
+
+  void putFirst(std::size_t term, EffectSelection& selection) const {
+    if (term == 0) return;
+    const auto at = static_cast<std::ptrdiff_t>(term);
+    GapModel model = selection.model.model;
+    std::rotate(model.terms.begin(), model.terms.begin() + at, model.terms.begin() + at + 1);
+    std::rotate(selection.ways.begin(), selection.ways.begin() + at, selection.ways.begin() + at + 1);
+    selection.model = search_.refined(model);
   }
 
   /// Among the alternatives the leading effect stands as it was selected, where that is the better fit: it was tried
   /// before the others were there.
   void holdLeading(EffectSelection& selection) const {
     if (selection.ways.empty()) return;
-    const std::size_t leading = selection.ways[selection.leading];
-    const RefinedModel rest = without(selection, selection.leading);
+    const std::size_t leading = selection.ways.front();
+    const RefinedModel rest = without(selection, 0);
     const double gain = search_.bicOf(rest.model) - search_.bicOf(selection.model.model);
     for (TriedEffect& tried : selection.alternatives) {
       if (search_.ways()[tried.way].effect != search_.ways()[leading].effect || tried.bic_gain >= gain) continue;
-      GapModel last = withoutTerm(selection.model.model, selection.leading);
-      last.terms.push_back(selection.model.model.terms[selection.leading]);
+      GapModel last = withoutTerm(selection.model.model, 0);
+      last.terms.push_back(selection.model.model.terms.front());
       tried.way = leading;
       tried.refined = search_.refined(last);
       tried.model = tried.refined.model;

@@ -10,9 +10,8 @@ namespace fieldtrue::identify {
 struct EffectSelection {
   std::vector<TriedEffect> first;         ///< All effects on their own, best first.
   std::vector<TriedEffect> alternatives;  ///< To the leading selected effect, with the others present; best first.
-  RefinedModel model;                     ///< With all selected effects; terms in the order they were added.
+  RefinedModel model;                     ///< With all selected effects; the one that counts most stands first.
   std::vector<std::size_t> ways;          ///< Of the terms.
-  std::size_t leading = 0;                ///< Term that explains most.
   double bic_gain = 0.0;                  ///< Against no effect.
 };
 

@@ -13,6 +13,7 @@
 #include "calib/core/statistics.h"
 #include "calib/recording/cleaning.h"
 #include "calib/recording/hemisphere.h"
+#include "calib/tables/table_sensors.h"
 #include "calib/tables/true_box.h"
 
 namespace fieldtrue::recording {
@@ -118,6 +119,36 @@ std::string slipText(const NearestSlip& nearest) {
          nearest.slip.words;
 }
 
+/// What is needed where true positions and readings are not of one scale.
+std::string remedyText(double ratio) {
+  if (!(ratio > 0.0)) return "a true position of each place is needed";
+  if (!std::isfinite(ratio)) return "a reading of each place is needed, of a sensor that is moved with the jig";
+  return "both must be in metres";
+}
+
+/// Whether true positions and readings of some rows are of one scale, or are too few to tell.
+bool areOfOneScale(const std::vector<Node>& nodes) {
+  std::set<int> places;
+  for (const Node& node : nodes) places.insert(node.node);
+  return places.size() < kFewestPlaces || isPlausible(repairedDistances(representatives(nodes), 1.0).ratio());
+}
+
+/// @param nodes that are not of one scale
+std::string scaleText(const std::vector<Node>& nodes) {
+  const NearestSlip nearest = nearestSlip(representatives(nodes));
+  return slipText(nearest) + "; " + remedyText(nearest.distances.ratio());
+}
+
+/// What is wrong with rows that are not of one scale: with one sensor's, where the others' are as they should be.
+std::string scaleTextBySensor(const std::vector<Node>& nodes) {
+  const std::vector<int> sensors = sensorsOf(nodes);
+  const auto is_at_fault = [&](int sensor) { return !areOfOneScale(nodesOfSensor(nodes, sensor)); };
+  const auto at_fault = std::find_if(sensors.begin(), sensors.end(), is_at_fault);
+  if (at_fault == sensors.end() || std::all_of(sensors.begin(), sensors.end(), is_at_fault)) return scaleText(nodes);
+  return "sensor " + std::to_string(*at_fault) + ": " + scaleText(nodesOfSensor(nodes, *at_fault)) +
+         "; the rows of a sensor that failed can be left out, role skipped";
+}
+
 /// "line 7, column x_m", or by the row's key where it is of no file.
 std::string whereOf(const Node& node, std::optional<int> line, Eigen::Index axis) {
   const std::string column = std::string("column ") + "xyz"[axis] + "_m";
@@ -153,10 +184,7 @@ Result<void> checkUnits(const CalibrationTable& table, std::span<const int> line
   }
   if (places.size() < 2) return checkReadings(table, lines);
   const double width_m = trueBox_m(nodes).sizes().maxCoeff();
-  nodes = representatives(std::move(nodes));
-  if (places.size() >= kFewestPlaces && !isPlausible(repairedDistances(nodes, 1.0).ratio())) {
-    return fail(ErrorCode::kBadInput, slipText(nearestSlip(nodes)) + "; both must be in metres");
-  }
+  if (!areOfOneScale(nodes)) return fail(ErrorCode::kBadInput, scaleTextBySensor(nodes));
   const std::string the_places = "the " + std::to_string(places.size()) + " places ";
   if (width_m > kTrackerReach_m) {
     return fail(ErrorCode::kBadInput, the_places + "are spread over " + threeFigures(width_m) + " m, more than the " +

@@ -17,7 +17,7 @@ bool isRankedAlike(const std::vector<identify::TriedEffect>& a, const std::vecto
 }
 
 bool isAlike(const identify::EffectSelection& a, const identify::EffectSelection& b) {
-  return a.ways == b.ways && a.bic_gain == b.bic_gain && a.leading == b.leading && isRankedAlike(a.first, b.first) &&
+  return a.ways == b.ways && a.bic_gain == b.bic_gain && isRankedAlike(a.first, b.first) &&
          isRankedAlike(a.alternatives, b.alternatives);
 }
 

@@ -12,11 +12,12 @@ namespace {
 std::string percent(double share) { return std::to_string(std::lround(100.0 * share)) + " %"; }
 
 /// A figure below 0, as noise alone gives half of the time, is nothing.
-std::string aboveNoise(double value_mm, const std::optional<double>& low_mm, const std::optional<double>& high_mm) {
-  if (value_mm <= 0.0)
-    return high_mm && *high_mm > 0.0 ? "nothing (at most " + shortNumber(*high_mm) + " mm)" : "nothing";
-  std::string text = shortNumber(value_mm) + " mm";
-  if (low_mm && high_mm) text += " (" + shortNumber(std::max(0.0, *low_mm)) + " to " + shortNumber(*high_mm) + ")";
+std::string aboveNoise(double value, const std::optional<double>& low, const std::optional<double>& high,
+                       const std::string& unit) {
+  if (value <= 0.0)
+    return high && *high > 0.0 ? "nothing (at most " + shortNumber(*high) + " " + unit + ")" : "nothing";
+  std::string text = shortNumber(value) + " " + unit;
+  if (low && high) text += " (" + shortNumber(std::max(0.0, *low)) + " to " + shortNumber(*high) + ")";
   return text;
 }
 
@@ -74,21 +75,25 @@ std::string effectLabel(const std::string& id) {
 }
 
 GapBarChart waterfallChart(const gap::GapReport& report) {
-  GapBarChart chart{"waterfall", "Error above noise as each cause is added (mm, 90 % range)", {}};
+  const bool of_rotation = report.remaining.is_of_rotation;
+  const std::string unit = of_rotation ? "degrees" : "mm";
+  GapBarChart chart{"waterfall", "Error above noise as each cause is added (" + unit + ", 90 % range)", {}};
   for (const gap::GapStep& step : report.sequence) {
+    const double excess = of_rotation ? step.excess_deg.value_or(0.0) : step.excess_mm;
     GapBar bar;
     bar.name = step.effect.empty() ? (report.against ? "As it was before" : "As simulated now")
                                    : "+ " + effectLabel(step.effect);
-    bar.value = std::max(0.0, step.excess_mm);
-    bar.low90 = step.low90_mm;
-    bar.high90 = step.high90_mm;
-    bar.text = aboveNoise(step.excess_mm, step.low90_mm, step.high90_mm);
+    bar.value = std::max(0.0, excess);
+    bar.low90 = of_rotation ? step.low90_deg : step.low90_mm;
+    bar.high90 = of_rotation ? step.high90_deg : step.high90_mm;
+    bar.text = aboveNoise(excess, bar.low90, bar.high90, unit);
     chart.bars.push_back(std::move(bar));
   }
   if (chart.bars.empty()) return chart;
   GapBar floor;
   floor.name = "Noise floor";
-  floor.text = "0 mm (noise itself: " + shortNumber(report.floor_position_mm) + " mm)";
+  const double noise = of_rotation ? report.floor_orientation_deg.value_or(0.0) : report.floor_position_mm;
+  floor.text = "0 " + unit + " (noise itself: " + shortNumber(noise) + " " + unit + ")";
   floor.muted = true;
   chart.bars.push_back(std::move(floor));
   return chart;

@@ -122,7 +122,7 @@ class JudgementTest : public QObject {
     simulation::Scene scene = gapScene();
     scene.effects.push_back({"grid_scale", nlohmann::json::parse(R"({"scale": [0.01, -0.008, 0.004]})")});
     scene.effects.push_back({"jig_tilt", nlohmann::json::parse(R"({"shear_rad": [0.02, -0.015, 0.0]})")});
-    const CalibrationTable table = recordedIn(scene, gapPlan());
+    const CalibrationTable table = recordedIn(scene, gapPlan(), 2);
     const Named named(table);
     QCOMPARE(named.selection.ways.size(), std::size_t{2});
     const Judgement usual = judge(named.search, named.selection, {});

@@ -77,7 +77,7 @@ GapReport someReport() {
   none.probability = 0.07;
   report.candidates = {someMetal(), none};
   report.selected = {someMetal()};
-  report.sequence = {{"", 12.5, 10.0, 15.0}, {"compact_metal", 2.5, std::nullopt, 3.0}};
+  report.sequence = {{"", 12.5, 10.0, 15.0, 0.8, 0.5, 1.1}, {"compact_metal", 2.5, std::nullopt, 3.0, 0.1, -0.1, 0.2}};
   report.remaining = {3.25, 0.2, 0.1, 0.3, true, 156.25, 6.25, 2.5, 4.0, 5.0, 6.5, 17, {17, 4}};
   report.rival = {12.5, 30.0, 1.5, 0.5, 0.875, {"gain_drift"}, "A field without a name does as well."};
   report.odds_over_next = 14.5;
@@ -143,7 +143,8 @@ class GapJsonTest : public QObject {
     QTest::newRow("parameter") << "/candidates/0/parameters/radius_m" << QString("value unit low90 high90").split(' ');
     QTest::newRow("shrinkage") << "/candidates/0/shrinkage"
                                << QString("before_mm after_mm fraction low90 high90").split(' ');
-    QTest::newRow("sequence") << "/sequence/1" << QString("effect excess_mm low90_mm high90_mm").split(' ');
+    QTest::newRow("sequence")
+        << "/sequence/1" << QString("effect excess_mm low90_mm high90_mm excess_deg low90_deg high90_deg").split(' ');
     QTest::newRow("remaining") << "/remaining"
                                << QString(
                                       "position_rms_mm fraction_of_start fraction_low90 fraction_high90 of "

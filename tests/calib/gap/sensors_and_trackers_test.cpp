@@ -230,6 +230,20 @@ class SensorsAndTrackersTest : public QObject {
     QVERIFY2(!isTold(*report, "do not belong together"), report->text.c_str());
   }
 
+  /// A tolerance that is stated ten times too large is told, with what the places really keep; twice is nothing to
+  /// tell.
+  void aToleranceFarTooLargeIsTold() {
+    CalibrationTable table = recordedIn(gapScene(), gapPlan());
+    const double kept_m = gapScene().rig.tolerance_m;
+    for (const double factor : {1.0, 2.0, 10.0}) {
+      table.metadata.jig_tolerance_m = factor * kept_m;
+      const auto report = diagnose(table, nullptr, nullptr);
+      FT_VERIFY_OK(report);
+      QVERIFY2(report->verdict == GapVerdict::kNoGap, report->text.c_str());
+      QCOMPARE(isTold(*report, "more exact than stated"), factor > 2.0);
+    }
+  }
+
   /// Twice as far as the tolerance says is a tolerance stated too small; four times as far is no placing.
   void whatScattersFarBeyondItsToleranceIsAGap() {
     const auto scattered = [](double sd_m) {

@@ -98,6 +98,28 @@ class UnitSlipTest : public QObject {
     check("every third reading in the other hemisphere");
   }
 
+  /// Of several sensors the one that stood still, or was read in another unit, is named; the others are of one scale.
+  void theSensorAtFaultIsNamed() {
+    CalibrationTable table = gridTable();
+    const std::vector<Node> first = table.nodes;
+    for (Node node : first) {
+      node.sensor = 1;
+      table.nodes.push_back(node);
+    }
+    FT_VERIFY_OK(checkUnits(table));
+    CalibrationTable still = table, slipped = table;
+    for (Node& node : still.nodes)
+      if (node.sensor == 1) node.tracker_from_sensor.position_m = {0.2, 0.1, 0.3};
+    for (Node& node : slipped.nodes)
+      if (node.sensor == 0) node.tracker_from_sensor.position_m *= 39.37;
+    const auto stood = checkUnits(still), other_unit = checkUnits(slipped);
+    QVERIFY(!stood && !other_unit);
+    FT_VERIFY_MATCH(holdsAll(stood.error().message,
+                             {"sensor 1: most places share one reading", "moved with the jig", "role skipped"}));
+    QVERIFY2(stood.error().message.find("metres") == std::string::npos, stood.error().message.c_str());
+    FT_VERIFY_MATCH(holdsAll(other_unit.error().message, {"sensor 0: the readings lie", "both must be in metres"}));
+  }
+
   void theBoundsAreAFactorOfTwo() {
     // Undistorted, so that every distance has the factor exactly.
     const CalibrationTable exact = syntheticTable();
