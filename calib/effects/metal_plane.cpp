@@ -90,7 +90,7 @@ class MetalPlaneFit final : public EffectFit {
   std::vector<Eigen::VectorXd> starts() const override {
     std::vector<Eigen::VectorXd> starts;
     for (int n = 0; n < 27; ++n) {  // Towards the faces, edges and corners of a cube.
-      const Eigen::Vector3d to(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      const Eigen::Vector3d to = Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1).cast<double>();
       if (to.isZero()) continue;
       const Eigen::Vector3d toward = to.normalized();
       const double nearest_m = search_.farthestAlong_m(toward);

@@ -174,12 +174,11 @@ class Imitator {
                                                      const Signature& by) {
     std::sort(tried.rbegin(), tried.rend());
     std::vector<std::size_t> most;
-    const auto is_of_way = [&](std::size_t k, std::size_t other) {
-      return by.imitations[k].fit == by.imitations[other].fit;
-    };
-    for (const auto& [share, k] : tried)
-      if (std::none_of(most.begin(), most.end(), [&](std::size_t other) { return is_of_way(k, other); }))
-        most.push_back(k);
+    for (const auto& one : tried) {
+      const effects::EffectFit* way = by.imitations[one.second].fit;
+      const auto is_of_way = [&](std::size_t other) { return by.imitations[other].fit == way; };
+      if (std::none_of(most.begin(), most.end(), is_of_way)) most.push_back(one.second);
+    }
     return most;
   }
   /// Of a signal as large as the noise.

@@ -1,5 +1,7 @@
 #include "calib/correctors/harmonic/harmonic_field_slips.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

@@ -23,8 +23,8 @@ std::vector<field::SensorSetting> gridPlaces() {
   Pose tracker_from_rig{Eigen::Vector3d::Zero(), rotationFromVector(Eigen::Vector3d(0.1, -0.05, 0.2))};
   for (int i = 0; i < 100; ++i) {
     field::SensorSetting setting;
-    const Eigen::Vector3d in_rig_m(0.6 + 0.25 * (i % 5), -0.5 + 0.25 * (i / 5 % 5),
-                                   -0.3 + 0.25 * static_cast<double>(i / 25));
+    const int row = i / 5 % 5, layer = i / 25;
+    const Eigen::Vector3d in_rig_m(0.6 + 0.25 * (i % 5), -0.5 + 0.25 * row, -0.3 + 0.25 * layer);
     setting.tracker_from_reference = tracker_from_rig;
     setting.tracker_from_sensor = tracker_from_rig * Pose{in_rig_m, Eigen::Quaterniond::Identity()};
     setting.time_s = 10.0 * i;
