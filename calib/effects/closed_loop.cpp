@@ -44,7 +44,7 @@ EllipticIntegrals ellipticIntegrals(double modulus_squared, double complement) {
 double fromWire_m(const Eigen::Vector3d& from_center_m, const Eigen::Vector3d& axis, double radius_m) {
   const double z_m = axis.dot(from_center_m);
   const double rho_m = (from_center_m - z_m * axis).norm();
-  return std::hypot(rho_m - radius_m, z_m);
+  return std::sqrt((rho_m - radius_m) * (rho_m - radius_m) + z_m * z_m);
 }
 
 class ClosedLoop final : public field::CouplingDistortion {

@@ -38,7 +38,7 @@ struct PlateFrame {
   double distance_m(const Eigen::Vector3d& p_m) const {
     const Eigen::Vector3d p = inPlate(p_m);
     const Eigen::Vector2d beyond = (p.head<2>().cwiseAbs() - half_m).cwiseMax(0.0);
-    return std::hypot(beyond.norm(), p.z());
+    return std::sqrt(beyond.squaredNorm() + p.z() * p.z());
   }
 };
 
@@ -105,11 +105,22 @@ class FinitePlate final : public field::CouplingDistortion {
 
   bool admits(const Eigen::Vector3d& p_sensor_m) const override { return frame_.distance_m(p_sensor_m) > 0.005; }
 
-  /// As `at` of each setting, all at once.
+  /// As `at` of each setting, many at once.
   void respond(std::span<const field::SensorSetting> settings, std::span<field::EffectResponse> responses) const {
+    for (std::size_t begin = 0; begin < settings.size(); begin += kAtOnce) {
+      const std::size_t count = std::min(std::size_t{kAtOnce}, settings.size() - begin);
+      respondSome(settings.subspan(begin, count), responses.subspan(begin, count));
+    }
+  }
+
+ private:
+  static constexpr int kAtOnce = 64;  ///< Places whose sums stay in the nearest cache.
+
+  void respondSome(std::span<const field::SensorSetting> settings, std::span<field::EffectResponse> responses) const {
     const auto count = static_cast<Eigen::Index>(settings.size());
-    Eigen::MatrixX3d p_m(count, 3);
-    Eigen::Matrix<double, Eigen::Dynamic, 9> sum = Eigen::Matrix<double, Eigen::Dynamic, 9>::Zero(count, 9);
+    Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kAtOnce, 3> p_m(count, 3);
+    Eigen::Matrix<double, Eigen::Dynamic, 9, 0, kAtOnce, 9> sum(count, 9);
+    sum.setZero();
     for (Eigen::Index i = 0; i < count; ++i)
       p_m.row(i) = frame_.inPlate(settings[static_cast<std::size_t>(i)].tracker_from_sensor.position_m);
     const SheetField field{p_m.col(0).data(), p_m.col(1).data(), p_m.col(2).data(), settings.size(), sum.data()};
@@ -127,7 +138,6 @@ class FinitePlate final : public field::CouplingDistortion {
     }
   }
 
- private:
   template <typename OfPlace>
   Eigen::MatrixXd sources(std::span<const Eigen::Vector2d> centers_m, double scale, const OfPlace& of_place) const {
     Eigen::MatrixXd rows(static_cast<Eigen::Index>(centers_m.size()), 3);

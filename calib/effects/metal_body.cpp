@@ -131,7 +131,9 @@ void respondAsBody(BodyShape shape, const Eigen::Vector3d& center_m, const Eigen
     responses[0].field_per_m3 = from_body * field_of_transmitter;
     return;
   }
-  const auto dyad = [&](int a, int b) -> Eigen::Matrix3d { return from_body.col(a) * field_of_transmitter.row(b); };
+  const auto dyad = [&](int a, int b) -> Eigen::Matrix3d {
+    return from_body.col(a).lazyProduct(field_of_transmitter.row(b));
+  };
   for (int a = 0; a < 3; ++a) responses[static_cast<std::size_t>(a)].field_per_m3 = dyad(a, a);
   responses[3].field_per_m3 = dyad(0, 1) + dyad(1, 0);
   responses[4].field_per_m3 = dyad(0, 2) + dyad(2, 0);

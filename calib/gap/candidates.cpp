@@ -57,11 +57,10 @@ void findEquivalents(const identify::GapSearch& search, const identify::EffectSe
   identify::GapModel rest = selection.model.model;
   if (!rest.terms.empty()) rest = identify::withoutTerm(std::move(rest), 0);
   const std::vector<identify::Vector6d> without =
-      identify::whitenedResiduals(search.physics(), search.refined(rest).model, search.whitening());
+      identify::whitenedResiduals(search.physics(), search.fitted(rest), search.whitening());
   std::vector<Eigen::VectorXd> signals;
   for (const identify::TriedEffect& one : tried) {
-    const bool is_refined = !one.refined.model.terms.empty();
-    signals.push_back(is_refined ? signalOf(search, without, one.model) : Eigen::VectorXd());
+    signals.push_back(one.is_refined ? signalOf(search, without, one.model) : Eigen::VectorXd());
   }
   for (std::size_t a = 0; a < tried.size(); ++a) {
     candidates[a].equivalents = {candidates[a].effect};
@@ -88,7 +87,7 @@ Shrinkage shrinkageOf(double before_m2, double after_m2, const Bounded& left) {
 Shrinkage shrinkageOfTried(const identify::GapSearch& search, const identify::TriedEffect& tried, const HowFar& far,
                            double none) {
   double fall = tried.held_out_gain;
-  if (tried.held_out_gain > 0.0 && !tried.refined.model.terms.empty()) {
+  if (tried.held_out_gain > 0.0 && tried.is_refined) {
     const auto parameters = static_cast<double>(identify::parametersOf(tried.model));
     fall = std::max(fall, none - whitenedSquares(search, tried.model) - 2.0 * parameters);
   }
@@ -166,8 +165,8 @@ std::vector<GapCandidate> describeCandidates(const identify::GapSearch& search, 
   std::vector<GapCandidate> candidates;
   for (const identify::TriedEffect& tried : selection.alternatives) {
     GapCandidate candidate;
-    const bool is_refined = !tried.refined.model.terms.empty();
-    identify::RefinedModel model = is_refined ? tried.refined : identify::RefinedModel{tried.model, {}, 0, 0.0};
+    const identify::RefinedModel model =
+        tried.is_refined ? search.withCovariance(tried.model) : identify::RefinedModel{tried.model, {}, 0, 0.0};
     describeTerm(model, model.model.terms.size() - 1, {}, search.thresholds(), candidate);
     candidate.bic_gain = tried.bic_gain;
     candidate.shrinkage = shrinkageOfTried(search, tried, judgement.far, none);
@@ -205,8 +204,7 @@ void takeOver(const std::vector<GapCandidate>& candidates, SelectedEffect& leadi
 /// An effect that stands beside the leading one is weighed against its absence.
 void setBeside(const identify::GapSearch& search, const identify::GapModel& model, std::size_t term,
                SelectedEffect& effect) {
-  const identify::RefinedModel rest = search.refined(identify::withoutTerm(model, term));
-  effect.bic_gain = search.bicOf(rest.model) - search.bicOf(model);
+  effect.bic_gain = search.bicOf(search.fitted(identify::withoutTerm(model, term))) - search.bicOf(model);
   effect.probability = 1.0 / (1.0 + std::exp(-0.5 * effect.bic_gain / search.thresholds().temperature));
   effect.equivalents = {effect.effect};
 }
@@ -248,7 +246,7 @@ std::vector<double> creditShares(const identify::GapSearch& search, const identi
     model.alignment = full.alignment;
     for (std::size_t t = 0; t < n; ++t)
       if ((subset >> t & 1U) != 0) model.terms.push_back(full.terms[t]);
-    value[subset] = -whitenedSquares(search, search.refined(model).model);
+    value[subset] = -whitenedSquares(search, search.fitted(model));
   });
   const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1.0); };
   std::vector<double> credit(n, 0.0);

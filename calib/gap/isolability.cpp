@@ -135,7 +135,8 @@ bool isPlaced(const Signature& signature) { return signature.imitations.front().
 /// Share of a signal that an imitator makes once its place and shape are fitted to it.
 /// @param strength norm of the signal, so that what is believable of the imitator counts
 double fittedShare(const identify::Linearized& at, const Eigen::VectorXd& unit, double strength, const Imitation& by) {
-  const identify::LocalFit fitted = identify::refineLocally(at.withResidual(strength * unit), *by.fit, by.start);
+  const identify::Linearized signal = at.withResidual(strength * unit);
+  const identify::LocalFit fitted = identify::LocalFitter(signal).from(*by.fit, by.start);
   return fitted.gain / (strength * strength);
 }
 

@@ -73,10 +73,10 @@ class Judge {
     while (selection.ways.size() > 1 && !control_.stop.stop_requested()) {
       double least = search_.thresholds().least_nats;
       std::optional<std::size_t> idle;
-      const std::vector<identify::RefinedModel> rests = withoutEach(selection);
+      const std::vector<identify::GapModel> rests = withoutEach(selection);
       std::vector<double> nats(rests.size());
       std::vector<identify::UnnamedLaws> laws(rests.size());
-      control_.parallel_for(rests.size(), [&](std::size_t t) { nats[t] = natsOf(rests[t].model, laws[t]); });
+      control_.parallel_for(rests.size(), [&](std::size_t t) { nats[t] = natsOf(rests[t], laws[t]); });
       for (std::size_t t = 0; t < rests.size(); ++t) {
         if (judgement.nats_over_unnamed - nats[t] >= least) continue;
         least = judgement.nats_over_unnamed - nats[t];
@@ -118,9 +118,9 @@ class Judge {
     bool is_harmful = false;
     for (std::size_t s = 0; s + 1 < scores.step.size(); ++s) is_harmful = is_harmful || harms(scores, s, judgement);
     if (!is_harmful || control_.stop.stop_requested()) return false;
-    const std::vector<identify::RefinedModel> rests = withoutEach(selection);
+    const std::vector<identify::GapModel> rests = withoutEach(selection);
     std::vector<double> bic;
-    for (const identify::RefinedModel& rest : rests) bic.push_back(search_.bicOf(rest.model));
+    for (const identify::GapModel& rest : rests) bic.push_back(search_.bicOf(rest));
     const auto least_missed = static_cast<std::size_t>(std::min_element(bic.begin(), bic.end()) - bic.begin());
     drop(least_missed, rests[least_missed], judgement);
     judgement.nats_over_unnamed = selection.ways.empty() ? 0.0 : natsOf(selection.model.model, laws_.beside);
@@ -128,20 +128,19 @@ class Judge {
   }
 
   /// Each effect left out in turn.
-  std::vector<identify::RefinedModel> withoutEach(const identify::EffectSelection& selection) const {
-    std::vector<identify::RefinedModel> rests(selection.ways.size());
+  std::vector<identify::GapModel> withoutEach(const identify::EffectSelection& selection) const {
+    std::vector<identify::GapModel> rests(selection.ways.size());
     control_.parallel_for(rests.size(), [&](std::size_t term) {
-      rests[term] = search_.refined(identify::withoutTerm(selection.model.model, term));
+      rests[term] = search_.fitted(identify::withoutTerm(selection.model.model, term));
     });
     return rests;
   }
 
-  void drop(std::size_t term, const identify::RefinedModel& rest, Judgement& judgement) const {
+  void drop(std::size_t term, const identify::GapModel& rest, Judgement& judgement) const {
     identify::EffectSelection& selection = judgement.selection;
     judgement.dropped.push_back(idOf(search_, selection, term));
     selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
-    selection.model = rest;
-    if (selection.ways.empty()) selection.model = search_.none();
+    selection.model = selection.ways.empty() ? search_.none() : search_.withCovariance(rest);
   }
 
   void clear(identify::EffectSelection& selection) const {

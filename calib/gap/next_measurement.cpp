@@ -126,7 +126,7 @@ double separation(const identify::GapSearch& search, const Proposal& proposal, c
 const identify::TriedEffect* triedOf(const identify::GapSearch& search, const identify::EffectSelection& selection,
                                      const std::string& effect) {
   for (const identify::TriedEffect& tried : selection.alternatives)
-    if (search.ways()[tried.way].effect->id == effect && !tried.refined.model.terms.empty()) return &tried;
+    if (search.ways()[tried.way].effect->id == effect && tried.is_refined) return &tried;
   return nullptr;
 }
 
@@ -196,8 +196,8 @@ class Removal {
     const identify::GapPhysics physics = search.physics().at(rows_);
     identify::RefineOptions options;
     options.law = search.law();
-    left_ = physics.residuals(
-        identify::refineJointly(physics, {refined.model.alignment, {}}, search.whitening(), options).model);
+    left_ =
+        physics.residuals(identify::fitJointly(physics, {refined.model.alignment, {}}, search.whitening(), options));
   }
 
   /// RMS size of the gap to be read at a row [m], and its SD: by the noise of one row and by how well the effects that

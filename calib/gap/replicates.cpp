@@ -189,7 +189,7 @@ const identify::TriedEffect* runnerUp(const Judgement& judgement, const std::vec
       const std::string& id = search.ways()[tried.way].effect->id;
       const bool is_named = std::any_of(judgement.selection.ways.begin(), judgement.selection.ways.end(),
                                         [&](std::size_t way) { return search.ways()[way].effect->id == id; });
-      if (id == candidate.effect && !is_named && !tried.refined.model.terms.empty()) return &tried;
+      if (id == candidate.effect && !is_named && tried.is_refined) return &tried;
     }
   }
   return nullptr;

@@ -27,9 +27,9 @@ const identify::EffectWay* bodyOfAnyShape(const identify::GapSearch& search) {
 std::vector<Eigen::Vector3d> centersOf(const identify::GapSearch& search, const identify::EffectSelection& selection) {
   std::vector<Eigen::Vector3d> centers_m;
   for (const identify::TriedEffect& one : selection.first) {
-    const bool is_sure = one.bic_gain > search.thresholds().sure_thing && !one.refined.model.terms.empty();
+    const bool is_sure = one.bic_gain > search.thresholds().sure_thing && one.is_refined;
     if (!is_sure || !search.ways()[one.way].fit->searchesPlace()) continue;
-    centers_m.emplace_back(one.refined.model.terms.back().searched.head<3>());
+    centers_m.emplace_back(one.model.terms.back().searched.head<3>());
   }
   return centers_m;
 }
@@ -61,8 +61,7 @@ bool isImageInPlane(const identify::GapSearch& search, const identify::EffectSel
   if (std::any_of(named.begin(), named.end(), isEndless)) return true;
   const double worst_bic = search.bicOf(body.model) + search.thresholds().same_evidence;
   return std::any_of(selection.first.begin(), selection.first.end(), [&](const identify::TriedEffect& one) {
-    const std::vector<identify::GapTerm>& terms = one.refined.model.terms;
-    return !terms.empty() && isEndless(terms.back()) && search.bicOf(one.refined.model) < worst_bic;
+    return one.is_refined && isEndless(one.model.terms.back()) && search.bicOf(one.model) < worst_bic;
   });
 }
 

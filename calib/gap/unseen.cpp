@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 
 namespace fieldtrue::gap {
@@ -28,7 +29,7 @@ class FoldFitter {
  public:
   FoldFitter(const identify::GapSearch& search, const identify::EffectSelection& selection,
              const identify::UnnamedRival& rival, const RivalLaws& laws, std::span<const int> blocks,
-             UnseenScores& scores)
+             UnseenScores& scores, const RunControl& control)
       : search_(search),
         selection_(selection),
         rival_(rival),
@@ -39,7 +40,11 @@ class FoldFitter {
     if (selection.ways.empty()) return;
     const identify::Linearized at(search.physics(), search.seenFrom(search.none().model), search.whitening(), blocks,
                                   identify::ResponseAt::kHalfWayIfBent);
-    for (const std::size_t way : ways_) first_.push_back(scanned(at, way));
+    const identify::Scanner scanner(at);
+    first_.resize(ways_.size());
+    control.parallel_for(ways_.size(), [&](std::size_t w) {
+      if (!control.stop.stop_requested()) first_[w] = scanned(scanner, ways_[w]);
+    });
   }
 
   void run(int block, const RunControl& control) const {
@@ -47,7 +52,7 @@ class FoldFitter {
     for (std::size_t i = 0; i < used.size(); ++i) used[i] = blocks_[i] != block ? 1 : 0;
     identify::GapModel none;
     none.alignment = search_.none().model.alignment;
-    none = search_.refined(none, used).model;
+    none = search_.fitted(none, used);
     const std::vector<identify::GapModel> steps = likelierOf(block, used, none, control);
     if (control.stop.stop_requested()) return;
     std::vector<identify::Vector6d> left;
@@ -61,9 +66,9 @@ class FoldFitter {
   }
 
  private:
-  identify::ScanResult scanned(const identify::Linearized& at, std::size_t way) const {
+  identify::ScanResult scanned(const identify::Scanner& scanner, std::size_t way) const {
     const identify::EffectWay& one = search_.ways()[way];
-    return identify::scan(at, *one.fit, one.fit->starts(), 1, {});
+    return scanner.scan(*one.fit, one.fit->starts(), 1, {});
   }
 
   enum class From { kAllWays, kNamedWay };
@@ -83,7 +88,7 @@ class FoldFitter {
     if (!(priceOf(named.front(), used) < priceOf(chosen.back(), used))) return chosen;
     while (!named.front().terms.empty()) {
       const identify::GapModel fewer = identify::withoutTerm(named.front(), named.front().terms.size() - 1);
-      named.insert(named.begin(), fewer.terms.empty() ? none : search_.refined(fewer, used).model);
+      named.insert(named.begin(), fewer.terms.empty() ? none : search_.fitted(fewer, used));
     }
     return named;
   }
@@ -92,7 +97,7 @@ class FoldFitter {
   /// anew: which body it was and when it moved is told by so few rows that its places would bring the fold what its own
   /// rows do not know.
   identify::GapModel namedOn(int block, std::span<const char> used) const {
-    if (!actsInTime()) return search_.refined(selection_.model.model, used).model;
+    if (!actsInTime()) return search_.fitted(selection_.model.model, used);
     identify::GapModel model = search_.none().model;
     for (std::size_t s = 0; s < selection_.ways.size(); ++s) addBest(block, used, s, From::kNamedWay, model);
     return model;
@@ -123,6 +128,8 @@ class FoldFitter {
     const identify::GapModel from = search_.seenFrom(step == 0 ? search_.none().model : model);
     const identify::Linearized at(search_.physics(), from, search_.whitening(), blocks_,
                                   identify::ResponseAt::kHalfWayIfBent);
+    std::optional<identify::Scanner> scanner;
+    if (step > 0) scanner.emplace(at);
     const auto held_out = static_cast<std::size_t>(block);
     struct Start {
       std::size_t way = 0;
@@ -136,7 +143,7 @@ class FoldFitter {
       const auto is_there = [&](const identify::GapTerm& term) { return term.effect == way.effect; };
       const bool is_named = from_ways == From::kNamedWay;
       if (is_named ? w != step : std::any_of(model.terms.begin(), model.terms.end(), is_there)) continue;
-      const identify::ScanResult scan = step == 0 ? first_[w] : scanned(at, ways_[w]);
+      const identify::ScanResult scan = scanner ? scanned(*scanner, ways_[w]) : first_[w];
       if (scan.without_block.size() <= held_out) continue;
       const identify::ScanResult::Start& start = scan.without_block[held_out];
       const auto parameters = static_cast<double>(way.fit->searched().size());
@@ -151,12 +158,13 @@ class FoldFitter {
     double best = from_ways == From::kNamedWay ? std::numeric_limits<double>::infinity()
                                                : search_.bicOf(model, used) - leastGain(step, used);
     const identify::GapModel before = search_.seenFrom(model);
+    const identify::LocalFitter near(at, held_out);
     for (const Start& start : starts) {
       const identify::EffectWay& way = search_.ways()[start.way];
-      const identify::LocalFit local = identify::refineLocally(at, *way.fit, start.searched, held_out);
+      const identify::LocalFit local = near.from(*way.fit, start.searched);
       identify::GapModel tried = before;
       tried.terms.push_back({way.effect, way.fit, local.searched, local.linear});
-      tried = search_.refined(tried, used).model;
+      tried = search_.fitted(tried, used);
       const double bic = search_.bicOf(tried, used);
       if (bic >= best) continue;
       best = bic;
@@ -210,7 +218,7 @@ UnseenScores scoreUnseen(const identify::GapSearch& search, const identify::Effe
   const std::vector<UnseenRow> empty(blocks.size());
   scores.step.assign(selection.ways.size() + 1, empty);
   scores.smooth = scores.both = empty;
-  const FoldFitter fitter(search, selection, rival, laws, blocks, scores);
+  const FoldFitter fitter(search, selection, rival, laws, blocks, scores, control);
   const int n_blocks = 1 + *std::max_element(blocks.begin(), blocks.end());
   control.parallel_for(static_cast<std::size_t>(n_blocks), [&](std::size_t block) {
     if (!control.stop.stop_requested()) fitter.run(static_cast<int>(block), control);

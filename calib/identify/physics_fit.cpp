@@ -180,7 +180,7 @@ Result<std::vector<ScenePositions>> refitted(const GapSearch& search, const GapM
   control.parallel_for(models.size(), [&](std::size_t fold) {
     std::vector<char> used;
     for (const GapRow& row : rows) used.push_back(fold_of_node.at(row.node) != static_cast<int>(fold) ? 1 : 0);
-    models[fold] = search.refined(model, used).model;
+    models[fold] = search.fitted(model, used);
   });
   std::vector<ScenePositions> scenes;
   for (const GapModel& one : models) {
@@ -204,7 +204,7 @@ CalibrationTable searchedPart(CalibrationTable table, const std::set<int>& searc
 GapModel refinedOn(const GapRows& rows, const GapSearch& search, const GapModel& model) {
   if (rows.rows.size() == search.physics().size()) return model;
   const Whitening whitening = makeWhitening(rows, search.placingSd_m(), search.placingSd_rad());
-  return refineJointly(GapPhysics(rows, {}), model, whitening, {search.law()}).model;
+  return fitJointly(GapPhysics(rows, {}), model, whitening, {search.law()});
 }
 
 PhysicsFit noPhysics(PhysicsFit fit, std::string why) {

@@ -21,7 +21,7 @@ std::optional<double> side(const GapSearch& search, const RefinedModel& refined,
   for (int i = 0; i < kMostSteps; ++i) {
     model.terms[term].searched[searched] = center + step;
     if (!model.terms[term].fit->allows(model.terms[term].searched)) return std::nullopt;
-    model = search.refinedWithout(model, column).model;
+    model = search.fittedWithout(model, column);
     const double root = std::sqrt(std::max(0.0, search.bicOf(model) - best_bic));
     const double wanted = std::sqrt(kFall);
     if (std::abs(root - wanted) < 0.1 * wanted) return center + step;

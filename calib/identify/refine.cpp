@@ -44,28 +44,19 @@ class ProjectedFit {
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = Eigen::Dynamic };
 
-  ProjectedFit(const Linearized& at, const effects::EffectFit& fit, std::optional<std::size_t> held_out)
-      : at_(at), fit_(fit), prior_(priorOf(fit)) {
-    for (std::size_t b = 0; b < at.segments().size(); ++b)
-      if (held_out != b) parts_.push_back(at.segments()[b]);
-    const Segment& last = at.segments().back();
-    const Eigen::Index end = last.begin + last.count;
-    if (end < at.size()) parts_.push_back({end, at.size() - end});
-    basis_ = spanOf(picked(at.nuisance()));
-    residual_ = projected(picked(at.residual()));
+  ProjectedFit(const LocalFitter& rows, const effects::EffectFit& fit) : rows_(rows), fit_(fit), prior_(priorOf(fit)) {
     for (const effects::FitParameter& p : fit.searched()) width_.push_back(std::max(1e-6, p.high - p.low));
   }
 
-  int NumResiduals() const { return static_cast<int>(residual_.size()); }
+  int NumResiduals() const { return static_cast<int>(rows_.residual().size()); }
   int NumParameters() const { return static_cast<int>(width_.size()); }
-  double sumOfSquares() const { return residual_.squaredNorm(); }
 
   struct Solved {
     Eigen::VectorXd linear;
     Eigen::VectorXd left;
   };
   Solved solved(const Eigen::VectorXd& searched) const {
-    Eigen::MatrixXd columns = projected(picked(at_.columns(fit_, searched)));
+    Eigen::MatrixXd columns = rows_.columns(fit_, searched);
     Eigen::VectorXd scale(columns.cols());
     for (Eigen::Index j = 0; j < columns.cols(); ++j) {
       const double norm = columns.col(j).norm();
@@ -75,9 +66,9 @@ class ProjectedFit {
     Eigen::MatrixXd normal = columns.transpose() * columns;
     normal.diagonal().array() += 1e-9;
     normal.diagonal() += scale.cwiseAbs2().cwiseProduct(prior_.precision);
-    Eigen::VectorXd y = normal.llt().solve(columns.transpose() * residual_);
+    Eigen::VectorXd y = normal.llt().solve(columns.transpose() * rows_.residual());
     if (y.size() == 1 && scale[0] > 0.0) y[0] = std::clamp(y[0], prior_.low / scale[0], prior_.high / scale[0]);
-    return {scale.asDiagonal() * y, residual_ - columns * y};
+    return {scale.asDiagonal() * y, rows_.residual() - columns * y};
   }
 
   bool operator()(const double* searched, double* residuals, double* jacobian) const {
@@ -101,25 +92,9 @@ class ProjectedFit {
   }
 
  private:
-  Eigen::MatrixXd picked(const Eigen::MatrixXd& all) const {
-    Eigen::Index rows = 0;
-    for (const Segment& part : parts_) rows += part.count;
-    Eigen::MatrixXd picked(rows, all.cols());
-    Eigen::Index at = 0;
-    for (const Segment& part : parts_) {
-      picked.middleRows(at, part.count) = all.middleRows(part.begin, part.count);
-      at += part.count;
-    }
-    return picked;
-  }
-  Eigen::MatrixXd projected(const Eigen::MatrixXd& m) const { return m - basis_ * (basis_.transpose() * m); }
-
-  const Linearized& at_;
+  const LocalFitter& rows_;
   const effects::EffectFit& fit_;
   LinearPrior prior_;
-  std::vector<Segment> parts_;
-  Eigen::MatrixXd basis_;
-  Eigen::VectorXd residual_;
   std::vector<double> width_;
 };
 
@@ -165,9 +140,18 @@ double priorCost(const GapPhysics& physics, const GapModel& model) {
   return cost;
 }
 
-LocalFit refineLocally(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& start,
-                       std::optional<std::size_t> held_out) {
-  const ProjectedFit projected(at, fit, held_out);
+LocalFitter::LocalFitter(const Linearized& at, std::optional<std::size_t> held_out) : at_(at) {
+  for (std::size_t b = 0; b < at.segments().size(); ++b)
+    if (held_out != b) parts_.push_back(at.segments()[b]);
+  const Segment& last = at.segments().back();
+  const Eigen::Index end = last.begin + last.count;
+  if (end < at.size()) parts_.push_back({end, at.size() - end});
+  basis_ = spanOf(picked(at.nuisance()));
+  residual_ = projected(picked(at.residual()));
+}
+
+LocalFit LocalFitter::from(const effects::EffectFit& fit, const Eigen::VectorXd& start) const {
+  const ProjectedFit projected(*this, fit);
   LocalFit local;
   local.searched = start;
   if (start.size() > 0) {
@@ -182,8 +166,25 @@ LocalFit refineLocally(const Linearized& at, const effects::EffectFit& fit, cons
   }
   ProjectedFit::Solved solved = projected.solved(local.searched);
   local.linear = std::move(solved.linear);
-  local.gain = projected.sumOfSquares() - solved.left.squaredNorm();
+  local.gain = residual_.squaredNorm() - solved.left.squaredNorm();
   return local;
+}
+
+Eigen::MatrixXd LocalFitter::columns(const effects::EffectFit& fit, const Eigen::VectorXd& searched) const {
+  return projected(picked(at_.columns(fit, searched)));
+}
+
+Eigen::MatrixXd LocalFitter::picked(Eigen::MatrixXd all) const {
+  Eigen::Index rows = 0;
+  for (const Segment& part : parts_) rows += part.count;
+  if (rows == all.rows()) return all;
+  Eigen::MatrixXd picked(rows, all.cols());
+  Eigen::Index at = 0;
+  for (const Segment& part : parts_) {
+    picked.middleRows(at, part.count) = all.middleRows(part.begin, part.count);
+    at += part.count;
+  }
+  return picked;
 }
 
 namespace {
@@ -202,7 +203,7 @@ class JointFit {
   JointFit(const GapPhysics& physics, const Whitening& whitening, const RefineOptions& options)
       : physics_(physics), whitening_(whitening), options_(options), block_(physics.size(), 0) {}
 
-  RefinedModel run(const GapModel& start) {
+  GapModel fitted(const GapModel& start) {
     State state = stateOf(start);
     double cost = adaptedCostOf(state);
     double damping = kFirstDamping;
@@ -213,12 +214,29 @@ class JointFit {
       cost = adaptedCostOf(state);
       if (fall < kEnough) break;
     }
-    return finished(std::move(state), cost);
+    return std::move(state.model);
+  }
+
+  RefinedModel withCovariance(const GapModel& model) {
+    const State state = stateOf(model);
+    RefinedModel refined;
+    refined.cost = adaptedCostOf(state);
+    const Linearized at = linearizedAt(state);
+    const Eigen::MatrixXd& J = at.nuisance();
+    Eigen::MatrixXd normal = normalOf(J, weights(at));
+    Eigen::VectorXd unused = Eigen::VectorXd::Zero(J.cols());
+    addPriors(model, at.nAlignment(), normal, unused);
+    const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
+    normal = scale.asDiagonal() * normal * scale.asDiagonal();
+    normal.diagonal().array() += 1e-9;
+    refined.covariance =
+        scale.asDiagonal() * normal.ldlt().solve(Eigen::MatrixXd::Identity(J.cols(), J.cols())) * scale.asDiagonal();
+    refined.n_alignment = at.nAlignment();
+    refined.model = model;
+    return refined;
   }
 
  private:
-  bool isUsed(std::size_t row) const { return options_.used.empty() || options_.used[row] != 0; }
-
   static constexpr double kFirstDamping = 1e-3;
 
   /// A model and what a tracker reports in it, which is most of the work.
@@ -226,6 +244,8 @@ class JointFit {
     GapModel model;
     std::vector<Pose> predicted;
   };
+
+  bool isUsed(std::size_t row) const { return options_.used.empty() || options_.used[row] != 0; }
 
   State stateOf(GapModel model) const {
     std::vector<Pose> predicted = physics_.predictions(model);
@@ -253,10 +273,14 @@ class JointFit {
     system.center_m = alignmentCenter_m(at.settings());
     system.n_alignment = at.nAlignment();
     const Eigen::VectorXd w = weights(at);
-    Eigen::MatrixXd J = at.nuisance();
-    if (options_.frozen) J.col(*options_.frozen).setZero();
+    const Eigen::MatrixXd& J = at.nuisance();
     system.normal = normalOf(J, w);
     system.right = J.transpose() * (w.asDiagonal() * at.residual());
+    if (options_.frozen) {
+      system.normal.col(*options_.frozen).setZero();
+      system.normal.row(*options_.frozen).setZero();
+      system.right[*options_.frozen] = 0.0;
+    }
     addPriors(state.model, at.nAlignment(), system.normal, system.right);
     system.scale = system.normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
     return system;
@@ -382,24 +406,6 @@ class JointFit {
     return w;
   }
 
-  RefinedModel finished(State state, double cost) const {
-    const Linearized at = linearizedAt(state);
-    const Eigen::MatrixXd& J = at.nuisance();
-    Eigen::MatrixXd normal = normalOf(J, weights(at));
-    Eigen::VectorXd unused = Eigen::VectorXd::Zero(J.cols());
-    addPriors(state.model, at.nAlignment(), normal, unused);
-    const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
-    normal = scale.asDiagonal() * normal * scale.asDiagonal();
-    normal.diagonal().array() += 1e-9;
-    RefinedModel refined;
-    refined.covariance =
-        scale.asDiagonal() * normal.ldlt().solve(Eigen::MatrixXd::Identity(J.cols(), J.cols())) * scale.asDiagonal();
-    refined.n_alignment = at.nAlignment();
-    refined.model = std::move(state.model);
-    refined.cost = cost;
-    return refined;
-  }
-
   const GapPhysics& physics_;
   const Whitening& whitening_;
   const RefineOptions& options_;
@@ -411,7 +417,17 @@ class JointFit {
 
 RefinedModel refineJointly(const GapPhysics& physics, const GapModel& start, const Whitening& whitening,
                            const RefineOptions& options) {
-  return JointFit(physics, whitening, options).run(start);
+  return withCovariance(physics, fitJointly(physics, start, whitening, options), whitening, options);
+}
+
+RefinedModel withCovariance(const GapPhysics& physics, const GapModel& fitted, const Whitening& whitening,
+                            const RefineOptions& options) {
+  return JointFit(physics, whitening, options).withCovariance(fitted);
+}
+
+GapModel fitJointly(const GapPhysics& physics, const GapModel& start, const Whitening& whitening,
+                    const RefineOptions& options) {
+  return JointFit(physics, whitening, options).fitted(start);
 }
 
 Eigen::Index firstParameterOf(const RefinedModel& refined, std::size_t term) {

@@ -38,17 +38,36 @@ std::vector<Vector6d> whitenedResiduals(const GapPhysics& physics, const GapMode
 /// Minus twice the log prior of a model: the rig's stated tolerances, and what is believable of linear effects.
 double priorCost(const GapPhysics& physics, const GapModel& model);
 
-/// Refines the searched parameters of one fit near a start by Levenberg and Marquardt, all linear parameters and the
-/// nuisance projected out.
-/// @param held_out block left out; none = all rows
-/// @source variable projection: Golub and Pereyra 1973, SIAM J. Numer. Anal. 10 413
 struct LocalFit {
   Eigen::VectorXd searched;
   Eigen::VectorXd linear;
   double gain = 0.0;  ///< Fall of the sum of squares of the rows used.
 };
-LocalFit refineLocally(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& start,
-                       std::optional<std::size_t> held_out = std::nullopt);
+
+/// Refines the searched parameters of fits near their starts by Levenberg and Marquardt, all linear parameters and the
+/// nuisance projected out.
+/// @source variable projection: Golub and Pereyra 1973, SIAM J. Numer. Anal. 10 413
+class LocalFitter {
+ public:
+  /// @param at outlives it
+  /// @param held_out block left out; none = all rows
+  explicit LocalFitter(const Linearized& at, std::optional<std::size_t> held_out = std::nullopt);
+
+  LocalFit from(const effects::EffectFit& fit, const Eigen::VectorXd& start) const;
+
+  /// Columns of a fit on the rows that count, less what the nuisance makes of them; and the residual likewise.
+  Eigen::MatrixXd columns(const effects::EffectFit& fit, const Eigen::VectorXd& searched) const;
+  const Eigen::VectorXd& residual() const { return residual_; }
+
+ private:
+  Eigen::MatrixXd picked(Eigen::MatrixXd all) const;
+  Eigen::MatrixXd projected(const Eigen::MatrixXd& m) const { return m - basis_ * (basis_.transpose() * m); }
+
+  const Linearized& at_;
+  std::vector<Segment> parts_;
+  Eigen::MatrixXd basis_;
+  Eigen::VectorXd residual_;
+};
 
 struct RefineOptions {
   ResidualLaw law;
@@ -72,5 +91,10 @@ Eigen::Index firstParameterOf(const RefinedModel& refined, std::size_t term);
 /// with weights that follow the residual law.
 RefinedModel refineJointly(const GapPhysics& physics, const GapModel& start, const Whitening& whitening,
                            const RefineOptions& options);
+/// The two halves of it: covariance and cost of a model that is fitted already cost as much as a step of the fit.
+GapModel fitJointly(const GapPhysics& physics, const GapModel& start, const Whitening& whitening,
+                    const RefineOptions& options);
+RefinedModel withCovariance(const GapPhysics& physics, const GapModel& fitted, const Whitening& whitening,
+                            const RefineOptions& options);
 
 }  // namespace fieldtrue::identify

@@ -4,6 +4,7 @@
 
 #include "calib/core/calibration_table.h"
 #include "calib/recording/finding.h"
+#include "calib/recording/sample_spectrum.h"
 #include "calib/simulation/scene.h"
 
 namespace fieldtrue::identify {

@@ -84,9 +84,11 @@ double heldOut(const Gram& gram, const Gram& own, const Gram& mixed, const Nuisa
   return heldOut(gram, x.nuisance) + x.effect.dot(own * x.effect) + 2.0 * x.effect.dot(of_nuisance);
 }
 
-class Scanner {
+}  // namespace
+
+class Scanner::Products {
  public:
-  explicit Scanner(const Linearized& at) : at_(at) {
+  explicit Products(const Linearized& at) : at_(at) {
     const Eigen::Index q = at.nuisance().cols();
     fixed_.resize(at.size(), q + 1);
     fixed_.leftCols(q) = at.nuisance();
@@ -99,6 +101,8 @@ class Scanner {
       base_held_out_.push_back(heldOut(fixed_grams_[b], fits_.back().alone().nuisance));
     }
   }
+
+  const Linearized& at() const { return at_; }
 
   struct Tried {
     double gain = 0.0;
@@ -151,7 +155,7 @@ class Scanner {
   std::vector<double> base_held_out_;
 };
 
-}  // namespace
+Scanner::Scanner(const Linearized& at) : products_(std::make_shared<const Products>(at)) {}
 
 std::vector<Eigen::VectorXd> startsAt(const effects::EffectFit& fit, std::span<const Eigen::Vector3d> centers_m) {
   std::vector<Eigen::VectorXd> others;
@@ -173,14 +177,14 @@ std::vector<Eigen::VectorXd> startsAt(const effects::EffectFit& fit, std::span<c
   return starts;
 }
 
-ScanResult scan(const Linearized& at, const effects::EffectFit& fit, std::vector<Eigen::VectorXd> starts,
-                std::size_t kept, const RunControl& control) {
+ScanResult Scanner::scan(const effects::EffectFit& fit, std::vector<Eigen::VectorXd> starts, std::size_t kept,
+                         const RunControl& control) const {
   std::erase_if(starts, [&](const Eigen::VectorXd& start) { return !fit.allows(start); });
-  const Scanner scanner(at);
+  const Linearized& at = products_->at();
   const LinearPrior prior = priorOf(fit);
-  std::vector<Scanner::Tried> tried(starts.size());
+  std::vector<Products::Tried> tried(starts.size());
   control.parallel_for(starts.size(), [&](std::size_t i) {
-    if (!control.stop.stop_requested()) tried[i] = scanner.tryColumns(at.columns(fit, starts[i]), prior);
+    if (!control.stop.stop_requested()) tried[i] = products_->tryColumns(at.columns(fit, starts[i]), prior);
   });
   ScanResult result;
   if (control.stop.stop_requested() || starts.empty()) return result;
@@ -200,13 +204,13 @@ ScanResult scan(const Linearized& at, const effects::EffectFit& fit, std::vector
   return result;
 }
 
-double heldOutGainFrom(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& searched) {
-  const Scanner scanner(at);
+double Scanner::heldOutGainFrom(const effects::EffectFit& fit, const Eigen::VectorXd& searched) const {
+  const Linearized& at = products_->at();
   const LinearPrior prior = priorOf(fit);
   double gain = 0.0;
   for (std::size_t b = 0; b < at.segments().size(); ++b) {
-    const LocalFit settled = refineLocally(at, fit, searched, b);
-    gain += scanner.tryColumns(at.columns(fit, settled.searched), prior).held_out[b];
+    const LocalFit settled = LocalFitter(at, b).from(fit, searched);
+    gain += products_->tryColumns(at.columns(fit, settled.searched), prior).held_out[b];
   }
   return gain;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -23,13 +24,24 @@ struct ScanResult {
 /// The starts of such a fit moved to the given centres, one for each of its other coarse values.
 std::vector<Eigen::VectorXd> startsAt(const effects::EffectFit& fit, std::span<const Eigen::Vector3d> centers_m);
 
-/// Tries starts of a fit, its linear parameters and those of `at` refitted, on all rows and with each block held out:
-/// the cross products of each block are summed once, so a hold-out costs no pass over the rows.
-ScanResult scan(const Linearized& at, const effects::EffectFit& fit, std::vector<Eigen::VectorXd> starts,
-                std::size_t kept, const RunControl& control);
+/// Tries starts of fits, their linear parameters and those of a linearised model refitted, on all rows and with each
+/// block held out: the cross products of each block are summed once, so a hold-out costs no pass over the rows.
+class Scanner {
+ public:
+  /// @param at outlives it
+  explicit Scanner(const Linearized& at);
 
-/// Fall of the held-out sum of squares over all blocks where each block's other rows settle the searched parameters
-/// themselves, from the given ones: what the coarse grid is too coarse to tell.
-double heldOutGainFrom(const Linearized& at, const effects::EffectFit& fit, const Eigen::VectorXd& searched);
+  /// @param kept how many starts are told, of all rows
+  ScanResult scan(const effects::EffectFit& fit, std::vector<Eigen::VectorXd> starts, std::size_t kept,
+                  const RunControl& control) const;
+
+  /// Fall of the held-out sum of squares over all blocks where each block's other rows settle the searched parameters
+  /// themselves, from the given ones: what the coarse grid is too coarse to tell.
+  double heldOutGainFrom(const effects::EffectFit& fit, const Eigen::VectorXd& searched) const;
+
+ private:
+  class Products;
+  std::shared_ptr<const Products> products_;
+};
 
 }  // namespace fieldtrue::identify

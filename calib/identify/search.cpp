@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "calib/core/statistics.h"
+#include "calib/identify/scan.h"
 
 namespace fieldtrue::identify {
 namespace {
@@ -25,13 +25,6 @@ double pitchOf_m(std::span<const field::SensorSetting> settings) {
     if (nearest_m.size() > 300) break;
   }
   return nearest_m.empty() ? 0.1 : median(std::move(nearest_m));
-}
-
-/// A part of what already runs in several threads, stopped with the whole.
-RunControl inOneThread(const RunControl& control) {
-  RunControl part;
-  part.stop = control.stop;
-  return part;
 }
 
 }  // namespace
@@ -87,12 +80,14 @@ std::vector<GapModel> GapSearch::simplestBesideAlignment(const RunControl& contr
   constexpr std::size_t kMostParameters = 4;  // Of a plane, or a sphere.
   const GapModel from = seenFrom(none_.model);
   const Linearized at(physics_, from, whitening_, space_blocks_, ResponseAt::kHalfWayIfBent);
+  const Scanner scanner(at);
+  const LocalFitter near(at);
   std::vector<GapModel> models;
   for (const EffectWay& way : ways_) {
     const std::size_t searched = way.fit->searched().size();
     if (searched == 0 || way.needs_time || searched + way.fit->linear().size() > kMostParameters) continue;
-    for (const ScanResult::Start& start : scan(at, *way.fit, way.fit->starts(), kStrongStarts, control).best) {
-      const LocalFit local = refineLocally(at, *way.fit, start.searched);
+    for (const ScanResult::Start& start : scanner.scan(*way.fit, way.fit->starts(), kStrongStarts, control).best) {
+      const LocalFit local = near.from(*way.fit, start.searched);
       models.push_back(from);
       models.back().terms.push_back({way.effect, way.fit, local.searched, local.linear});
     }
@@ -101,7 +96,7 @@ std::vector<GapModel> GapSearch::simplestBesideAlignment(const RunControl& contr
   options.law = law_;
   options.bounded_by_places = false;
   control.parallel_for(models.size(), [&](std::size_t i) {
-    if (!control.stop.stop_requested()) models[i] = refineJointly(physics_, models[i], whitening_, options).model;
+    if (!control.stop.stop_requested()) models[i] = fitJointly(physics_, models[i], whitening_, options);
   });
   return models;
 }
@@ -228,185 +223,20 @@ double GapSearch::bicOf(const GapModel& model, std::span<const char> used) const
          priorCost(physics_, model);
 }
 
-RefinedModel GapSearch::refined(const GapModel& start, std::span<const char> used) const {
-  RefineOptions options;
-  options.used = used;
-  options.law = law_;
-  return refineJointly(physics_, start, whitening_, options);
+RefinedModel GapSearch::withCovariance(const GapModel& fitted) const {
+  return identify::withCovariance(physics_, fitted, whitening_, {law_});
 }
 
-RefinedModel GapSearch::refinedWithout(const GapModel& start, Eigen::Index frozen) const {
+GapModel GapSearch::fitted(const GapModel& start, std::span<const char> used) const {
+  return fitJointly(physics_, start, whitening_, {law_, used});
+}
+
+GapModel GapSearch::fittedWithout(const GapModel& start, Eigen::Index frozen) const {
   RefineOptions options;
   options.law = law_;
   options.frozen = frozen;
   options.most_steps = 8;
-  return refineJointly(physics_, start, whitening_, options);
-}
-
-std::optional<TriedEffect> GapSearch::tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
-                                             const GapModel& base, const RunControl& control) const {
-  constexpr std::size_t kStarts = 5;
-  const EffectWay& chosen = ways_[way];
-  const Linearized& at = chosen.needs_time ? in_time : in_space;
-  TriedEffect tried;
-  tried.way = way;
-  tried.bic_gain = -std::numeric_limits<double>::infinity();
-  tried.scan = scan(at, *chosen.fit, chosen.fit->starts(), kStarts, control);
-  if (tried.scan.best.empty()) return std::nullopt;
-  refineFrom(tried.scan.best, at, base, tried);
-  tried.held_out_gain = std::accumulate(tried.scan.held_out_gain.begin(), tried.scan.held_out_gain.end(), 0.0);
-  return tried;
-}
-
-void GapSearch::refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const GapModel& base,
-                           TriedEffect& tried) const {
-  const EffectWay& chosen = ways_[tried.way];
-  constexpr double kHopeful = 0.4;  // Of the best start's gain.
-  std::optional<LocalFit> best;
-  for (const ScanResult::Start& start : starts) {
-    if (best && start.gain < kHopeful * starts.front().gain) break;
-    LocalFit local = refineLocally(at, *chosen.fit, start.searched);
-    if (!best || local.gain > best->gain) best = std::move(local);
-  }
-  if (!best) return;
-  GapTerm term{chosen.effect, chosen.fit, best->searched, best->linear};
-  const double count = static_cast<double>(rows_.rows.size()) * rows_.channels();
-  const double sum = at.residual().squaredNorm();
-  const double left = std::max(1e-9 * sum, sum - best->gain);
-  const double gain = count * std::log(sum / left) - static_cast<double>(parametersOf({{}, {term}})) * std::log(count);
-  if (gain <= tried.bic_gain) return;
-  tried.bic_gain = gain;
-  tried.model = base;
-  tried.model.terms.push_back(std::move(term));
-}
-
-void GapSearch::shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                             const GapModel& base, const RunControl& control) const {
-  constexpr std::size_t kCenters = 4;
-  constexpr std::size_t kStarts = 2;
-  constexpr double kApart_m = 0.1;
-  std::vector<Eigen::Vector3d> centers_m;
-  for (const TriedEffect& one : tried) {
-    if (centers_m.size() >= kCenters) break;
-    const GapTerm& term = one.model.terms.back();
-    if (!term.fit->searchesPlace()) continue;
-    const Eigen::Vector3d center_m = term.searched.head<3>();
-    const auto is_near = [&](const Eigen::Vector3d& other_m) { return (other_m - center_m).norm() < kApart_m; };
-    if (std::none_of(centers_m.begin(), centers_m.end(), is_near)) centers_m.push_back(center_m);
-  }
-  control.parallel_for(tried.size(), [&](std::size_t i) {
-    TriedEffect& one = tried[i];
-    const EffectWay& way = ways_[one.way];
-    if (!way.fit->searchesPlace() || control.stop.stop_requested()) return;
-    const Linearized& at = way.needs_time ? in_time : in_space;
-    const ScanResult again = scan(at, *way.fit, startsAt(*way.fit, centers_m), kStarts, inOneThread(control));
-    refineFrom(again.best, at, base, one);
-    const double held_out = std::accumulate(again.held_out_gain.begin(), again.held_out_gain.end(), 0.0);
-    one.held_out_gain = std::max(one.held_out_gain, held_out);
-  });
-}
-
-namespace {
-
-/// Whether two fits search places and, but for the last parameter, the same shape, so that one may start where another
-/// ended.
-bool areOfOneShape(const effects::EffectFit& a, const effects::EffectFit& b) {
-  constexpr std::size_t kPlaceOnly = 3;
-  const std::vector<effects::FitParameter> of_a = a.searched(), of_b = b.searched();
-  return a.searchesPlace() && of_a.size() > kPlaceOnly + 1 && of_a.size() == of_b.size() &&
-         std::equal(of_a.begin(), of_a.end() - 1, of_b.begin(),
-                    [](const auto& x, const auto& y) { return x.name == y.name; });
-}
-
-}  // namespace
-
-void GapSearch::shareShapes(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                            const GapModel& base, const RunControl& control) const {
-  std::vector<GapTerm> ended;
-  for (const TriedEffect& one : tried) ended.push_back(one.model.terms.back());
-  control.parallel_for(tried.size(), [&](std::size_t i) {
-    const EffectWay& way = ways_[tried[i].way];
-    for (std::size_t k = 0; k < ended.size(); ++k) {
-      if (k == i || control.stop.stop_requested() || !areOfOneShape(*way.fit, *ended[k].fit)) continue;
-      const effects::FitParameter last = way.fit->searched().back();
-      Eigen::VectorXd start = ended[k].searched;
-      start.tail<1>()[0] = std::clamp(start.tail<1>()[0], last.low, last.high);
-      const ScanResult::Start from{start, 0.0};
-      if (way.fit->allows(start)) refineFrom({&from, 1}, way.needs_time ? in_time : in_space, base, tried[i]);
-    }
-  });
-}
-
-void GapSearch::finish(TriedEffect& tried, const Linearized& at, double base_bic) const {
-  tried.refined = refined(tried.model);
-  tried.model = tried.refined.model;
-  const GapTerm& term = tried.model.terms.back();
-  if (tried.held_out_gain <= 0.0 && term.searched.size() > 0)
-    tried.held_out_gain = heldOutGainFrom(at, *term.fit, term.searched);
-  tried.fitted = term.fit->describe(term.searched, term.linear);
-  tried.bic_gain = base_bic - bicOf(tried.model) - (tried.fitted.is_plausible ? 0.0 : thresholds_.implausible_cost);
-  if (term.effect->is_freer) tried.bic_gain -= thresholds_.share_of_freer * std::max(0.0, tried.bic_gain);
-}
-
-/// The linearised gain of a strong effect can be a fifth off, and flatters: whatever is near the best of those fitted
-/// exactly is fitted exactly too.
-void GapSearch::finishBest(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                           const RefinedModel& base, const RunControl& control) const {
-  constexpr double kNear = 60.0;
-  constexpr double kNearNothing = 25.0;
-  constexpr double kNearShare = 0.2;
-  const double base_bic = bicOf(base.model);
-  double best = tried.empty() ? 0.0 : tried.front().bic_gain;
-  double margin = best < kNearNothing ? kNearNothing : std::max(kNear, kNearShare * best);
-  for (;;) {
-    std::vector<std::size_t> due;
-    for (std::size_t i = 0; i < tried.size(); ++i)
-      if (tried[i].refined.model.terms.empty() && tried[i].bic_gain >= best - margin) due.push_back(i);
-    if (due.empty() || control.stop.stop_requested()) return;
-    control.parallel_for(due.size(), [&](std::size_t k) {
-      TriedEffect& one = tried[due[k]];
-      finish(one, ways_[one.way].needs_time ? in_time : in_space, base_bic);
-    });
-    best = 0.0;
-    for (const TriedEffect& one : tried)
-      if (!one.refined.model.terms.empty()) best = std::max(best, one.bic_gain);
-    margin = std::clamp(best, kNearNothing, kNear);
-  }
-}
-
-std::vector<TriedEffect> GapSearch::rank(const RefinedModel& base, const RunControl& control) const {
-  const GapModel from = seenFrom(base.model);
-  const Linearized in_space(physics_, from, whitening_, space_blocks_, ResponseAt::kHalfWayIfBent);
-  const Linearized in_time(physics_, from, whitening_, time_blocks_, ResponseAt::kHalfWayIfBent);
-  std::vector<std::optional<TriedEffect>> of_ways(ways_.size());
-  control.parallel_for(ways_.size(), [&](std::size_t way) {
-    of_ways[way] = tryWay(way, in_space, in_time, from, inOneThread(control));
-  });
-  if (control.stop.stop_requested()) return {};
-  std::vector<TriedEffect> tried;
-  for (auto& one : of_ways)
-    if (one) tried.push_back(std::move(*one));
-  const auto better = [](const TriedEffect& a, const TriedEffect& b) { return a.bic_gain > b.bic_gain; };
-  std::stable_sort(tried.begin(), tried.end(), better);
-  shareCenters(tried, in_space, in_time, from, control);
-  shareShapes(tried, in_space, in_time, from, control);
-  std::stable_sort(tried.begin(), tried.end(), better);
-  finishBest(tried, in_space, in_time, base, control);
-  for (TriedEffect& one : tried) {
-    if (!one.refined.model.terms.empty()) continue;
-    const GapTerm& term = one.model.terms.back();
-    one.fitted = term.fit->describe(term.searched, term.linear);
-    if (!one.fitted.is_plausible) one.bic_gain -= thresholds_.implausible_cost;
-  }
-  std::stable_sort(tried.begin(), tried.end(), better);
-  std::vector<TriedEffect> of_each;
-  for (TriedEffect& one : tried) {
-    const bool is_new = std::none_of(of_each.begin(), of_each.end(), [&](const TriedEffect& other) {
-      return ways_[other.way].effect == ways_[one.way].effect;
-    });
-    if (is_new) of_each.push_back(std::move(one));
-  }
-  return of_each;
+  return fitJointly(physics_, start, whitening_, options);
 }
 
 }  // namespace fieldtrue::identify

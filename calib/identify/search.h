@@ -8,7 +8,6 @@
 
 #include "calib/core/run_control.h"
 #include "calib/identify/refine.h"
-#include "calib/identify/scan.h"
 #include "calib/identify/structure.h"
 
 namespace fieldtrue::identify {
@@ -18,18 +17,6 @@ struct EffectWay {
   const effects::Effect* effect = nullptr;
   std::shared_ptr<const effects::EffectFit> fit;
   bool needs_time = false;  ///< Held out by blocks of time, not of space.
-};
-
-/// One effect tried on top of a model.
-struct TriedEffect {
-  std::size_t way = 0;  ///< Index into GapSearch::ways().
-  GapModel model;       ///< With it, all parameters refitted together.
-  RefinedModel refined;
-  double bic_gain = 0.0;       ///< Against the model without it.
-  double held_out_gain = 0.0;  ///< Fall of the held-out sum of squares over all blocks, whitened.
-  double held_out_before = 0.0;
-  effects::FittedEffect fitted;
-  ScanResult scan;
 };
 
 /// Whether the rig's tolerance is taken as stated or as the flexible fit of the residuals shows it.
@@ -76,14 +63,14 @@ class GapSearch {
   /// Whether readings are of their places at all: no sensor's are mirror images of them, and half of them lie near.
   bool belongTogether() const;
 
+  /// Criterion of a model, and its parameters fitted together from a start.
   /// @param used per row, which rows count; empty = all
   double bicOf(const GapModel& model, std::span<const char> used = {}) const;
-  RefinedModel refined(const GapModel& start, std::span<const char> used = {}) const;
+  GapModel fitted(const GapModel& start, std::span<const char> used = {}) const;
+  RefinedModel withCovariance(const GapModel& fitted) const;
+  RefinedModel refined(const GapModel& start) const { return withCovariance(fitted(start)); }
   /// All but one parameter refitted, counted as in RefinedModel::covariance.
-  RefinedModel refinedWithout(const GapModel& start, Eigen::Index frozen) const;
-  /// Every effect added to a model, best first; only the best way of each effect.
-  /// @param slow_only_near how far below the best a linearised gain may be for the full refinement
-  std::vector<TriedEffect> rank(const RefinedModel& base, const RunControl& control) const;
+  GapModel fittedWithout(const GapModel& start, Eigen::Index frozen) const;
 
  private:
   enum class Channel { kPosition, kRotation };
@@ -94,20 +81,6 @@ class GapSearch {
   std::optional<GapModel> settleVantage(const RunControl& control);
   bool isBent(const GapModel& model) const;
   std::vector<GapModel> simplestBesideAlignment(const RunControl& control) const;
-  std::optional<TriedEffect> tryWay(std::size_t way, const Linearized& in_space, const Linearized& in_time,
-                                    const GapModel& base, const RunControl& control) const;
-  /// Keeps the best of what local refinement makes of the starts, where it beats what `tried` has.
-  void refineFrom(std::span<const ScanResult::Start> starts, const Linearized& at, const GapModel& base,
-                  TriedEffect& tried) const;
-  /// Where one thing in the room fits well, others may fit too: each is tried at the places of the best.
-  void shareCenters(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                    const GapModel& base, const RunControl& control) const;
-  /// Things of other physics that are searched by the same shape as well: each starts where the others ended.
-  void shareShapes(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                   const GapModel& base, const RunControl& control) const;
-  void finishBest(std::vector<TriedEffect>& tried, const Linearized& in_space, const Linearized& in_time,
-                  const RefinedModel& base, const RunControl& control) const;
-  void finish(TriedEffect& tried, const Linearized& at, double base_bic) const;
 
   const GapRows& rows_;
   Thresholds thresholds_;

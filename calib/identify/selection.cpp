@@ -32,7 +32,7 @@ class Selector {
   EffectSelection run() {
     none_bic_ = search_.bicOf(search_.none().model);
     if (options_.most_effects < 1) return finished({}, {});
-    const std::vector<TriedEffect>& first = ranked(search_.none());
+    const std::vector<TriedEffect>& first = ranked(search_.none().model);
     const TriedEffect* best = firstWorth(first, thresholds_.least_gain_first);
     if (best == nullptr || control_.stop.stop_requested()) return finished({}, first);
     EffectSelection selection = grown({}, best);
@@ -45,14 +45,15 @@ class Selector {
     selection.alternatives = selection.first;
     if (selection.ways.size() > 1) rankAlternatives(selection);
     holdLeading(selection);
+    settle(selection);
   }
 
  private:
-  /// What GapSearch::rank makes of a model. Exchanging effects and looking for the leading one ask for the same again.
-  const std::vector<TriedEffect>& ranked(const RefinedModel& base) {
+  /// What rankEffects makes of a model. Exchanging effects and looking for the leading one ask for the same again.
+  const std::vector<TriedEffect>& ranked(const GapModel& base) {
     for (const Ranked& one : ranked_)
-      if (isSame(one.model, base.model)) return one.tried;
-    ranked_.push_back({base.model, search_.rank(base, control_)});
+      if (isSame(one.model, base)) return one.tried;
+    ranked_.push_back({base, rankEffects(search_, base, control_)});
     return ranked_.back().tried;
   }
 
@@ -110,7 +111,7 @@ class Selector {
       }
       selection = std::move(grown);
       if (static_cast<int>(selection.ways.size()) >= options_.most_effects) break;
-      next = firstWorth(ranked(selection.model), thresholds_.least_gain_more);
+      next = firstWorth(ranked(selection.model.model), thresholds_.least_gain_more);
     }
     selection.bic_gain = selection.ways.empty() ? 0.0 : none_bic_ - search_.bicOf(selection.model.model);
     return selection;
@@ -126,7 +127,7 @@ class Selector {
     only_kind_.reset();
     if (selection.bic_gain < std::max(least, thresholds_.other_kind_share * best.bic_gain)) return {};
     if (static_cast<int>(selection.ways.size()) >= options_.most_effects) return selection;
-    return grown(selection, firstWorth(ranked(selection.model), thresholds_.least_gain_more));
+    return grown(selection, firstWorth(ranked(selection.model.model), thresholds_.least_gain_more));
   }
 
   EffectSelection finished(EffectSelection selection, const std::vector<TriedEffect>& first) {
@@ -136,6 +137,7 @@ class Selector {
     if (selection.ways.size() > 1) findLeading(selection);
     if (selection.ways.size() == 1) takeOver(selection);
     holdLeading(selection);
+    settle(selection);
     selection.bic_gain = none_bic_ - search_.bicOf(selection.model.model);
     return selection;
   }
@@ -147,17 +149,26 @@ class Selector {
   }
 
   void add(const TriedEffect& tried, EffectSelection& selection) const {
-    selection.model = tried.refined.model.terms.empty() ? search_.refined(tried.model) : tried.refined;
+    selection.model.model = fittedOf(tried);
     selection.ways.push_back(tried.way);
   }
 
-  RefinedModel without(const EffectSelection& selection, std::size_t term) const {
-    return search_.refined(withoutTerm(selection.model.model, term));
+  GapModel fittedOf(const TriedEffect& tried) const {
+    return tried.is_refined ? tried.model : search_.fitted(tried.model);
+  }
+
+  /// Covariance and cost are told of what is selected in the end.
+  void settle(EffectSelection& selection) const {
+    if (!selection.ways.empty()) selection.model = search_.withCovariance(selection.model.model);
+  }
+
+  GapModel without(const EffectSelection& selection, std::size_t term) const {
+    return search_.fitted(withoutTerm(selection.model.model, term));
   }
 
   /// Each effect left out in turn.
-  std::vector<RefinedModel> withoutEach(const EffectSelection& selection) const {
-    std::vector<RefinedModel> rests(selection.ways.size());
+  std::vector<GapModel> withoutEach(const EffectSelection& selection) const {
+    std::vector<GapModel> rests(selection.ways.size());
     control_.parallel_for(rests.size(), [&](std::size_t term) { rests[term] = without(selection, term); });
     return rests;
   }
@@ -166,13 +177,13 @@ class Selector {
   void exchange(EffectSelection& selection) {
     for (std::size_t term = 0; term + 1 < selection.ways.size(); ++term) {
       const double bic = search_.bicOf(selection.model.model);
-      const RefinedModel rest = without(selection, term);
+      const GapModel rest = without(selection, term);
       const std::vector<TriedEffect>& tried = ranked(rest);
       if (tried.empty()) return;
       const TriedEffect* best = firstWorth(tried, 0.0);
       if (best == nullptr || search_.bicOf(best->model) > bic - thresholds_.least_gain_exchange) continue;
       selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(term));
-      selection.model = best->refined.model.terms.empty() ? search_.refined(best->model) : best->refined;
+      selection.model.model = fittedOf(*best);
       selection.ways.push_back(best->way);
     }
   }
@@ -183,15 +194,15 @@ class Selector {
       const double bic = search_.bicOf(selection.model.model);
       double least = thresholds_.least_gain_more;
       std::optional<std::size_t> cheapest;
-      std::vector<RefinedModel> rests = withoutEach(selection);
+      std::vector<GapModel> rests = withoutEach(selection);
       for (std::size_t term = 0; term < rests.size(); ++term) {
-        const double cost = search_.bicOf(rests[term].model) - bic;
+        const double cost = search_.bicOf(rests[term]) - bic;
         if (cost >= least) continue;
         least = cost;
         cheapest = term;
       }
       if (!cheapest) return;
-      selection.model = std::move(rests[*cheapest]);
+      selection.model.model = std::move(rests[*cheapest]);
       selection.ways.erase(selection.ways.begin() + static_cast<std::ptrdiff_t>(*cheapest));
     }
   }
@@ -220,8 +231,8 @@ class Selector {
 
   void rankAlternatives(EffectSelection& selection) {
     std::vector<double> costs;
-    const std::vector<RefinedModel> rests = withoutEach(selection);
-    for (const RefinedModel& rest : rests) costs.push_back(search_.bicOf(rest.model));
+    const std::vector<GapModel> rests = withoutEach(selection);
+    for (const GapModel& rest : rests) costs.push_back(search_.bicOf(rest));
     const auto leading = static_cast<std::size_t>(std::max_element(costs.begin(), costs.end()) - costs.begin());
     selection.alternatives = ranked(rests[leading]);
     putFirst(leading, selection);
@@ -233,7 +244,7 @@ class Selector {
     GapModel model = selection.model.model;
     std::rotate(model.terms.begin(), model.terms.begin() + at, model.terms.begin() + at + 1);
     std::rotate(selection.ways.begin(), selection.ways.begin() + at, selection.ways.begin() + at + 1);
-    selection.model = search_.refined(model);
+    selection.model.model = search_.fitted(model);
   }
 
   /// Among the alternatives the leading effect stands as it was selected, where that is the better fit: it was tried
@@ -241,15 +252,14 @@ class Selector {
   void holdLeading(EffectSelection& selection) const {
     if (selection.ways.empty()) return;
     const std::size_t leading = selection.ways.front();
-    const RefinedModel rest = without(selection, 0);
-    const double gain = search_.bicOf(rest.model) - search_.bicOf(selection.model.model);
+    const double gain = search_.bicOf(without(selection, 0)) - search_.bicOf(selection.model.model);
     for (TriedEffect& tried : selection.alternatives) {
       if (search_.ways()[tried.way].effect != search_.ways()[leading].effect || tried.bic_gain >= gain) continue;
       GapModel last = withoutTerm(selection.model.model, 0);
       last.terms.push_back(selection.model.model.terms.front());
       tried.way = leading;
-      tried.refined = search_.refined(last);
-      tried.model = tried.refined.model;
+      tried.model = search_.fitted(last);
+      tried.is_refined = true;
       tried.bic_gain = gain;
     }
   }

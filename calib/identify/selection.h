@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "calib/identify/search.h"
+#include "calib/identify/ranking.h"
 
 namespace fieldtrue::identify {
 

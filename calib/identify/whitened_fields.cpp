@@ -6,7 +6,7 @@ namespace fieldtrue::identify {
 
 FIELDTRUE_CLONES
 void whitenFields(const FieldChanges& changes, double* columns, std::size_t leading) {
-  constexpr std::size_t kPose = 6, kField = 9;
+  constexpr std::size_t kPosition = 3, kPose = 6, kField = 9;
   const std::size_t n_rows = changes.n_rows, n_parameters = changes.n_parameters, n_channels = changes.n_channels;
   for (std::size_t k = 0; k < n_rows; ++k) {
     const double* white = changes.white_by_field + kPose * kField * k;
@@ -16,7 +16,10 @@ void whitenFields(const FieldChanges& changes, double* columns, std::size_t lead
       for (std::size_t i = 0; i < kField; ++i)
         for (std::size_t r = 0; r < kPose; ++r) sum[r] += white[kPose * i + r] * field[i];
       double* out = columns + j * leading + k * n_channels;
-      for (std::size_t r = 0; r < n_channels; ++r) out[r] = sum[r];
+      // Counted by constants: a call to copy a few numbers costs as much as their sums.
+      for (std::size_t r = 0; r < kPosition; ++r) out[r] = sum[r];
+      if (n_channels == kPose)
+        for (std::size_t r = kPosition; r < kPose; ++r) out[r] = sum[r];
     }
   }
 }

@@ -11,9 +11,9 @@
 #include "calib/gap/diagnosis.h"
 #include "calib/gap/first_look.h"
 #include "calib/identify/field_comparison.h"
+#include "calib/identify/ranking.h"
 #include "calib/identify/refine.h"
 #include "calib/identify/rows.h"
-#include "calib/identify/search.h"
 #include "calib/simulation/simulator.h"
 #include "tests/bench/two_threads.h"
 #include "tests/support/bent_room.h"
@@ -109,7 +109,7 @@ struct FloorOff {
   identify::GapModel start;
 
   FloorOff() {
-    start = search.rank(search.none(), {}).front().model;
+    start = identify::rankEffects(search, search.none().model, {}).front().model;
     for (identify::GapTerm& term : start.terms) {
       term.linear *= 0.97;
       term.searched *= 0.97;

@@ -35,7 +35,7 @@ class CreditTest : public QObject {
       GapModel model{selection.model.model.alignment, {}};
       for (const std::size_t term : terms) model.terms.push_back(selection.model.model.terms[term]);
       double sum = 0.0;
-      for (const Vector6d& left : whitenedResiduals(search.physics(), search.refined(model).model, search.whitening()))
+      for (const Vector6d& left : whitenedResiduals(search.physics(), search.fitted(model), search.whitening()))
         sum += left.squaredNorm();
       return squares[terms] = sum;
     };

@@ -87,7 +87,7 @@ class JudgementTest : public QObject {
     for (int block = 0; block < 10; ++block) {
       std::vector<char> used;
       for (const int of_row : blocks) used.push_back(of_row != block ? 1 : 0);
-      const identify::GapModel refitted = named.search.refined(named.selection.model.model, used).model;
+      const identify::GapModel refitted = named.search.fitted(named.selection.model.model, used);
       const std::vector<identify::Vector6d> left = named.search.physics().residuals(refitted);
       for (std::size_t i = 0; i < left.size(); ++i) {
         const double square_m2 = left[i].head<3>().squaredNorm();

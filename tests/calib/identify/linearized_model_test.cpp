@@ -3,7 +3,7 @@
 #include <QTest>
 #include <cmath>
 
-#include "calib/identify/search.h"
+#include "calib/identify/ranking.h"
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -115,9 +115,9 @@ class LinearizedModelTest : public QObject {
         recordedIn(scene, gapPlan({.counts = {4, 3, 3}, .pitch_m = 0.2, .orientations = threeTurns()}));
     const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
     const GapSearch search(rows, {});
-    const std::vector<TriedEffect> tried = search.rank(search.none(), {});
-    QVERIFY(!tried.empty() && !tried.front().refined.model.terms.empty());
-    const GapModel& state = tried.front().refined.model;
+    const std::vector<TriedEffect> tried = rankEffects(search, search.none().model, {});
+    QVERIFY(!tried.empty() && tried.front().is_refined);
+    const GapModel& state = tried.front().model;
     const Linearized at(search.physics(), state, search.whitening(), search.spaceBlocks());
     const Eigen::Index n_linear = state.terms[0].linear.size();
     for (Eigen::Index d = 0; d < state.terms[0].searched.size(); ++d) {
@@ -136,9 +136,9 @@ class LinearizedModelTest : public QObject {
     const CalibrationTable table = recordedIn(scene, gapPlan({.counts = {6, 3, 3}, .pitch_m = 0.3}));
     const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
     const GapSearch search(rows, {});
-    const std::vector<TriedEffect> tried = search.rank(search.none(), {});
-    QVERIFY(!tried.empty() && !tried.front().refined.model.terms.empty());
-    const GapModel& state = tried.front().refined.model;
+    const std::vector<TriedEffect> tried = rankEffects(search, search.none().model, {});
+    QVERIFY(!tried.empty() && tried.front().is_refined);
+    const GapModel& state = tried.front().model;
     QCOMPARE(state.terms[0].effect->id, std::string("metal_plane"));
     const Linearized at(search.physics(), state, search.whitening(), search.spaceBlocks());
     const Linearized as_it_is(search.physics(), {state.alignment, {}}, search.whitening(), search.spaceBlocks());

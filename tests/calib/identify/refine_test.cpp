@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "calib/identify/search.h"
+#include "calib/identify/ranking.h"
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/matchers.h"
 #include "tests/support/test_main.h"
@@ -89,9 +89,9 @@ class RefineTest : public QObject {
     const CalibrationTable table = recordedIn(scene, gapPlan({.orientations = threeTurns()}));
     const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
     const GapSearch search(rows, {});
-    const std::vector<TriedEffect> tried = search.rank(search.none(), {});
+    const std::vector<TriedEffect> tried = rankEffects(search, search.none().model, {});
     QVERIFY(!tried.empty());
-    const RefinedModel& best = tried.front().refined;
+    const RefinedModel best = search.withCovariance(tried.front().model);
     QVERIFY(best.model.terms.size() == 1 && best.model.terms[0].effect->id == std::string("compact_metal"));
     const double least = search.bicOf(best.model);
     const GapTerm& term = best.model.terms[0];
@@ -111,8 +111,8 @@ class RefineTest : public QObject {
     for (const double way : {-1.0, 1.0}) {
       GapModel moved = best.model;
       moved.terms[0].searched[0] += way * sd;
-      const RefinedModel rest = search.refinedWithout(moved, best.n_alignment + n_linear);
-      const double cost = search.bicOf(rest.model) - least;
+      const GapModel rest = search.fittedWithout(moved, best.n_alignment + n_linear);
+      const double cost = search.bicOf(rest) - least;
       QVERIFY2(cost > 0.6 && cost < 1.6, qPrintable(QString::number(cost)));
     }
   }

@@ -89,7 +89,7 @@ class ScanTest : public QObject {
       std::erase_if(starts, [&](const Eigen::VectorXd& start) { return !way.fit->allows(start); });
       const std::size_t stride = std::max<std::size_t>(1, starts.size() / 3);
       for (std::size_t i = 0; i < starts.size(); i += stride, ++n_starts) {
-        const ScanResult seen = scan(at, *way.fit, {starts[i]}, 1, {});
+        const ScanResult seen = Scanner(at).scan(*way.fit, {starts[i]}, 1, {});
         const Eigen::MatrixXd columns = at.columns(*way.fit, starts[i]);
         const LinearPrior prior = priorOf(*way.fit);
         const Refit all = refit(at.nuisance(), columns, at.residual(), prior);
@@ -127,8 +127,8 @@ class ScanTest : public QObject {
     for (const EffectWay& way : search.ways()) {
       if (!way.fit->searchesPlace()) continue;
       const std::vector<Eigen::VectorXd> starts = way.fit->starts();
-      const ScanResult few = scan(at, *way.fit, starts, 3, {});
-      const ScanResult all = scan(at, *way.fit, starts, starts.size(), {});
+      const ScanResult few = Scanner(at).scan(*way.fit, starts, 3, {});
+      const ScanResult all = Scanner(at).scan(*way.fit, starts, starts.size(), {});
       QVERIFY(few.best.size() == 3 && all.best.size() >= 3);
       for (std::size_t i = 0; i < 3; ++i) QVERIFY(few.best[i].searched == all.best[i].searched);
       for (std::size_t i = 1; i < all.best.size(); ++i) QVERIFY(all.best[i - 1].gain >= all.best[i].gain);

@@ -55,20 +55,20 @@ class SelectionTest : public QObject {
     FT_VERIFY_MATCH(near(seen.bic_gain, none - bic, 1e-6));
     double most = 0.0, leading = 0.0;
     for (std::size_t term = 0; term < seen.ways.size(); ++term) {
-      const RefinedModel rest = search.refined(withoutTerm(seen.model.model, term));
-      const double cost = search.bicOf(rest.model) - bic;
+      const GapModel rest = search.fitted(withoutTerm(seen.model.model, term));
+      const double cost = search.bicOf(rest) - bic;
       // Nothing is left to drop, nothing to exchange: the two things that it ends with.
       QVERIFY2(cost >= search.thresholds().least_gain_more, qPrintable(QString::number(cost)));
       most = std::max(most, cost);
       if (term == 0) leading = cost;
-      for (const TriedEffect& other : search.rank(rest, {}))
+      for (const TriedEffect& other : rankEffects(search, rest, {}))
         if (other.fitted.is_plausible && other.held_out_gain > 0.0)
           QVERIFY2(search.bicOf(other.model) > bic - search.thresholds().least_gain_exchange,
                    search.ways()[other.way].effect->id.c_str());
     }
     FT_VERIFY_MATCH(near(leading, most, 1e-6));
     // Nor to add.
-    for (const TriedEffect& more : search.rank(seen.model, {}))
+    for (const TriedEffect& more : rankEffects(search, seen.model.model, {}))
       QVERIFY(more.bic_gain < search.thresholds().least_gain_more || !more.fitted.is_plausible ||
               more.held_out_gain <= 0.0);
   }
@@ -88,7 +88,7 @@ class SelectionTest : public QObject {
       ++n_loops;
       serialFor(count, body);
     };
-    search.rank(search.none(), counting);
+    rankEffects(search, search.none().model, counting);
     const int n_once = std::exchange(n_loops, 0);
     QCOMPARE(namesOf(selectEffects(search, {}, counting)), QString("jig_tilt"));
     QVERIFY2(n_loops <= 2 * 4 * 4 * n_once, qPrintable(QStringLiteral("%1 of %2").arg(n_loops).arg(n_once)));
