@@ -20,14 +20,24 @@ double shareAbove(double scatter, double bound, double gap_rms, const identify::
   return gap_excess > left_excess ? left_excess / gap_excess : 1.0;
 }
 
+std::string causeText(const SelectedEffect& effect) {
+  std::string name = effects::labelOf(effect.effect);
+  for (const std::string& other : effect.equivalents)
+    if (other != effect.effect) name += " or " + effects::labelOf(other);
+  return effect.equivalents.size() > 1 ? name + " (these readings cannot tell)" : name;
+}
+
+/// Each once, with how many of them there are.
 std::string causesText(const GapReport& report) {
+  std::vector<std::string> names;
+  for (const SelectedEffect& effect : report.selected) names.push_back(causeText(effect));
   std::string text;
-  for (const SelectedEffect& effect : report.selected) {
-    std::string name = effects::labelOf(effect.effect);
-    for (const std::string& other : effect.equivalents)
-      if (other != effect.effect) name += " or " + effects::labelOf(other);
-    if (effect.equivalents.size() > 1) name += " (these readings cannot tell)";
-    text += (text.empty() ? "" : ", and ") + name;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto here = names.begin() + static_cast<std::ptrdiff_t>(i);
+    if (std::find(names.begin(), here, names[i]) != here) continue;
+    const auto count = std::count(here, names.end(), names[i]);
+    text += (text.empty() ? "" : ", and ") + names[i];
+    if (count > 1) text += " (" + std::to_string(count) + " of them)";
   }
   return text;
 }
@@ -114,7 +124,7 @@ bool hasGap(const identify::GapSearch& search, const Judgement& judgement, doubl
   const identify::Thresholds& thresholds = search.thresholds();
   const std::vector<identify::TriedEffect>& first = judgement.selection.first;
   const bool is_any_sure = std::any_of(first.begin(), first.end(), [&](const auto& one) {
-    return !one.refined.model.terms.empty() && one.bic_gain > thresholds.sure_unselected;
+    return one.is_refined && one.bic_gain > thresholds.sure_unselected;
   });
   return !judgement.selection.ways.empty() || scattered_share > 0.0 || is_any_sure || !judgement.far.strays.empty() ||
          search.structureOfNone().p_value < thresholds.sure_of_structure ||

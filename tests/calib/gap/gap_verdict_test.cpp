@@ -92,6 +92,22 @@ class GapVerdictTest : public QObject {
     QVERIFY(!isSurelyExplained(report));
   }
 
+  void aCauseThatIsThereSeveralTimesIsNamedOnce() {
+    GapReport report;
+    report.verdict = GapVerdict::kPartlyExplained;
+    report.remaining.excess2_before_mm2 = 400.0;
+    report.remaining.fraction = 0.25;
+    for (const char* effect : {"compact_metal", "finite_plate", "compact_metal", "compact_metal"}) {
+      SelectedEffect one;
+      one.effect = effect;
+      one.equivalents = {effect};
+      report.selected.push_back(one);
+    }
+    const QString text = QString::fromStdString(verdictText(report, "gap"));
+    QVERIFY2(text.contains("Compact metal body (3 of them), and Metal plate") && text.count("Compact metal") == 1,
+             qPrintable(text));
+  }
+
   /// The figures in brackets show the gap: by size, by rotation, or neither, where only its structure does.
   void figuresShowTheGap_data() {
     QTest::addColumn<double>("position_mm");
