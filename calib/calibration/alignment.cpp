@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "calib/calibration/corrector.h"
+#include "calib/calibration/outlying_places.h"
 #include "calib/core/place_name.h"
 #include "calib/core/statistics.h"
 #include "calib/geometry/grid_index.h"
@@ -131,6 +131,7 @@ AlignMode defaultAlignMode(const TableMetadata& metadata) {
 }
 
 Result<Alignment> fitAlignment(std::span<const Node> nodes) {
+  constexpr int kRounds = 4;
   FT_TRY_VOID(checkRows(nodes));
   std::vector<Eigen::Vector3d> p_tracked_m;
   std::vector<Eigen::Vector3d> p_true_m;
@@ -138,7 +139,15 @@ Result<Alignment> fitAlignment(std::span<const Node> nodes) {
     p_tracked_m.push_back(node.tracker_from_sensor.position_m);
     p_true_m.push_back(node.reference_from_sensor.position_m);
   }
-  const auto reference_from_tracker = fitRigid(p_tracked_m, p_true_m);
+  auto reference_from_tracker = fitRigid(p_tracked_m, p_true_m);
+  // A place that lies a long way off hides those that lie a short one.
+  for (int round = 0; reference_from_tracker && round < kRounds; ++round) {
+    const std::vector<OutlyingRow> outlying = outlyingRows(nodes, *reference_from_tracker);
+    if (outlying.empty()) break;
+    std::vector<double> weights(nodes.size(), 1.0);
+    for (const OutlyingRow& one : outlying) weights[one.row] = one.weight;
+    reference_from_tracker = fitRigid(p_tracked_m, p_true_m, weights);
+  }
   if (!reference_from_tracker)
     return fail(reference_from_tracker.error().code,
                 "The alignment of rig and tracker cannot be found: " + reference_from_tracker.error().message);

@@ -27,9 +27,9 @@ enum class AlignMode { kNone, kRigid };
 /// `rigid` unless the table says the alignment is known.
 AlignMode defaultAlignMode(const TableMetadata& metadata);
 
-/// Fits the rigid part from positions, and the constant mounting rotation of each sensor from orientations when
-/// present. Sensors held in several orientations tell the mounting from a mean rotation error of the tracker, which is
-/// left to be corrected.
+/// Fits the rigid part from positions, by least squares but for rows that stand apart (see outlyingRows), and the
+/// constant mounting rotation of each sensor from orientations when present. Sensors held in several orientations tell
+/// the mounting from a mean rotation error of the tracker, which is left to be corrected.
 /// @error kTooFewNodes, kDegenerate as fitRigid
 Result<Alignment> fitAlignment(std::span<const Node> nodes);
 

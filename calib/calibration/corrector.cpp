@@ -7,6 +7,7 @@
 #include "calib/calibration/coincident_places.h"
 #include "calib/calibration/mirrored_sensors.h"
 #include "calib/calibration/missing_orientations.h"
+#include "calib/calibration/outlying_places.h"
 #include "calib/calibration/placed_sensors.h"
 #include "calib/core/statistics.h"
 #include "calib/correctors/baked/baked_position.h"
@@ -145,7 +146,8 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   }
   std::vector<Node> rows(nodes.begin(), nodes.end());
   std::vector<std::string> notes{mirroredNote(nodes), joinCoincidentPlaces(rows), placed.note(),
-                                 missingOrientationsNote(nodes)};
+                                 missingOrientationsNote(nodes),
+                                 outlyingNote(nodes, parts.alignment.reference_from_tracker)};
   const PartsFit fit{*position_method, *orientation_method, metadata, choice, control, parts.alignment, notes};
   const std::vector<int> sensors = sensorsOf(rows);
   const Wanted apart{choice.separate_position && sensors.size() > 1, choice.separate_orientation && sensors.size() > 1};

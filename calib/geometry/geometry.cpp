@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "calib/core/json_reader.h"
 #include "calib/geometry/convex_hull.h"
@@ -24,6 +25,12 @@ Eigen::Vector3d mean(std::span<const Eigen::Vector3d> points_m) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& point_m : points_m) sum += point_m;
   return sum / static_cast<double>(points_m.size());
+}
+
+Eigen::Vector3d weightedMean(std::span<const Eigen::Vector3d> points_m, std::span<const double> weights) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < points_m.size(); ++i) sum += weights[i] * points_m[i];
+  return sum / std::accumulate(weights.begin(), weights.end(), 0.0);
 }
 
 bool allFinite(std::span<const Eigen::Vector3d> points_m) {
@@ -77,8 +84,10 @@ Eigen::Vector4d halfSpaceFrom(const JsonReader& json) {
 
 }  // namespace
 
-Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m) {
+Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m,
+                      std::span<const double> weights) {
   FT_CHECK(from_m.size() == to_m.size());
+  FT_CHECK(weights.empty() || weights.size() == from_m.size());
   if (from_m.size() < 3) {
     return fail(ErrorCode::kTooFewNodes,
                 "A rigid fit needs 3 points not on one line, got " + std::to_string(from_m.size()));
@@ -90,11 +99,12 @@ Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const E
     return fail(ErrorCode::kDegenerate, "A rigid fit needs 3 points not on one line, got " +
                                             std::to_string(from_m.size()) + " points on one line");
   }
-  const Eigen::Vector3d from_center_m = mean(from_m);
-  const Eigen::Vector3d to_center_m = mean(to_m);
+  const Eigen::Vector3d from_center_m = weights.empty() ? mean(from_m) : weightedMean(from_m, weights);
+  const Eigen::Vector3d to_center_m = weights.empty() ? mean(to_m) : weightedMean(to_m, weights);
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < from_m.size(); ++i) {
-    covariance += (to_m[i] - to_center_m) * (from_m[i] - from_center_m).transpose();
+    const double weight = weights.empty() ? 1.0 : weights[i];
+    covariance += weight * (to_m[i] - to_center_m) * (from_m[i] - from_center_m).transpose();
   }
   // Umeyama 1991, eq. 40-43 without the scale; the last column's sign keeps a mirror image from being fitted.
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);

@@ -11,10 +11,12 @@ namespace fieldtrue {
 
 class JsonReader;
 
-/// Least-squares rigid transform to_from_from: minimises sum |to_i - (R from_i + t)|^2, det R = +1.
+/// Least-squares rigid transform to_from_from: minimises sum w_i |to_i - (R from_i + t)|^2, det R = +1.
+/// @param weights w_i, positive, as many as points; empty = all alike
 /// @source Horn 1987 / Umeyama 1991 (without scale)
 /// @error kTooFewNodes below 3 points; kDegenerate when the points lie on one line
-Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m);
+Result<Pose> fitRigid(std::span<const Eigen::Vector3d> from_m, std::span<const Eigen::Vector3d> to_m,
+                      std::span<const double> weights = {});
 
 /// RMS misfit of the mirror image over that of any turn, below which an axis has the wrong sign or two are exchanged.
 inline constexpr double kMirrorShare = 0.3;

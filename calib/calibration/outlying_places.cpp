@@ -1,0 +1,138 @@
+#include "calib/calibration/outlying_places.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "calib/core/number_text.h"
+#include "calib/core/place_name.h"
+#include "calib/core/statistics.h"
+#include "calib/core/units.h"
+
+namespace fieldtrue::calibration {
+namespace {
+
+constexpr double kFreedom = 4.0;
+constexpr double kFarOff = 30.0;          // Of chi-square of three degrees of freedom one in a million is farther.
+constexpr double kFarOffOfFew = 60.0;     // Places of real boards of 41 reach 45 by the unevenness of the field there,
+constexpr std::size_t kFew = 100;         // which so few rows do not show to be a field.
+constexpr double kFarOffInField = 300.0;  // A field that changes within the pitch takes a place so far from the others.
+constexpr double kMedianOfThree = 2.3660;  // Of chi-square of three degrees of freedom.
+constexpr double kLeast_m = 1e-5;          // Nobody sets down a jig more exactly.
+constexpr std::size_t kAbout = 8;
+constexpr std::size_t kMostPart = 10;  // One row in so many may stand apart.
+
+/// The middle of vectors, and the variance an axis that half of them show about it.
+struct Middle {
+  Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
+  double variance_m2 = 0.0;
+};
+
+double varianceAbout(const Eigen::Vector3d& at_m, const std::vector<Eigen::Vector3d>& off_m) {
+  std::vector<double> squares_m2;
+  for (const Eigen::Vector3d& one_m : off_m) squares_m2.push_back((one_m - at_m).squaredNorm());
+  return median(std::move(squares_m2)) / kMedianOfThree;
+}
+
+Middle middleOf(const std::vector<Eigen::Vector3d>& off_m) {
+  Middle middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> along_m;
+    for (const Eigen::Vector3d& one_m : off_m) along_m.push_back(one_m[axis]);
+    middle.at_m[axis] = median(std::move(along_m));
+  }
+  middle.variance_m2 = varianceAbout(middle.at_m, off_m);
+  return middle;
+}
+
+/// What the nearest rows of other places are off by.
+std::vector<Eigen::Vector3d> offAbout(std::span<const Node> nodes, const std::vector<Eigen::Vector3d>& off_m,
+                                      std::size_t row) {
+  std::vector<std::pair<double, std::size_t>> by_distance;
+  for (std::size_t other = 0; other < nodes.size(); ++other) {
+    if (nodes[other].node == nodes[row].node) continue;
+    const Eigen::Vector3d away_m =
+        nodes[other].reference_from_sensor.position_m - nodes[row].reference_from_sensor.position_m;
+    by_distance.emplace_back(away_m.squaredNorm(), other);
+  }
+  const std::size_t n_about = std::min(kAbout, by_distance.size());
+  std::partial_sort(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(n_about), by_distance.end());
+  std::vector<Eigen::Vector3d> about_m;
+  for (std::size_t i = 0; i < n_about; ++i) about_m.push_back(off_m[by_distance[i].second]);
+  return about_m;
+}
+
+/// In units of the variance that it was held against.
+double squareOf(const OutlyingRow& one) { return (kFreedom + 3.0) / one.weight - kFreedom; }
+
+std::vector<OutlyingRow> apartFromOthers(std::span<const Node> nodes, const std::vector<Eigen::Vector3d>& off_m) {
+  const double far_off = nodes.size() < kFew ? kFarOffOfFew : kFarOff;
+  const double core_m2 = std::max(kLeast_m * kLeast_m, varianceAbout(Eigen::Vector3d::Zero(), off_m));
+  std::vector<std::size_t> far;
+  for (std::size_t row = 0; row < off_m.size(); ++row)
+    if (off_m[row].squaredNorm() > far_off * core_m2) far.push_back(row);
+  if (far.size() * kMostPart > nodes.size()) return {};
+  std::vector<OutlyingRow> outlying;
+  for (const std::size_t row : far) {
+    const std::vector<Eigen::Vector3d> about_m = offAbout(nodes, off_m, row);
+    if (about_m.size() < kAbout) continue;
+    const Middle middle = middleOf(about_m);
+    const double variance_m2 = std::max(core_m2, middle.variance_m2);
+    const double square_m2 = (off_m[row] - middle.at_m).squaredNorm();
+    if (square_m2 > far_off * variance_m2)
+      outlying.push_back({row, std::sqrt(square_m2), (kFreedom + 3.0) / (kFreedom + square_m2 / variance_m2)});
+  }
+  return outlying;
+}
+
+/// Whether the other rows show a field: they are off as those about them are, by more than three SDs of the sum of
+/// these products where each is off by itself. Of many rows an even choice is asked.
+bool isField(std::span<const Node> nodes, const std::vector<Eigen::Vector3d>& off_m,
+             const std::vector<OutlyingRow>& outlying) {
+  constexpr std::size_t kAsked = 200;
+  constexpr double kClearly = 3.0;
+  std::vector<std::size_t> others;
+  for (std::size_t row = 0; row < nodes.size(); ++row)
+    if (std::ranges::none_of(outlying, [&](const OutlyingRow& one) { return one.row == row; })) others.push_back(row);
+  const std::size_t step = std::max<std::size_t>(1, others.size() / kAsked);
+  double sum_m2 = 0.0, squares_m4 = 0.0;
+  for (std::size_t i = 0; i < others.size(); i += step) {
+    const Eigen::Vector3d about_m = middleOf(offAbout(nodes, off_m, others[i])).at_m;
+    sum_m2 += off_m[others[i]].dot(about_m);
+    squares_m4 += off_m[others[i]].squaredNorm() * about_m.squaredNorm() / 3.0;
+  }
+  return sum_m2 > kClearly * std::sqrt(squares_m4);
+}
+
+}  // namespace
+
+std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& reference_from_tracker) {
+  std::vector<Eigen::Vector3d> off_m;
+  for (const Node& node : nodes)
+    off_m.push_back(node.reference_from_sensor.position_m -
+                    reference_from_tracker * node.tracker_from_sensor.position_m);
+  if (off_m.empty()) return {};
+  std::vector<OutlyingRow> outlying = apartFromOthers(nodes, off_m);
+  if (!outlying.empty() && isField(nodes, off_m, outlying))
+    std::erase_if(outlying, [](const OutlyingRow& one) { return squareOf(one) < kFarOffInField; });
+  return outlying;
+}
+
+std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from_tracker) {
+  std::vector<OutlyingRow> outlying = outlyingRows(nodes, reference_from_tracker);
+  if (outlying.empty()) return {};
+  std::stable_sort(outlying.begin(), outlying.end(),
+                   [](const OutlyingRow& a, const OutlyingRow& b) { return a.off_m > b.off_m; });
+  std::vector<int> places;
+  for (const OutlyingRow& one : outlying)
+    if (std::find(places.begin(), places.end(), nodes[one.row].node) == places.end())
+      places.push_back(nodes[one.row].node);
+  const std::string farthest = shortNumber(outlying.front().off_m / kMPerMm) + " mm";
+  const bool is_one = places.size() == 1;
+  return PlaceNames(nodes).listInOrder(places) + (is_one ? " lies " : " lie up to ") + farthest +
+         " off what the places about " + (is_one ? "it" : "them") + " show, and " + (is_one ? "counts" : "count") +
+         " little in the alignment. Take " + (is_one ? "it" : "them") +
+         " again: what reads so once more has metal close by.";
+}
+
+}  // namespace fieldtrue::calibration
