@@ -145,9 +145,9 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
     parts.alignment = alignment;
   }
   std::vector<Node> rows(nodes.begin(), nodes.end());
-  std::vector<std::string> notes{mirroredNote(nodes), joinCoincidentPlaces(rows), placed.note(),
-                                 missingOrientationsNote(nodes),
-                                 outlyingNote(nodes, parts.alignment.reference_from_tracker)};
+  std::vector<std::string> notes{
+      mirroredNote(nodes), joinCoincidentPlaces(rows), placed.note(), missingOrientationsNote(nodes),
+      outlyingNote(nodes, parts.alignment.reference_from_tracker, align == AlignMode::kRigid)};
   const PartsFit fit{*position_method, *orientation_method, metadata, choice, control, parts.alignment, notes};
   const std::vector<int> sensors = sensorsOf(rows);
   const Wanted apart{choice.separate_position && sensors.size() > 1, choice.separate_orientation && sensors.size() > 1};

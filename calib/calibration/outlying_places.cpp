@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "calib/core/chi_square.h"
 #include "calib/core/number_text.h"
 #include "calib/core/place_name.h"
 #include "calib/core/statistics.h"
@@ -17,8 +18,7 @@ constexpr double kFarOff = 30.0;          // Of chi-square of three degrees of f
 constexpr double kFarOffOfFew = 60.0;     // Places of real boards of 41 reach 45 by the unevenness of the field there,
 constexpr std::size_t kFew = 100;         // which so few rows do not show to be a field.
 constexpr double kFarOffInField = 300.0;  // A field that changes within the pitch takes a place so far from the others.
-constexpr double kMedianOfThree = 2.3660;  // Of chi-square of three degrees of freedom.
-constexpr double kLeast_m = 1e-5;          // Nobody sets down a jig more exactly.
+constexpr double kLeast_m = 1e-5;         // Nobody sets down a jig more exactly.
 constexpr std::size_t kAbout = 8;
 constexpr std::size_t kMostPart = 10;  // One row in so many may stand apart.
 
@@ -31,7 +31,7 @@ struct Middle {
 double varianceAbout(const Eigen::Vector3d& at_m, const std::vector<Eigen::Vector3d>& off_m) {
   std::vector<double> squares_m2;
   for (const Eigen::Vector3d& one_m : off_m) squares_m2.push_back((one_m - at_m).squaredNorm());
-  return median(std::move(squares_m2)) / kMedianOfThree;
+  return median(std::move(squares_m2)) / kMedianOfChiSquare3;
 }
 
 Middle middleOf(const std::vector<Eigen::Vector3d>& off_m) {
@@ -118,7 +118,7 @@ std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& r
   return outlying;
 }
 
-std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from_tracker) {
+std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from_tracker, bool is_fitted) {
   std::vector<OutlyingRow> outlying = outlyingRows(nodes, reference_from_tracker);
   if (outlying.empty()) return {};
   std::stable_sort(outlying.begin(), outlying.end(),
@@ -129,10 +129,10 @@ std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from
       places.push_back(nodes[one.row].node);
   const std::string farthest = shortNumber(outlying.front().off_m / kMPerMm) + " mm";
   const bool is_one = places.size() == 1;
+  const std::string counts = is_one ? "and counts little in the alignment" : "and count little in the alignment";
   return PlaceNames(nodes).listInOrder(places) + (is_one ? " lies " : " lie up to ") + farthest +
-         " off what the places about " + (is_one ? "it" : "them") + " show, and " + (is_one ? "counts" : "count") +
-         " little in the alignment. Take " + (is_one ? "it" : "them") +
-         " again: what reads so once more has metal close by.";
+         " off what the places about " + (is_one ? "it" : "them") + " show" + (is_fitted ? ", " + counts : "") +
+         ". Take " + (is_one ? "it" : "them") + " again: what reads so once more has metal close by.";
 }
 
 }  // namespace fieldtrue::calibration

@@ -26,6 +26,7 @@ struct OutlyingRow {
 std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& reference_from_tracker);
 
 /// Which places these are, what was made of them and what to do; "" where there are none.
-std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from_tracker);
+/// @param is_fitted whether the alignment was, else it was known
+std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from_tracker, bool is_fitted);
 
 }  // namespace fieldtrue::calibration

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "calib/core/chi_square.h"
 #include "calib/core/file_io.h"
 #include "calib/field/dipole_field.h"
 
@@ -254,7 +255,6 @@ Trace ofGainByPlace(const TraceTest& test, const Linearized& at) {
 }  // namespace
 
 Eigen::VectorXd robustWeights(const Eigen::VectorXd& left, Eigen::Index n_rows, int channels) {
-  constexpr double kMedianOfChiSquare3 = 2.366;
   constexpr double kFullWeightBelow = 12.0;  // In squared scales.
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(left.size());
   for (Eigen::Index part = 0; part < channels / 3; ++part) {

@@ -9,13 +9,13 @@
 #include <numeric>
 #include <vector>
 
+#include "calib/core/chi_square.h"
 #include "calib/core/statistics.h"
 
 namespace fieldtrue::correctors {
 namespace {
 
 constexpr double kFreedom = 4.0;
-constexpr double kMedianOfThree = 2.3660;  // Of chi-square of three degrees of freedom.
 
 /// What a fit leaves at one place, and the noise that its rows were whitened by.
 struct Left {
@@ -43,7 +43,7 @@ double coreOf(const std::vector<Left>& all, bool is_stated) {
   constexpr double kLeast = 1e-16;
   std::vector<double> squares;
   for (const Left& one : all) squares.push_back(one.square());
-  return std::max(is_stated ? 1.0 : kLeast, median(std::move(squares)) / kMedianOfThree);
+  return std::max(is_stated ? 1.0 : kLeast, median(std::move(squares)) / kMedianOfChiSquare3);
 }
 
 /// Square of how far a place lies off what the others make of it, in units of the noise.

@@ -161,9 +161,9 @@ class OutlyingPlacesTest : public QObject {
     std::vector<Node> nodes = Room(11).places(60, 0.0);
     TableMetadata metadata;
     const CorrectorChoice none = parseCorrectorChoice("none", "none").value();
-    const auto notes = [&] {
+    const auto notes = [&](AlignMode align = AlignMode::kRigid) {
       std::string all;
-      const Corrector fitted = Corrector::fit(nodes, metadata, none, AlignMode::kRigid).value();
+      const Corrector fitted = Corrector::fit(nodes, metadata, none, align).value();
       for (const std::string& note : fitted.report().notes) all += note + "\n";
       return all;
     };
@@ -173,6 +173,9 @@ class OutlyingPlacesTest : public QObject {
         holdsAll(notes(), {"P17 lies 4", " mm off what the places about it show", "counts little", "Take it again"}));
     nodes[3].reference_from_sensor.position_m.x() -= 0.09;
     FT_VERIFY_MATCH(holdsAll(notes(), {"P3 and P17 lie up to ", "count little", "Take them again"}));
+    for (Node& node : nodes)
+      node.tracker_from_sensor.position_m = kScatterFromTracker * node.tracker_from_sensor.position_m;
+    FT_VERIFY_MATCH(holdsAll(notes(AlignMode::kNone), {"P3 and P17 lie up to ", "about them show. Take them again"}));
   }
 };
 
