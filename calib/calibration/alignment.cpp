@@ -141,12 +141,15 @@ Result<Alignment> fitAlignment(std::span<const Node> nodes) {
   }
   auto reference_from_tracker = fitRigid(p_tracked_m, p_true_m);
   // A place that lies a long way off hides those that lie a short one.
+  std::vector<OutlyingRow> before;
   for (int round = 0; reference_from_tracker && round < kRounds; ++round) {
     const std::vector<OutlyingRow> outlying = outlyingRows(nodes, *reference_from_tracker);
-    if (outlying.empty()) break;
+    if (outlying.empty() && before.empty()) break;
     std::vector<double> weights(nodes.size(), 1.0);
     for (const OutlyingRow& one : outlying) weights[one.row] = one.weight;
     reference_from_tracker = fitRigid(p_tracked_m, p_true_m, weights);
+    if (std::ranges::equal(before, outlying, {}, &OutlyingRow::row, &OutlyingRow::row)) break;
+    before = outlying;
   }
   if (!reference_from_tracker)
     return fail(reference_from_tracker.error().code,

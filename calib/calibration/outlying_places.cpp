@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "calib/core/chi_square.h"
@@ -45,36 +46,72 @@ Middle middleOf(const std::vector<Eigen::Vector3d>& off_m) {
   return middle;
 }
 
-/// What the nearest rows of other places are off by.
-std::vector<Eigen::Vector3d> offAbout(std::span<const Node> nodes, const std::vector<Eigen::Vector3d>& off_m,
-                                      std::size_t row) {
-  std::vector<std::pair<double, std::size_t>> by_distance;
-  for (std::size_t other = 0; other < nodes.size(); ++other) {
-    if (nodes[other].node == nodes[row].node) continue;
-    const Eigen::Vector3d away_m =
-        nodes[other].reference_from_sensor.position_m - nodes[row].reference_from_sensor.position_m;
-    by_distance.emplace_back(away_m.squaredNorm(), other);
+/// What rows are off by, and which stand about a row.
+class OffByPlace {
+ public:
+  OffByPlace(std::span<const Node> nodes, std::vector<Eigen::Vector3d> off_m)
+      : nodes_(nodes), off_m_(std::move(off_m)) {
+    for (std::size_t row = 0; row < nodes.size(); ++row) along_x_.emplace_back(place_m(row).x(), row);
+    std::sort(along_x_.begin(), along_x_.end());
   }
-  const std::size_t n_about = std::min(kAbout, by_distance.size());
-  std::partial_sort(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(n_about), by_distance.end());
-  std::vector<Eigen::Vector3d> about_m;
-  for (std::size_t i = 0; i < n_about; ++i) about_m.push_back(off_m[by_distance[i].second]);
-  return about_m;
-}
+
+  const std::vector<Eigen::Vector3d>& all_m() const { return off_m_; }
+
+  /// Of the nearest rows of other places, found outwards along one axis.
+  std::vector<Eigen::Vector3d> about(std::size_t row) const {
+    using Neighbour = std::pair<double, std::size_t>;
+    std::vector<Neighbour> nearest;  // A heap, the farthest first.
+    const auto isWorthATry = [&](double away_x_m) {
+      return nearest.size() < kAbout || away_x_m * away_x_m <= nearest.front().first;
+    };
+    const auto take = [&](std::size_t other) {
+      if (nodes_[other].node == nodes_[row].node) return;
+      const Neighbour one{(place_m(other) - place_m(row)).squaredNorm(), other};
+      if (nearest.size() == kAbout) {
+        if (!(one < nearest.front())) return;
+        std::pop_heap(nearest.begin(), nearest.end());
+        nearest.pop_back();
+      }
+      nearest.push_back(one);
+      std::push_heap(nearest.begin(), nearest.end());
+    };
+    const double x_m = place_m(row).x();
+    const auto here = std::lower_bound(along_x_.begin(), along_x_.end(), std::pair{x_m, row});
+    auto below = std::make_reverse_iterator(here);
+    auto above = here;
+    while (below != along_x_.rend() || above != along_x_.end()) {
+      const bool goes_up =
+          below == along_x_.rend() || (above != along_x_.end() && above->first - x_m < x_m - below->first);
+      if (!isWorthATry(goes_up ? above->first - x_m : x_m - below->first)) break;
+      take(goes_up ? (above++)->second : (below++)->second);
+    }
+    std::vector<Eigen::Vector3d> about_m;
+    for (const Neighbour& one : nearest) about_m.push_back(off_m_[one.second]);
+    return about_m;
+  }
+
+ private:
+  const Eigen::Vector3d& place_m(std::size_t row) const { return nodes_[row].reference_from_sensor.position_m; }
+
+  std::span<const Node> nodes_;
+  std::vector<Eigen::Vector3d> off_m_;
+  std::vector<std::pair<double, std::size_t>> along_x_;
+};
 
 /// In units of the variance that it was held against.
 double squareOf(const OutlyingRow& one) { return (kFreedom + 3.0) / one.weight - kFreedom; }
 
-std::vector<OutlyingRow> apartFromOthers(std::span<const Node> nodes, const std::vector<Eigen::Vector3d>& off_m) {
-  const double far_off = nodes.size() < kFew ? kFarOffOfFew : kFarOff;
+std::vector<OutlyingRow> apartFromOthers(const OffByPlace& off) {
+  const std::vector<Eigen::Vector3d>& off_m = off.all_m();
+  const double far_off = off_m.size() < kFew ? kFarOffOfFew : kFarOff;
   const double core_m2 = std::max(kLeast_m * kLeast_m, varianceAbout(Eigen::Vector3d::Zero(), off_m));
   std::vector<std::size_t> far;
   for (std::size_t row = 0; row < off_m.size(); ++row)
     if (off_m[row].squaredNorm() > far_off * core_m2) far.push_back(row);
-  if (far.size() * kMostPart > nodes.size()) return {};
+  if (far.size() * kMostPart > off_m.size()) return {};
   std::vector<OutlyingRow> outlying;
   for (const std::size_t row : far) {
-    const std::vector<Eigen::Vector3d> about_m = offAbout(nodes, off_m, row);
+    const std::vector<Eigen::Vector3d> about_m = off.about(row);
     if (about_m.size() < kAbout) continue;
     const Middle middle = middleOf(about_m);
     const double variance_m2 = std::max(core_m2, middle.variance_m2);
@@ -87,17 +124,17 @@ std::vector<OutlyingRow> apartFromOthers(std::span<const Node> nodes, const std:
 
 /// Whether the other rows show a field: they are off as those about them are, by more than three SDs of the sum of
 /// these products where each is off by itself. Of many rows an even choice is asked.
-bool isField(std::span<const Node> nodes, const std::vector<Eigen::Vector3d>& off_m,
-             const std::vector<OutlyingRow>& outlying) {
-  constexpr std::size_t kAsked = 200;
+bool isField(const OffByPlace& off, const std::vector<OutlyingRow>& outlying) {
+  const std::vector<Eigen::Vector3d>& off_m = off.all_m();
+  constexpr std::size_t kAsked = 100;
   constexpr double kClearly = 3.0;
   std::vector<std::size_t> others;
-  for (std::size_t row = 0; row < nodes.size(); ++row)
+  for (std::size_t row = 0; row < off_m.size(); ++row)
     if (std::ranges::none_of(outlying, [&](const OutlyingRow& one) { return one.row == row; })) others.push_back(row);
   const std::size_t step = std::max<std::size_t>(1, others.size() / kAsked);
   double sum_m2 = 0.0, squares_m4 = 0.0;
   for (std::size_t i = 0; i < others.size(); i += step) {
-    const Eigen::Vector3d about_m = middleOf(offAbout(nodes, off_m, others[i])).at_m;
+    const Eigen::Vector3d about_m = middleOf(off.about(others[i])).at_m;
     sum_m2 += off_m[others[i]].dot(about_m);
     squares_m4 += off_m[others[i]].squaredNorm() * about_m.squaredNorm() / 3.0;
   }
@@ -112,8 +149,9 @@ std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& r
     off_m.push_back(node.reference_from_sensor.position_m -
                     reference_from_tracker * node.tracker_from_sensor.position_m);
   if (off_m.empty()) return {};
-  std::vector<OutlyingRow> outlying = apartFromOthers(nodes, off_m);
-  if (!outlying.empty() && isField(nodes, off_m, outlying))
+  const OffByPlace off(nodes, std::move(off_m));
+  std::vector<OutlyingRow> outlying = apartFromOthers(off);
+  if (!outlying.empty() && isField(off, outlying))
     std::erase_if(outlying, [](const OutlyingRow& one) { return squareOf(one) < kFarOffInField; });
   return outlying;
 }
