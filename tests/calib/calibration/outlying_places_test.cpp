@@ -127,7 +127,7 @@ class OutlyingPlacesTest : public QObject {
       Node node;
       node.node = n;
       node.has_orientation = false;
-      node.reference_from_sensor.position_m = 0.2 * Eigen::Vector3d(n % 7, n / 7 % 7, n / 49);
+      node.reference_from_sensor.position_m = 0.2 * Eigen::Vector3i(n % 7, n / 7 % 7, n / 49).cast<double>();
       node.tracker_from_sensor.position_m = inverse(kScatterFromTracker) * node.reference_from_sensor.position_m;
       nodes.push_back(node);
     }
