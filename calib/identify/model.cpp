@@ -1,10 +1,30 @@
 #include "calib/identify/model.h"
 
+#include <algorithm>
+
 #include "calib/core/statistics.h"
 #include "calib/field/tracker_model.h"
 #include "calib/geometry/geometry.h"
 
 namespace fieldtrue::identify {
+namespace {
+
+bool isSame(const Pose& a, const Pose& b) {
+  return a.position_m == b.position_m && a.orientation.coeffs() == b.orientation.coeffs();
+}
+
+bool isSame(const GapTerm& a, const GapTerm& b) {
+  return a.fit == b.fit && a.searched == b.searched && a.linear == b.linear;
+}
+
+}  // namespace
+
+bool isSame(const GapModel& a, const GapModel& b) {
+  const auto same = [](const auto& one, const auto& other) { return isSame(one, other); };
+  return isSame(a.alignment.tracker_from_reference, b.alignment.tracker_from_reference) &&
+         std::ranges::equal(a.alignment.mount_from_sensor, b.alignment.mount_from_sensor, same) &&
+         std::ranges::equal(a.terms, b.terms, same);
+}
 
 Eigen::Index parametersOf(const GapModel& model) {
   Eigen::Index count = 0;

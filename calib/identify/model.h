@@ -33,6 +33,8 @@ struct GapModel {
   std::vector<GapTerm> terms;
 };
 
+/// Whether two models are the same, to the bit.
+bool isSame(const GapModel& a, const GapModel& b);
 /// Parameters of a model's terms, searched ones too; the alignment's do not count.
 Eigen::Index parametersOf(const GapModel& model);
 /// The model with one term fewer.

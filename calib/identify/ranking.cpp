@@ -85,10 +85,10 @@ class Ranking {
     TriedEffect tried;
     tried.way = index;
     tried.bic_gain = -std::numeric_limits<double>::infinity();
-    tried.scan = viewOf(way).scanner.scan(*way.fit, way.fit->starts(), kStarts, inOneThread(control_));
-    if (tried.scan.best.empty()) return std::nullopt;
-    refineFrom(tried.scan.best, tried);
-    tried.held_out_gain = sumOf(tried.scan.held_out_gain);
+    const ScanResult scan = viewOf(way).scanner.scan(*way.fit, way.fit->starts(), kStarts, inOneThread(control_));
+    if (scan.best.empty()) return std::nullopt;
+    refineFrom(scan.best, tried);
+    tried.held_out_gain = sumOf(scan.held_out_gain);
     return tried;
   }
 

@@ -16,7 +16,6 @@ struct TriedEffect {
   double bic_gain = 0.0;       ///< Against the model without it.
   double held_out_gain = 0.0;  ///< Fall of the held-out sum of squares over all blocks, whitened.
   effects::FittedEffect fitted;
-  ScanResult scan;
 };
 
 /// Every effect added to a model, best first; only the best way of each effect.

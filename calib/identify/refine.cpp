@@ -207,10 +207,12 @@ class JointFit {
     State state = stateOf(start);
     double cost = adaptedCostOf(state);
     double damping = kFirstDamping;
+    double last_fall = std::numeric_limits<double>::infinity();
     for (int step = 0; step < options_.most_steps; ++step) {
       const System system = systemAt(state);
-      const double fall = descend(system, state, cost, damping);
+      const double fall = descend(system, last_fall, state, cost, damping);
       if (fall <= 0.0) break;
+      last_fall = fall;
       cost = adaptedCostOf(state);
       if (fall < kEnough) break;
     }
@@ -238,6 +240,8 @@ class JointFit {
 
  private:
   static constexpr double kFirstDamping = 1e-3;
+  static constexpr double kSlow = 0.3;  ///< Of the fall before: a valley that bends, or weights that hold back.
+  static constexpr double kMostTimes = 32.0;
 
   /// A model and what a tracker reports in it, which is most of the work.
   struct State {
@@ -286,8 +290,10 @@ class JointFit {
     return system;
   }
 
-  /// One damped step downhill. @return fall of the cost; 0 where none was found
-  double descend(const System& system, State& state, double& cost, double& damping) const {
+  /// One damped step downhill, and on along it where steps are slow.
+  /// @param last_fall of the cost by the step before
+  /// @return fall of the cost; 0 where none was found
+  double descend(const System& system, double last_fall, State& state, double& cost, double& damping) const {
     const Eigen::MatrixXd scaled = system.scale.asDiagonal() * system.normal * system.scale.asDiagonal();
     for (int attempt = 0; attempt < 7; ++attempt) {
       Eigen::MatrixXd damped = scaled;
@@ -300,17 +306,32 @@ class JointFit {
         State next = applied == Applied::kForbidden ? State{} : stateOf(std::move(moved));
         const double next_cost = applied == Applied::kForbidden ? cost : costAt(usedResiduals(next), next.model);
         if (next_cost < cost) {
-          const double fall = cost - next_cost;
+          const double before = cost;
+          const GapModel from = std::move(state.model);
           state = std::move(next);
           cost = next_cost;
           damping = std::max(1e-9, 0.2 * damping);
-          return fall;
+          if (before - cost > kSlow * last_fall) goOn(system, from, y, state, cost);
+          return before - cost;
         }
         if (applied != Applied::kAtTolerance) break;
       }
       damping = 6.0 * std::max(damping, 1e-6);
     }
     return 0.0;
+  }
+
+  /// Takes two, four ... times a step that led downhill, for as long as that leads farther down.
+  void goOn(const System& system, const GapModel& from, const Eigen::VectorXd& step, State& state, double& cost) const {
+    for (double times = 2.0; times <= kMostTimes; times *= 2.0) {
+      GapModel moved = from;
+      if (apply(times * step, system.center_m, system.n_alignment, moved) != Applied::kFully) return;
+      State next = stateOf(std::move(moved));
+      const double next_cost = costAt(usedResiduals(next), next.model);
+      if (!(next_cost < cost)) return;
+      state = std::move(next);
+      cost = next_cost;
+    }
   }
 
   /// One damped step; the first `fixed` parameters stay.

@@ -228,7 +228,15 @@ RefinedModel GapSearch::withCovariance(const GapModel& fitted) const {
 }
 
 GapModel GapSearch::fitted(const GapModel& start, std::span<const char> used) const {
-  return fitJointly(physics_, start, whitening_, {law_, used});
+  {
+    const std::lock_guard lock(known_mutex_);
+    for (const Known& one : known_)
+      if (isSame(one.start, start) && std::ranges::equal(one.used, used)) return one.fitted;
+  }
+  GapModel fitted = fitJointly(physics_, start, whitening_, {law_, used});
+  const std::lock_guard lock(known_mutex_);
+  known_.push_back({start, {used.begin(), used.end()}, fitted});
+  return fitted;
 }
 
 GapModel GapSearch::fittedWithout(const GapModel& start, Eigen::Index frozen) const {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <list>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -66,6 +68,7 @@ class GapSearch {
   /// Criterion of a model, and its parameters fitted together from a start.
   /// @param used per row, which rows count; empty = all
   double bicOf(const GapModel& model, std::span<const char> used = {}) const;
+  /// What was asked for before is known.
   GapModel fitted(const GapModel& start, std::span<const char> used = {}) const;
   RefinedModel withCovariance(const GapModel& fitted) const;
   RefinedModel refined(const GapModel& start) const { return withCovariance(fitted(start)); }
@@ -74,6 +77,11 @@ class GapSearch {
 
  private:
   enum class Channel { kPosition, kRotation };
+  struct Known {
+    GapModel start;
+    std::vector<char> used;
+    GapModel fitted;
+  };
 
   Structure settleNoise(RefinedModel& about);
   double placingFrom(Channel channel, double present) const;
@@ -98,6 +106,8 @@ class GapSearch {
   std::vector<field::SensorSetting> settings_;
   effects::FitDesign design_;
   std::vector<EffectWay> ways_;
+  mutable std::mutex known_mutex_;
+  mutable std::list<Known> known_;  ///< Of fitted(); the parts of a diagnosis ask for many models more than once.
 };
 
 }  // namespace fieldtrue::identify
