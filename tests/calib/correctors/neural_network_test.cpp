@@ -284,21 +284,28 @@ class NeuralNetworkTest : public QObject {
     }
   }
 
-  // Inside, across the faces of the places' box and where an output is held down.
+  // Inside, across the faces of the places' box and where an output is held down. Nearer to a bend than the step there
+  // is no slope: where a half step tells another one.
   void jacobianIsThatOfFiniteDifferences() {
     const FitData data = fitDataOf(shakenGrid({4, 4, 4}, 0.2, 0.02), curved_m);
     const auto model = fitPosition("neural_network", data, {{"weight_penalty", "0"}, {"starts", "1"}});
     FT_VERIFY_OK(model);
+    const auto slope = [&](const Eigen::Vector3d& p_m, int axis, double size_m) -> Eigen::Vector3d {
+      const Eigen::Vector3d step_m = size_m * Eigen::Vector3d::Unit(axis);
+      return ((*model)->displacement_m(p_m + step_m) - (*model)->displacement_m(p_m - step_m)) / (2.0 * size_m) +
+             Eigen::Vector3d::Unit(axis);
+    };
     constexpr double kStep_m = 1e-5;
+    int compared = 0;
     for (const Eigen::Vector3d& p_m : randomPoints(100)) {
       for (int axis = 0; axis < 3; ++axis) {
-        const Eigen::Vector3d step_m = kStep_m * Eigen::Vector3d::Unit(axis);
-        const Eigen::Vector3d slope =
-            ((*model)->displacement_m(p_m + step_m) - (*model)->displacement_m(p_m - step_m)) / (2.0 * kStep_m) +
-            Eigen::Vector3d::Unit(axis);
-        FT_VERIFY_MATCH(near(Eigen::Vector3d((*model)->jacobian(p_m).col(axis)), slope, 1e-5));
+        const Eigen::Vector3d by_half = slope(p_m, axis, 0.5 * kStep_m);
+        if ((slope(p_m, axis, kStep_m) - by_half).norm() > 5e-6) continue;
+        ++compared;
+        FT_VERIFY_MATCH(near(Eigen::Vector3d((*model)->jacobian(p_m).col(axis)), by_half, 1e-5));
       }
     }
+    QVERIFY(compared > 290);
   }
 
   void refusesWhatCannotBeTrained() {
