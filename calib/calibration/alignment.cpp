@@ -2,7 +2,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "calib/calibration/outlying_places.h"
@@ -130,8 +132,9 @@ AlignMode defaultAlignMode(const TableMetadata& metadata) {
   return metadata.alignment_known ? AlignMode::kNone : AlignMode::kRigid;
 }
 
-Result<Alignment> fitAlignment(std::span<const Node> nodes) {
+Result<Alignment> fitAlignment(std::span<const Node> nodes, std::optional<double> jig_tolerance_m) {
   constexpr int kRounds = 4;
+  const auto areAlike = [](double one, double other) { return std::abs(one - other) < 0.01; };
   FT_TRY_VOID(checkRows(nodes));
   std::vector<Eigen::Vector3d> p_tracked_m;
   std::vector<Eigen::Vector3d> p_true_m;
@@ -141,15 +144,12 @@ Result<Alignment> fitAlignment(std::span<const Node> nodes) {
   }
   auto reference_from_tracker = fitRigid(p_tracked_m, p_true_m);
   // A place that lies a long way off hides those that lie a short one.
-  std::vector<OutlyingRow> before;
+  std::vector<double> before;
   for (int round = 0; reference_from_tracker && round < kRounds; ++round) {
-    const std::vector<OutlyingRow> outlying = outlyingRows(nodes, *reference_from_tracker);
-    if (outlying.empty() && before.empty()) break;
-    std::vector<double> weights(nodes.size(), 1.0);
-    for (const OutlyingRow& one : outlying) weights[one.row] = one.weight;
+    std::vector<double> weights = alignmentWeights(nodes, *reference_from_tracker, jig_tolerance_m);
+    if (std::ranges::equal(weights, before, areAlike)) break;
     reference_from_tracker = fitRigid(p_tracked_m, p_true_m, weights);
-    if (std::ranges::equal(before, outlying, {}, &OutlyingRow::row, &OutlyingRow::row)) break;
-    before = outlying;
+    before = std::move(weights);
   }
   if (!reference_from_tracker)
     return fail(reference_from_tracker.error().code,

@@ -27,11 +27,12 @@ enum class AlignMode { kNone, kRigid };
 /// `rigid` unless the table says the alignment is known.
 AlignMode defaultAlignMode(const TableMetadata& metadata);
 
-/// Fits the rigid part from positions, by least squares but for rows that stand apart (see outlyingRows), and the
+/// Fits the rigid part from positions, by least squares or, where rows stand apart, as alignmentWeights says, and the
 /// constant mounting rotation of each sensor from orientations when present. Sensors held in several orientations tell
 /// the mounting from a mean rotation error of the tracker, which is left to be corrected.
+/// @param jig_tolerance_m SD per axis of placing, where it is stated: tells how far off a row of few must lie
 /// @error kTooFewNodes, kDegenerate as fitRigid
-Result<Alignment> fitAlignment(std::span<const Node> nodes);
+Result<Alignment> fitAlignment(std::span<const Node> nodes, std::optional<double> jig_tolerance_m = {});
 
 /// Rows of a table as fit data in the tracker frame: truth brought there by the inverse alignment. The grid index is
 /// the table's, or found from the true positions where they stand on a grid along the rig's axes.

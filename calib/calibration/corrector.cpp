@@ -141,13 +141,14 @@ Result<Corrector> Corrector::fit(std::span<const Node> nodes, const TableMetadat
   nodes = placed.nodes;
   Parts parts;
   if (align == AlignMode::kRigid) {
-    FT_TRY(auto alignment, fitAlignment(nodes));
+    FT_TRY(auto alignment, fitAlignment(nodes, metadata.jig_tolerance_m));
     parts.alignment = alignment;
   }
   std::vector<Node> rows(nodes.begin(), nodes.end());
-  std::vector<std::string> notes{
-      mirroredNote(nodes), joinCoincidentPlaces(rows), placed.note(), missingOrientationsNote(nodes),
-      outlyingNote(nodes, parts.alignment.reference_from_tracker, align == AlignMode::kRigid)};
+  std::vector<std::string> notes{mirroredNote(nodes), joinCoincidentPlaces(rows), placed.note(),
+                                 missingOrientationsNote(nodes),
+                                 outlyingNote(nodes, parts.alignment.reference_from_tracker, metadata.jig_tolerance_m,
+                                              align == AlignMode::kRigid)};
   const PartsFit fit{*position_method, *orientation_method, metadata, choice, control, parts.alignment, notes};
   const std::vector<int> sensors = sensorsOf(rows);
   const Wanted apart{choice.separate_position && sensors.size() > 1, choice.separate_orientation && sensors.size() > 1};

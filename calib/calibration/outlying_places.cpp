@@ -18,9 +18,12 @@ constexpr double kFreedom = 4.0;
 constexpr double kFarOff = 30.0;          // Of chi-square of three degrees of freedom one in a million is farther.
 constexpr double kFarOffOfFew = 60.0;     // Places of real boards of 41 reach 45 by the unevenness of the field there,
 constexpr std::size_t kFew = 100;         // which so few rows do not show to be a field.
+constexpr double kAsStated = 2.0;         // Of the stated variance: readings are noisy too.
 constexpr double kFarOffInField = 300.0;  // A field that changes within the pitch takes a place so far from the others.
 constexpr double kLeast_m = 1e-5;         // Nobody sets down a jig more exactly.
 constexpr std::size_t kAbout = 8;
+constexpr double kOfMiddle = 0.2;      // Variance of the middle of so many, of one's.
+constexpr double kUneven = 3.0;        // So many scatter by so much more than all do in one case of five hundred.
 constexpr std::size_t kMostPart = 10;  // One row in so many may stand apart.
 
 /// The middle of vectors, and the variance an axis that half of them show about it.
@@ -44,6 +47,11 @@ Middle middleOf(const std::vector<Eigen::Vector3d>& off_m) {
   }
   middle.variance_m2 = varianceAbout(middle.at_m, off_m);
   return middle;
+}
+
+/// Variance an axis that half of the rows show.
+double coreOf_m2(const std::vector<Eigen::Vector3d>& off_m) {
+  return std::max(kLeast_m * kLeast_m, varianceAbout(Eigen::Vector3d::Zero(), off_m));
 }
 
 /// What rows are off by, and which stand about a row.
@@ -98,33 +106,18 @@ class OffByPlace {
   std::vector<std::pair<double, std::size_t>> along_x_;
 };
 
-/// In units of the variance that it was held against.
-double squareOf(const OutlyingRow& one) { return (kFreedom + 3.0) / one.weight - kFreedom; }
+/// Of a square in units of the variance; no row counts more than by least squares.
+double tWeight(double square) { return std::min(1.0, (kFreedom + 3.0) / (kFreedom + square)); }
 
-std::vector<OutlyingRow> apartFromOthers(const OffByPlace& off) {
-  const std::vector<Eigen::Vector3d>& off_m = off.all_m();
-  const double far_off = off_m.size() < kFew ? kFarOffOfFew : kFarOff;
-  const double core_m2 = std::max(kLeast_m * kLeast_m, varianceAbout(Eigen::Vector3d::Zero(), off_m));
-  std::vector<std::size_t> far;
-  for (std::size_t row = 0; row < off_m.size(); ++row)
-    if (off_m[row].squaredNorm() > far_off * core_m2) far.push_back(row);
-  if (far.size() * kMostPart > off_m.size()) return {};
-  std::vector<OutlyingRow> outlying;
-  for (const std::size_t row : far) {
-    const std::vector<Eigen::Vector3d> about_m = off.about(row);
-    if (about_m.size() < kAbout) continue;
-    const Middle middle = middleOf(about_m);
-    const double variance_m2 = std::max(core_m2, middle.variance_m2);
-    const double square_m2 = (off_m[row] - middle.at_m).squaredNorm();
-    if (square_m2 > far_off * variance_m2)
-      outlying.push_back({row, std::sqrt(square_m2), (kFreedom + 3.0) / (kFreedom + square_m2 / variance_m2)});
-  }
-  return outlying;
+/// Square from which on a row of so many lies far off, in units of the variance.
+double farOff(std::size_t n_rows, double core_m2, std::optional<double> jig_tolerance_m) {
+  const bool is_as_stated = jig_tolerance_m && core_m2 <= kAsStated * *jig_tolerance_m * *jig_tolerance_m;
+  return n_rows < kFew && !is_as_stated ? kFarOffOfFew : kFarOff;
 }
 
-/// Whether the other rows show a field: they are off as those about them are, by more than three SDs of the sum of
-/// these products where each is off by itself. Of many rows an even choice is asked.
-bool isField(const OffByPlace& off, const std::vector<OutlyingRow>& outlying) {
+/// Whether the other rows are off as those about them are, by more than three SDs of the sum of these products where
+/// each is off by itself. Of many rows an even choice is asked.
+bool areOffTogether(const OffByPlace& off, const std::vector<OutlyingRow>& outlying) {
   const std::vector<Eigen::Vector3d>& off_m = off.all_m();
   constexpr std::size_t kAsked = 100;
   constexpr double kClearly = 3.0;
@@ -141,23 +134,71 @@ bool isField(const OffByPlace& off, const std::vector<OutlyingRow>& outlying) {
   return sum_m2 > kClearly * std::sqrt(squares_m4);
 }
 
-}  // namespace
-
-std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& reference_from_tracker) {
+OffByPlace offByPlace(std::span<const Node> nodes, const Pose& reference_from_tracker) {
   std::vector<Eigen::Vector3d> off_m;
   for (const Node& node : nodes)
     off_m.push_back(node.reference_from_sensor.position_m -
                     reference_from_tracker * node.tracker_from_sensor.position_m);
-  if (off_m.empty()) return {};
-  const OffByPlace off(nodes, std::move(off_m));
-  std::vector<OutlyingRow> outlying = apartFromOthers(off);
-  if (!outlying.empty() && isField(off, outlying))
-    std::erase_if(outlying, [](const OutlyingRow& one) { return squareOf(one) < kFarOffInField; });
-  return outlying;
+  return {nodes, std::move(off_m)};
 }
 
-std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from_tracker, bool is_fitted) {
-  std::vector<OutlyingRow> outlying = outlyingRows(nodes, reference_from_tracker);
+/// Rows that stand apart, and whether the others show a field.
+struct Found {
+  std::vector<OutlyingRow> rows;
+  bool is_in_field = false;
+};
+
+Found findOutlying(const OffByPlace& off, std::optional<double> jig_tolerance_m) {
+  const std::vector<Eigen::Vector3d>& off_m = off.all_m();
+  if (off_m.empty()) return {};
+  const double core_m2 = coreOf_m2(off_m);
+  const double far_off = farOff(off_m.size(), core_m2, jig_tolerance_m);
+  std::vector<std::size_t> far;
+  for (std::size_t row = 0; row < off_m.size(); ++row)
+    if (off_m[row].squaredNorm() > far_off * core_m2) far.push_back(row);
+  if (far.size() * kMostPart > off_m.size()) return {};
+  Found found;
+  for (const std::size_t row : far) {
+    const std::vector<Eigen::Vector3d> about_m = off.about(row);
+    if (about_m.size() < kAbout) continue;
+    const Middle middle = middleOf(about_m);
+    if (middle.at_m.squaredNorm() > kFarOff * kOfMiddle * core_m2) found.is_in_field = true;
+    const double variance_m2 = middle.variance_m2 > kUneven * core_m2 ? middle.variance_m2 : core_m2;
+    const double square_m2 = (off_m[row] - middle.at_m).squaredNorm();
+    if (square_m2 > far_off * variance_m2) found.rows.push_back({row, std::sqrt(square_m2), square_m2 / variance_m2});
+  }
+  if (found.rows.empty()) return {};
+  found.is_in_field = found.is_in_field || areOffTogether(off, found.rows);
+  if (found.is_in_field) std::erase_if(found.rows, [](const OutlyingRow& one) { return one.square < kFarOffInField; });
+  return found;
+}
+
+}  // namespace
+
+std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& reference_from_tracker,
+                                      std::optional<double> jig_tolerance_m) {
+  return findOutlying(offByPlace(nodes, reference_from_tracker), jig_tolerance_m).rows;
+}
+
+std::vector<double> alignmentWeights(std::span<const Node> nodes, const Pose& reference_from_tracker,
+                                     std::optional<double> jig_tolerance_m) {
+  const OffByPlace off = offByPlace(nodes, reference_from_tracker);
+  const Found found = findOutlying(off, jig_tolerance_m);
+  if (found.rows.empty()) return {};
+  std::vector<double> weights(nodes.size(), 1.0);
+  if (found.is_in_field) {
+    for (const OutlyingRow& one : found.rows) weights[one.row] = tWeight(one.square);
+    return weights;
+  }
+  const double core_m2 = coreOf_m2(off.all_m());
+  std::ranges::transform(off.all_m(), weights.begin(),
+                         [&](const Eigen::Vector3d& one_m) { return tWeight(one_m.squaredNorm() / core_m2); });
+  return weights;
+}
+
+std::string outlyingNote(std::span<const Node> nodes, const Pose& reference_from_tracker,
+                         std::optional<double> jig_tolerance_m, bool is_fitted) {
+  std::vector<OutlyingRow> outlying = outlyingRows(nodes, reference_from_tracker, jig_tolerance_m);
   if (outlying.empty()) return {};
   std::stable_sort(outlying.begin(), outlying.end(),
                    [](const OutlyingRow& a, const OutlyingRow& b) { return a.off_m > b.off_m; });

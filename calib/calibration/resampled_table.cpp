@@ -119,7 +119,8 @@ Result<ResampledTable> resampleTable(const CalibrationTable& table, std::span<co
   if (nodes.empty()) return fail(ErrorCode::kTooFewNodes, "Resampling needs measured places of role fit, got none");
   ResampledTable resampled;
   resampled.note = joinCoincidentPlaces(nodes);
-  FT_TRY(const auto alignment, align == AlignMode::kRigid ? fitAlignment(nodes) : Result<Alignment>(Alignment{}));
+  FT_TRY(const auto alignment, align == AlignMode::kRigid ? fitAlignment(nodes, table.metadata.jig_tolerance_m)
+                                                          : Result<Alignment>(Alignment{}));
   const correctors::FitData data = makeFitData(nodes, table.metadata, alignment);
   FT_TRY_VOID(correctors::checkPositions(data, "Resampling"));
   if (auto room = checkMemory("Resampling to " + std::to_string(grid.size()) + " grid nodes",

@@ -77,7 +77,7 @@ std::vector<Node> rowsOf(const HeldOutJob& job, std::span<const std::size_t> row
 }
 
 Result<calibration::Alignment> alignmentOf(const HeldOutJob& job, std::span<const Node> nodes) {
-  return job.align == calibration::AlignMode::kRigid ? calibration::fitAlignment(nodes)
+  return job.align == calibration::AlignMode::kRigid ? calibration::fitAlignment(nodes, job.metadata.jig_tolerance_m)
                                                      : Result<calibration::Alignment>(calibration::Alignment{});
 }
 

@@ -20,6 +20,7 @@ RUNS = [("interval_coverage.py", ("--places", "30", *ONE_ROOM), 12),
         ("uncertainty_coverage.py", ("--places", "60", "--methods", "gaussian_process", *ONE_ROOM), 2),
         ("multiquadric_spread.py", ("--places", "30", *ONE_ROOM), 2),
         ("automatic_choice.py", ("--places", "40", *ONE_ROOM), 2),
+        ("alignment_slips.py", ("--places", "40", *ONE_ROOM), 2),
         ("physics_gain.py", ("--places", "30"), 6)]
 
 

@@ -45,7 +45,7 @@ Pose transmitterPose(const ReportInput& input) {
   for (const Node& node : input.table.nodes) {
     if (node.role != NodeRole::kSkipped) nodes.push_back(node);
   }
-  const auto alignment = calibration::fitAlignment(nodes);
+  const auto alignment = calibration::fitAlignment(nodes, input.table.metadata.jig_tolerance_m);
   return alignment ? alignment->reference_from_tracker : Pose{};
 }
 

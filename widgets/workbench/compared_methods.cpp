@@ -20,7 +20,7 @@ MethodRow rowOf(const std::vector<evaluation::MethodScore>& scores, const QStrin
 ErrorField emptyField(const evaluation::Comparison& comparison, const CalibrationTable& table) {
   ErrorField field;
   const std::map<int, Eigen::Vector3d> true_m = truePositions_m(table);
-  const auto alignment = calibration::fitAlignment(table.nodes);
+  const auto alignment = calibration::fitAlignment(table.nodes, table.metadata.jig_tolerance_m);
   if (alignment) field.reference_from_tracker = alignment->reference_from_tracker;
   std::map<int, bool> validation;
   for (const Node& node : table.nodes) validation[node.node] = node.role == NodeRole::kValidation;

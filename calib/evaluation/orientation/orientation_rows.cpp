@@ -62,7 +62,7 @@ Result<OrientationRows> orientationRows(const CalibrationTable& table, PosePart 
                     std::to_string(n_without) + " of " + std::to_string(nodes.size()) + " rows have none");
   calibration::Alignment alignment;
   if (calibration::defaultAlignMode(table.metadata) == calibration::AlignMode::kRigid) {
-    FT_TRY(const auto fitted, calibration::fitAlignment(nodes));
+    FT_TRY(const auto fitted, calibration::fitAlignment(nodes, table.metadata.jig_tolerance_m));
     alignment = fitted;
   }
   correctors::FitData data = calibration::makeFitData(nodes, table.metadata, alignment);
