@@ -5,7 +5,7 @@
 
 #include "calib/gap/report.h"
 #include "calib/identify/profile.h"
-#include "calib/identify/refine.h"
+#include "calib/identify/joint_fit.h"
 #include "calib/identify/thresholds.h"
 
 namespace fieldtrue::gap {

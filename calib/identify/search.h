@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calib/core/run_control.h"
-#include "calib/identify/refine.h"
+#include "calib/identify/joint_fit.h"
 #include "calib/identify/structure.h"
 
 namespace fieldtrue::identify {

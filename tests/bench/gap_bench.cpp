@@ -12,7 +12,7 @@
 #include "calib/gap/first_look.h"
 #include "calib/identify/field_comparison.h"
 #include "calib/identify/ranking.h"
-#include "calib/identify/refine.h"
+#include "calib/identify/joint_fit.h"
 #include "calib/identify/rows.h"
 #include "calib/simulation/simulator.h"
 #include "tests/bench/two_threads.h"

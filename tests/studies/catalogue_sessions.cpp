@@ -6,7 +6,7 @@
 #include <random>
 
 #include "calib/core/file_io.h"
-#include "calib/identify/refine.h"
+#include "calib/identify/joint_fit.h"
 #include "calib/simulation/simulator.h"
 #include "calib/tables/table_io.h"
 #include "calib/tables/table_writer.h"

@@ -1,11 +1,10 @@
-#include "calib/identify/refine.h"
-
 #include <QTest>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
 
+#include "calib/identify/joint_fit.h"
 #include "calib/identify/ranking.h"
 #include "tests/calib/gap/gap_fixtures.h"
 #include "tests/support/matchers.h"
@@ -149,6 +148,40 @@ class RefineTest : public QObject {
     const auto [least, most] = std::minmax_element(bics.begin(), bics.end());
     const double gain = search.bicOf(search.none().model) - *least;
     QVERIFY2(gain > 1000.0 && *most - *least < 2.0, qPrintable(QString("%1 of %2").arg(*most - *least).arg(gain)));
+  }
+
+  /// A body nearer to a place than any is looked for draws its fit to the bound; the other body's fit goes on.
+  void whatStandsAtItsBoundHoldsNoOther() {
+    simulation::Scene scene = gapScene();
+    const Pose tracker_from_rig = inverse(scene.reference_from_tracker);
+    const Eigen::Vector3d far_m(1.3, 0.5, 0.3), near_m = tracker_from_rig * Eigen::Vector3d(0.4, 0.2, -0.05);
+    const auto put = [&](const Eigen::Vector3d& at_m, double radius_m) {
+      scene.effects.push_back(
+          {"compact_metal", {{"center_m", {at_m.x(), at_m.y(), at_m.z()}}, {"radius_m", radius_m}}});
+    };
+    put(far_m, 0.12);
+    put(near_m, 0.04);
+    const CalibrationTable table = recordedIn(scene, gapPlan({}));
+    const GapRows rows = makeGapRows(table.nodes, table.metadata).value();
+    const GapSearch search(rows, {});
+    const std::vector<TriedEffect> tried = rankEffects(search, search.none().model, {});
+    const auto one = std::find_if(tried.begin(), tried.end(), [&](const TriedEffect& other) {
+      return other.model.terms.back().effect->id == std::string("compact_metal");
+    });
+    QVERIFY(one != tried.end());
+    std::vector<double> bics;
+    for (const double off_m : {0.05, 0.1, 0.2}) {
+      GapModel start = one->model;
+      start.terms.push_back(start.terms.back());
+      start.terms[0].searched.head<3>() = far_m + off_m * Eigen::Vector3d(1.0, -1.0, 0.5);
+      start.terms[1].searched.head<3>() = near_m - tracker_from_rig.orientation * Eigen::Vector3d(0.0, 0.0, 0.06);
+      start.terms[1].linear.setZero();
+      for (const GapTerm& term : start.terms) QVERIFY(term.fit->allows(term.searched));
+      bics.push_back(search.bicOf(search.fitted(start)));
+    }
+    const auto [least, most] = std::minmax_element(bics.begin(), bics.end());
+    // Where along its bound the near body came to stand is worth some units; the far one left aside would be hundreds.
+    QVERIFY2(*most - *least < 50.0, qPrintable(QString::number(*most - *least)));
   }
 
   void fitsAreKnownByStartAndRows() {
