@@ -28,6 +28,7 @@ void addDipole(const SheetSource& source, const SheetField& field) {
   const double strength[3] = {source.strength[0], source.strength[1], source.strength[2]};
   const double at_x = source.x_m, at_y = source.y_m;
   const std::size_t count = field.count;
+  FIELDTRUE_STEPS_APART
   for (std::size_t i = 0; i < count; ++i) {
     const double dx = x_m[i] - at_x, dy = y_m[i] - at_y, dz = z_m[i];
     const double r2 = dx * dx + (dy * dy + dz * dz);
@@ -46,6 +47,7 @@ void addCharge(const SheetSource& source, const SheetField& field) {
   const double strength[3] = {source.strength[0], source.strength[1], source.strength[2]};
   const double at_x = source.x_m, at_y = source.y_m;
   const std::size_t count = field.count;
+  FIELDTRUE_STEPS_APART
   for (std::size_t i = 0; i < count; ++i) {
     const double dx = x_m[i] - at_x, dy = y_m[i] - at_y, dz = z_m[i];
     const double r2 = dx * dx + (dy * dy + dz * dz);
