@@ -4,8 +4,8 @@
 #include <span>
 
 #include "calib/gap/report.h"
-#include "calib/identify/profile.h"
 #include "calib/identify/joint_fit.h"
+#include "calib/identify/profile.h"
 #include "calib/identify/thresholds.h"
 
 namespace fieldtrue::gap {
