@@ -32,7 +32,7 @@ AlignMode defaultAlignMode(const TableMetadata& metadata);
 /// the mounting from a mean rotation error of the tracker, which is left to be corrected.
 /// @param jig_tolerance_m SD per axis of placing, where it is stated: tells how far off a row of few must lie
 /// @error kTooFewNodes, kDegenerate as fitRigid
-Result<Alignment> fitAlignment(std::span<const Node> nodes, std::optional<double> jig_tolerance_m = {});
+Result<Alignment> fitAlignment(std::span<const Node> nodes, std::optional<double> jig_tolerance_m);
 
 /// Rows of a table as fit data in the tracker frame: truth brought there by the inverse alignment. The grid index is
 /// the table's, or found from the true positions where they stand on a grid along the rig's axes.

@@ -142,22 +142,23 @@ OffByPlace offByPlace(std::span<const Node> nodes, const Pose& reference_from_tr
   return {nodes, std::move(off_m)};
 }
 
-/// Rows that stand apart, and whether the others show a field.
+/// Rows that stand apart, the variance an axis that half of all show, and whether the others show a field.
 struct Found {
   std::vector<OutlyingRow> rows;
+  double core_m2 = 0.0;
   bool is_in_field = false;
 };
 
 Found findOutlying(const OffByPlace& off, std::optional<double> jig_tolerance_m) {
   const std::vector<Eigen::Vector3d>& off_m = off.all_m();
   if (off_m.empty()) return {};
-  const double core_m2 = coreOf_m2(off_m);
+  Found found;
+  const double core_m2 = found.core_m2 = coreOf_m2(off_m);
   const double far_off = farOff(off_m.size(), core_m2, jig_tolerance_m);
   std::vector<std::size_t> far;
   for (std::size_t row = 0; row < off_m.size(); ++row)
     if (off_m[row].squaredNorm() > far_off * core_m2) far.push_back(row);
   if (far.size() * kMostPart > off_m.size()) return {};
-  Found found;
   for (const std::size_t row : far) {
     const std::vector<Eigen::Vector3d> about_m = off.about(row);
     if (about_m.size() < kAbout) continue;
@@ -190,9 +191,8 @@ std::vector<double> alignmentWeights(std::span<const Node> nodes, const Pose& re
     for (const OutlyingRow& one : found.rows) weights[one.row] = tWeight(one.square);
     return weights;
   }
-  const double core_m2 = coreOf_m2(off.all_m());
   std::ranges::transform(off.all_m(), weights.begin(),
-                         [&](const Eigen::Vector3d& one_m) { return tWeight(one_m.squaredNorm() / core_m2); });
+                         [&](const Eigen::Vector3d& one_m) { return tWeight(one_m.squaredNorm() / found.core_m2); });
   return weights;
 }
 

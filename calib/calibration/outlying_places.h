@@ -25,7 +25,7 @@ struct OutlyingRow {
 /// that is far beyond what a field does from place to place is told, or none.
 /// @param jig_tolerance_m SD per axis of placing, where it is stated
 std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& reference_from_tracker,
-                                      std::optional<double> jig_tolerance_m = {});
+                                      std::optional<double> jig_tolerance_m);
 
 /// How much the square of each row counts in the alignment; empty where all count alike, since no row stands apart.
 /// Where the other rows show a field, those that stand apart count less; where they show none, every row counts as a
@@ -33,7 +33,7 @@ std::vector<OutlyingRow> outlyingRows(std::span<const Node> nodes, const Pose& r
 /// far.
 /// @source Lange, Little and Taylor 1989, J. Am. Stat. Assoc. 84 881 (t weights)
 std::vector<double> alignmentWeights(std::span<const Node> nodes, const Pose& reference_from_tracker,
-                                     std::optional<double> jig_tolerance_m = {});
+                                     std::optional<double> jig_tolerance_m);
 
 /// Which places these are, what was made of them and what to do; "" where there are none.
 /// @param is_fitted whether the alignment was, else it was known

@@ -12,6 +12,7 @@
 
 namespace fieldtrue::effects {
 
+namespace closed_loop {
 namespace {
 
 struct EllipticIntegrals {
@@ -195,8 +196,10 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace closed_loop
 
 Eigen::Vector3d ringField_per_m(const Eigen::Vector3d& from_center_m, const Eigen::Vector3d& axis, double radius_m) {
+  using namespace closed_loop;
   const double z_m = axis.dot(from_center_m);
   const Eigen::Vector3d across_m = from_center_m - z_m * axis;
   const double rho_m = across_m.norm();
@@ -229,6 +232,7 @@ Eigen::Vector3d ringField_per_m(const Eigen::Vector3d& from_center_m, const Eige
 /// delay, R at direct current.
 /// @source Jackson 1999, Classical Electrodynamics, section 5.5 (field of a current ring); L: Maxwell 1873, art. 704
 Effect closedLoopEffect() {
+  using namespace closed_loop;
   Effect effect;
   effect.id = "closed_loop";
   effect.label = "Closed conducting loop";

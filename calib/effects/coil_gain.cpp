@@ -4,6 +4,7 @@
 
 namespace fieldtrue::effects {
 
+namespace coil_gain {
 namespace {
 
 constexpr double kPlausible = 0.1;
@@ -48,6 +49,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 }
 
 }  // namespace
+}  // namespace coil_gain
 
 /// Coils, amplifiers or their stored calibration that are stronger or weaker than the tracker believes, each by its own
 /// share.
@@ -58,6 +60,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 /// so a transmitter's gain scales a column of S and a receiver's a row.
 /// @source coupling matrix: Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; its change to first order by hand
 Effect coilGainEffect() {
+  using namespace coil_gain;
   Effect effect;
   effect.id = "coil_gain";
   effect.label = "Coil gains";

@@ -7,6 +7,7 @@
 
 namespace fieldtrue::effects {
 
+namespace coil_nonorthogonality {
 namespace {
 
 constexpr double kPlausible_rad = 0.05;
@@ -64,6 +65,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 }
 
 }  // namespace
+}  // namespace coil_nonorthogonality
 
 /// Coils that do not stand at right angles to each other though the tracker believes so.
 ///
@@ -73,6 +75,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 ///   dG = G E_tx + R E_rx R^T G,   R = tracker_from_sensor.
 /// @source coupling matrix: Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709; its change to first order by hand
 Effect coilNonorthogonalityEffect() {
+  using namespace coil_nonorthogonality;
   Effect effect;
   effect.id = "coil_nonorthogonality";
   effect.label = "Coils not at right angles";

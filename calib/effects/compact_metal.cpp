@@ -8,6 +8,7 @@
 
 namespace fieldtrue::effects {
 
+namespace compact_metal {
 namespace {
 
 class CompactMetal final : public field::CouplingDistortion {
@@ -82,6 +83,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace compact_metal
 
 double spherePolarizability_m3(double radius_m, bool is_ferromagnetic, double relative_permeability) {
   const double a3 = radius_m * radius_m * radius_m;
@@ -91,6 +93,7 @@ double spherePolarizability_m3(double radius_m, bool is_ferromagnetic, double re
 
 std::unique_ptr<field::CouplingDistortion> makeCompactMetal(const Eigen::Vector3d& center_m,
                                                             const Eigen::Matrix3d& polarizability_m3, double radius_m) {
+  using namespace compact_metal;
   return std::make_unique<CompactMetal>(MetalBody{center_m, polarizability_m3, radius_m});
 }
 
@@ -104,6 +107,7 @@ std::unique_ptr<field::CouplingDistortion> makeCompactMetal(const Eigen::Vector3
 /// @source Raab, Blood, Steiner, Jones 1979, section on field distortion; sphere: Wait 1951, Geophysics 16 666, limits
 /// of high and zero frequency
 Effect compactMetalEffect() {
+  using namespace compact_metal;
   Effect effect;
   effect.id = "compact_metal";
   effect.label = "Compact metal body";

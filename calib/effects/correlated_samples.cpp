@@ -5,6 +5,7 @@
 
 namespace fieldtrue::effects {
 
+namespace correlated_samples {
 namespace {
 
 /// Correlation below which 60 readings are worth 45 or more.
@@ -45,6 +46,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 }
 
 }  // namespace
+}  // namespace correlated_samples
 
 /// Successive readings that are not independent, because the tracker filters them.
 ///
@@ -53,6 +55,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 /// the larger holds.
 /// @source Box, Jenkins, Reinsel 1994, Time Series Analysis, section 3.2
 Effect correlatedSamplesEffect() {
+  using namespace correlated_samples;
   Effect effect;
   effect.id = "correlated_samples";
   effect.label = "Filtered readings";

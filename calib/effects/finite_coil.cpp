@@ -7,6 +7,7 @@
 
 namespace fieldtrue::effects {
 
+namespace finite_coil {
 namespace {
 
 enum class Coil { kTransmitter, kReceiver };
@@ -143,6 +144,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 }
 
 }  // namespace
+}  // namespace finite_coil
 
 /// Coils of real size where the tracker's electronics believe in dipoles.
 ///
@@ -154,6 +156,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 /// @source Jackson 1999, Classical Electrodynamics, section 5.5 (ring) and its expansion in a/r; square: second moment
 /// of the wound area
 Effect finiteCoilEffect() {
+  using namespace finite_coil;
   Effect effect;
   effect.id = "finite_coil";
   effect.label = "Coils of real size";

@@ -16,6 +16,7 @@
 
 namespace fieldtrue::effects {
 
+namespace finite_plate {
 namespace {
 
 /// A plate looked for is a square this big at first, in metres.
@@ -361,6 +362,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace finite_plate
 
 /// A flat rectangular metal plate with edges: a table top, a cabinet's side, a floor plate, a sheet of foil.
 ///
@@ -372,6 +374,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// @source meshed sheet: calib/field/sheet_mesh.h; sheet impedance: Wait 1962, Electromagnetic Waves in Stratified
 /// Media, chapter 2; thin conducting sheet: Saslow 1992, Am. J. Phys. 60 693
 Effect finitePlateEffect() {
+  using namespace finite_plate;
   Effect effect;
   effect.id = "finite_plate";
   effect.label = "Metal plate";

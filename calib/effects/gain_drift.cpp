@@ -9,6 +9,7 @@
 
 namespace fieldtrue::effects {
 
+namespace gain_drift {
 namespace {
 
 constexpr double kPlausibleGain = 0.1;
@@ -173,6 +174,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace gain_drift
 
 /// A gain that changes while the recording goes on: a transmitter or an amplifier that warms up.
 ///
@@ -184,6 +186,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// its own constant, for what is stable may lie at either end of the session.
 /// @source Newton's law of cooling: Carslaw and Jaeger 1959, Conduction of Heat in Solids, section 1.9
 Effect gainDriftEffect() {
+  using namespace gain_drift;
   Effect effect;
   effect.id = "gain_drift";
   effect.label = "Gain that drifts with time";

@@ -4,6 +4,7 @@
 
 namespace fieldtrue::effects {
 
+namespace global_gain {
 namespace {
 
 constexpr double kPlausible = 0.1;
@@ -26,6 +27,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 }
 
 }  // namespace
+}  // namespace global_gain
 
 /// Everything is received stronger or weaker by one factor: a wrong dipole constant, drive current or unit.
 ///
@@ -33,6 +35,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 /// first order; the orientation stays. An isotropic error of the rig's scale looks the same about the transmitter.
 /// @source Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709 (inverse cube law)
 Effect globalGainEffect() {
+  using namespace global_gain;
   Effect effect;
   effect.id = "global_gain";
   effect.label = "Gain of the whole tracker";

@@ -4,6 +4,7 @@
 
 namespace fieldtrue::effects {
 
+namespace grid_scale {
 namespace {
 
 constexpr double kPlausible = 0.1;
@@ -39,6 +40,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 }
 
 }  // namespace
+}  // namespace grid_scale
 
 /// A rig that is larger or smaller than its drawing, along each of its axes: wrong pitch, wet wood, a tape in another
 /// unit.
@@ -47,6 +49,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& /*design*/) {
 /// place does not matter where the alignment is unknown; here it is the rig's origin.
 /// @source geometry, by hand
 Effect gridScaleEffect() {
+  using namespace grid_scale;
   Effect effect;
   effect.id = "grid_scale";
   effect.label = "Scale of the rig";

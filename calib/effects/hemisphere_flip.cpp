@@ -3,6 +3,7 @@
 
 namespace fieldtrue::effects {
 
+namespace hemisphere_flip {
 namespace {
 
 class HemisphereFlip final : public field::PhysicalEffect {
@@ -22,6 +23,7 @@ Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parame
 }
 
 }  // namespace
+}  // namespace hemisphere_flip
 
 /// Visits at which the tracker reports the other of the two positions that its signals allow.
 ///
@@ -29,6 +31,7 @@ Result<std::unique_ptr<field::PhysicalEffect>> make(const nlohmann::json& parame
 /// right orientation; each visit does so, all its readings together, with this probability.
 /// @source Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709 (hemisphere ambiguity)
 Effect hemisphereFlipEffect() {
+  using namespace hemisphere_flip;
   Effect effect;
   effect.id = "hemisphere_flip";
   effect.label = "Lost hemisphere";

@@ -12,6 +12,7 @@
 
 namespace fieldtrue::effects {
 
+namespace jig_layer_offset {
 namespace {
 
 constexpr double kPlausible_m = 0.03;
@@ -165,6 +166,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace jig_layer_offset
 
 /// Layers of a rig that are too high or too low: pipes cut to the wrong length, a shelf on another peg.
 ///
@@ -172,6 +174,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// the nearest layer of the list, and to none where that is farther than half the smallest spacing of the list.
 /// @source geometry, by hand
 Effect jigLayerOffsetEffect() {
+  using namespace jig_layer_offset;
   Effect effect;
   effect.id = "jig_layer_offset";
   effect.label = "Layers of the rig at a wrong height";

@@ -4,6 +4,7 @@
 
 namespace fieldtrue::effects {
 
+namespace jig_tilt {
 namespace {
 
 constexpr double kPlausible_rad = 0.1;
@@ -50,6 +51,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace jig_tilt
 
 /// A rig that leans: its pipes do not stand at right angles to its base, or its rows not to each other.
 ///
@@ -60,6 +62,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// level. The shear xy of the rows does not turn it.
 /// @source geometry, the rotation to first order by hand
 Effect jigTiltEffect() {
+  using namespace jig_tilt;
   Effect effect;
   effect.id = "jig_tilt";
   effect.label = "Leaning rig";

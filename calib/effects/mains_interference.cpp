@@ -7,6 +7,7 @@
 
 namespace fieldtrue::effects {
 
+namespace mains_interference {
 namespace {
 
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
@@ -86,6 +87,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 }
 
 }  // namespace
+}  // namespace mains_interference
 
 /// Mains wiring or a monitor whose magnetic field the receiver picks up beside the transmitter's.
 ///
@@ -97,6 +99,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 /// clocks of their own, so between two visits the phase is lost.
 /// @source Oppenheim and Schafer 1989, Discrete-Time Signal Processing, section 3.2 (aliasing)
 Effect mainsInterferenceEffect() {
+  using namespace mains_interference;
   Effect effect;
   effect.id = "mains_interference";
   effect.label = "Mains or monitor";

@@ -7,6 +7,7 @@
 
 namespace fieldtrue::effects {
 
+namespace metal_moved {
 namespace {
 
 /// A change that fewer readings than this on one side of it speak for is not looked for.
@@ -139,6 +140,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace metal_moved
 
 /// A compact metal body that is in the room only from a time on, or only until then: a chair, a tool, a trolley.
 ///
@@ -146,6 +148,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// places were not all visited on one side of the change, and whose times are stated, can show it.
 /// @source Raab, Blood, Steiner, Jones 1979, IEEE Trans. AES-15 709 (the body)
 Effect metalMovedEffect() {
+  using namespace metal_moved;
   Effect effect;
   effect.id = "metal_moved";
   effect.label = "Metal that came or went";

@@ -9,6 +9,7 @@
 
 namespace fieldtrue::effects {
 
+namespace metal_plane {
 namespace {
 
 class MetalPlane final : public field::CouplingDistortion {
@@ -153,6 +154,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace metal_plane
 
 /// A flat metal floor, wall or ceiling much larger than the distances: an image of the transmitter stands behind it.
 ///
@@ -166,6 +168,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// @source Jackson 1999, Classical Electrodynamics, problem 5.17 (images in a permeable half-space); perfect conductor:
 /// the same with mu_r -> 0; sheet: Saslow 1992, Am. J. Phys. 60 693
 Effect metalPlaneEffect() {
+  using namespace metal_plane;
   Effect effect;
   effect.id = "metal_plane";
   effect.label = "Metal floor, wall or ceiling";

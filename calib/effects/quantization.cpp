@@ -5,6 +5,7 @@
 
 namespace fieldtrue::effects {
 
+namespace quantization {
 namespace {
 
 /// Share of a reading's variance above which the lattice is felt.
@@ -50,6 +51,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 }
 
 }  // namespace
+}  // namespace quantization
 
 /// Readings reported in coarse steps: ASCII with few digits, short binary words.
 ///
@@ -58,6 +60,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 /// than half a step the error is uniform, SD step/sqrt(12); below, the mean of a place is biased.
 /// @source Widrow and Kollar 2008, Quantization Noise
 Effect quantizationEffect() {
+  using namespace quantization;
   Effect effect;
   effect.id = "quantization";
   effect.label = "Coarse steps";

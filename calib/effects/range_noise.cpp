@@ -3,6 +3,7 @@
 
 namespace fieldtrue::effects {
 
+namespace range_noise {
 namespace {
 
 constexpr double kSds = 3.0;
@@ -79,6 +80,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 }
 
 }  // namespace
+}  // namespace range_noise
 
 /// More noise than the tracker's data sheet says, or noise that grows with range beyond the law.
 ///
@@ -87,6 +89,7 @@ void detect(const SampleEvidence& evidence, const SignalBelief& belief, std::vec
 /// with range, or a long cable, makes the couplings themselves noisier.
 /// @source error propagation through nine couplings of equal SD: position r^4, orientation r^3
 Effect rangeNoiseEffect() {
+  using namespace range_noise;
   Effect effect;
   effect.id = "range_noise";
   effect.label = "Noise beyond the law of range";

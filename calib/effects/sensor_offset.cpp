@@ -4,6 +4,7 @@
 
 namespace fieldtrue::effects {
 
+namespace sensor_offset {
 namespace {
 
 constexpr double kPlausible_m = 0.2;
@@ -55,6 +56,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace sensor_offset
 
 /// A sensor whose magnetic centre is not where the rig says, or that is mounted turned.
 ///
@@ -63,6 +65,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// alignment is unknown a constant mounting rotation is a part of it.
 /// @source Tsai and Lenz 1989, IEEE Trans. RA-5 345 (sensor to mount transform)
 Effect sensorOffsetEffect() {
+  using namespace sensor_offset;
   Effect effect;
   effect.id = "sensor_offset";
   effect.label = "Sensor off its mark";

@@ -4,6 +4,7 @@
 
 namespace fieldtrue::effects {
 
+namespace transmitter_misalignment {
 namespace {
 
 constexpr double kPlausible_m = 0.2;
@@ -39,6 +40,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 }
 
 }  // namespace
+}  // namespace transmitter_misalignment
 
 /// A transmitter that does not stand where the rig says.
 ///
@@ -46,6 +48,7 @@ std::vector<std::unique_ptr<EffectFit>> fits(const FitDesign& design) {
 /// Seen from the real transmitter a sensor at p then stands, to first order, at p - d - w x p and is turned by -w.
 /// @source Horn 1987, J. Opt. Soc. Am. A 4 629 (rigid transform); first order by hand
 Effect transmitterMisalignmentEffect() {
+  using namespace transmitter_misalignment;
   Effect effect;
   effect.id = "transmitter_misalignment";
   effect.label = "Transmitter out of place";

@@ -8,6 +8,7 @@
 #include "calib/tables/table_writer.h"
 
 namespace fieldtrue::exporters {
+namespace csv {
 namespace {
 
 constexpr const char* kAddedColumns =
@@ -87,8 +88,10 @@ Result<Written> write(const ExportSubject& subject, const ExportOptions&, const 
 }
 
 }  // namespace
+}  // namespace csv
 
 Exporter csvExporter() {
+  using namespace csv;
   return {.id = "csv",
           .label = "Node table (CSV)",
           .extension = ".csv",

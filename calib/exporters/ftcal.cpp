@@ -1,6 +1,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace ftcal {
 namespace {
 
 Result<Written> write(const ExportSubject& subject, const ExportOptions&, const std::filesystem::path& path,
@@ -10,8 +11,10 @@ Result<Written> write(const ExportSubject& subject, const ExportOptions&, const 
 }
 
 }  // namespace
+}  // namespace ftcal
 
 Exporter ftcalExporter() {
+  using namespace ftcal;
   return {.id = "ftcal",
           .label = "Fieldtrue calibration",
           .extension = ".ftcal.json",

@@ -8,6 +8,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace itk_h5 {
 namespace {
 
 /// A handle of HDF5, closed at the end of its scope.
@@ -126,8 +127,10 @@ Result<Written> exportH5(const ExportSubject& subject, const ExportOptions& opti
 }
 
 }  // namespace
+}  // namespace itk_h5
 
 Exporter itkH5Exporter() {
+  using namespace itk_h5;
   return {.id = "itk_h5",
           .label = "ITK transform, HDF5",
           .extension = ".h5",

@@ -6,6 +6,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace itk_mha {
 namespace {
 
 Result<void> writeMha(const LatticeField& field, const Facts& facts, const std::filesystem::path& path) {
@@ -95,8 +96,10 @@ Result<Written> exportMha(const ExportSubject& subject, const ExportOptions& opt
 }
 
 }  // namespace
+}  // namespace itk_mha
 
 Exporter itkMhaExporter() {
+  using namespace itk_mha;
   return {.id = "itk_mha",
           .label = "Displacement field, MetaImage",
           .extension = ".mha",

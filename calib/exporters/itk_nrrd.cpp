@@ -6,6 +6,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace itk_nrrd {
 namespace {
 
 std::string tuple(const Eigen::Vector3d& v) { return "(" + threeNumbers(v, ",") + ")"; }
@@ -128,8 +129,10 @@ Result<Written> exportNrrd(const ExportSubject& subject, const ExportOptions& op
 }
 
 }  // namespace
+}  // namespace itk_nrrd
 
 Exporter itkNrrdExporter() {
+  using namespace itk_nrrd;
   return {.id = "itk_nrrd",
           .label = "Displacement field, NRRD",
           .extension = ".nrrd",

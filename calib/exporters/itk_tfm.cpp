@@ -4,6 +4,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace itk_tfm {
 namespace {
 
 constexpr const char* kHead = "#Insight Transform File V1.0\n";
@@ -53,8 +54,10 @@ Result<Written> exportTfm(const ExportSubject& subject, const ExportOptions& opt
 }
 
 }  // namespace
+}  // namespace itk_tfm
 
 Exporter itkTfmExporter() {
+  using namespace itk_tfm;
   return {.id = "itk_tfm",
           .label = "ITK transform, text",
           .extension = ".tfm",

@@ -7,6 +7,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace lattice_csv {
 namespace {
 
 constexpr const char* kColumns =
@@ -78,8 +79,10 @@ Result<Written> exportCsv(const ExportSubject& subject, const ExportOptions& opt
 }
 
 }  // namespace
+}  // namespace lattice_csv
 
 Exporter latticeCsvExporter() {
+  using namespace lattice_csv;
   return {.id = "lattice_csv",
           .label = "Lattice (CSV)",
           .extension = ".lattice.csv",

@@ -8,6 +8,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace matlab {
 namespace {
 
 bool addArray(mat_t* file, const char* name, std::vector<std::size_t> dims, std::vector<double> numbers) {
@@ -158,8 +159,10 @@ Result<Written> exportMat(const ExportSubject& subject, const ExportOptions& opt
 }
 
 }  // namespace
+}  // namespace matlab
 
 Exporter matlabExporter() {
+  using namespace matlab;
   return {.id = "matlab",
           .label = "Lattice (MATLAB)",
           .extension = ".mat",

@@ -7,6 +7,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace numpy {
 namespace {
 
 /// An array in NumPy's own format, version 1.0. @param kind "<f8", "|b1", "|S12"
@@ -107,8 +108,10 @@ Result<Written> exportNpz(const ExportSubject& subject, const ExportOptions& opt
 }
 
 }  // namespace
+}  // namespace numpy
 
 Exporter numpyExporter() {
+  using namespace numpy;
   return {.id = "numpy",
           .label = "Lattice (NumPy)",
           .extension = ".npz",

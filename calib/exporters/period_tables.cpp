@@ -9,6 +9,7 @@
 /// Tables of the CAVE's time, in feet. Their readers run past the end of the table at its upper bounds, so that two
 /// steps of padding stand around the places.
 namespace fieldtrue::exporters {
+namespace period_tables {
 namespace {
 
 constexpr int kCavePadding = 1;
@@ -141,8 +142,10 @@ Result<Written> exportSyzygy(const ExportSubject& subject, const ExportOptions& 
 }
 
 }  // namespace
+}  // namespace period_tables
 
 Exporter caveTableExporter() {
+  using namespace period_tables;
   return {.id = "cave_table",
           .label = "CAVE calibration table",
           .extension = ".cave.txt",
@@ -154,6 +157,7 @@ Exporter caveTableExporter() {
 }
 
 Exporter syzygyTableExporter() {
+  using namespace period_tables;
   return {.id = "syzygy_table",
           .label = "Syzygy table",
           .extension = ".syzygy.txt",

@@ -7,6 +7,7 @@
 #include "calib/exporters/rows.h"
 
 namespace fieldtrue::exporters {
+namespace polynomial_files {
 namespace {
 
 /// A calibration by a polynomial, written out: with u = axes^T (p - center) / scale the true position is
@@ -180,8 +181,10 @@ Result<Written> writeC(const ExportSubject& subject, const ExportOptions&, const
 }
 
 }  // namespace
+}  // namespace polynomial_files
 
 Exporter polynomialJsonExporter() {
+  using namespace polynomial_files;
   return {.id = "polynomial_json",
           .label = "Polynomial coefficients (JSON)",
           .extension = ".polynomial.json",
@@ -193,6 +196,7 @@ Exporter polynomialJsonExporter() {
 }
 
 Exporter polynomialCExporter() {
+  using namespace polynomial_files;
   return {.id = "polynomial_c",
           .label = "C function of the polynomial",
           .extension = ".c",

@@ -10,6 +10,7 @@
 
 /// Files of programs that know rigid transforms only: the best rigid part of a calibration, and what it leaves.
 namespace fieldtrue::exporters {
+namespace rigid_files {
 namespace {
 
 struct RigidPart {
@@ -131,8 +132,10 @@ Result<Written> writeVrpn(const ExportSubject& subject, const ExportOptions& opt
 }
 
 }  // namespace
+}  // namespace rigid_files
 
 Exporter plusXmlExporter() {
+  using namespace rigid_files;
   return {.id = "plus_xml",
           .label = "PLUS coordinate definition",
           .extension = ".plus.xml",
@@ -143,6 +146,7 @@ Exporter plusXmlExporter() {
 }
 
 Exporter vrpnCfgExporter() {
+  using namespace rigid_files;
   return {.id = "vrpn_cfg",
           .label = "VRPN tracker configuration",
           .extension = ".vrpn.cfg",

@@ -6,6 +6,7 @@
 
 /// The plug-in that trackd's drivers load, with its parameter file and the calibration: a folder.
 namespace fieldtrue::exporters {
+namespace trackd_plugin {
 namespace {
 
 namespace fs = std::filesystem;
@@ -70,8 +71,10 @@ Result<Written> write(const ExportSubject& subject, const ExportOptions&, const 
 }
 
 }  // namespace
+}  // namespace trackd_plugin
 
 Exporter trackdPluginExporter() {
+  using namespace trackd_plugin;
   return {.id = "trackd_plugin",
           .label = "trackd plug-in",
           .extension = ".trackd",

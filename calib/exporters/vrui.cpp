@@ -8,6 +8,7 @@
 
 /// Vrui's calibrators. Both want metres: their search for a cell never ends on lattices in millimetres.
 namespace fieldtrue::exporters {
+namespace vrui {
 namespace {
 
 constexpr std::size_t kGridHead = 12;  ///< Three counts.
@@ -211,8 +212,10 @@ Result<Written> exportForward(const ExportSubject& subject, const ExportOptions&
 }
 
 }  // namespace
+}  // namespace vrui
 
 Exporter vruiForwardGridExporter() {
+  using namespace vrui;
   return {.id = "vrui_forward_grid",
           .label = "Vrui forward grid (text)",
           .extension = ".vrui.txt",
@@ -224,6 +227,7 @@ Exporter vruiForwardGridExporter() {
 }
 
 Exporter vruiGridExporter() {
+  using namespace vrui;
   return {.id = "vrui_grid",
           .label = "Vrui grid (binary)",
           .extension = ".vrui.grid",

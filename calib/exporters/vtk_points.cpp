@@ -6,6 +6,7 @@
 #include "calib/exporters/vtk_xml.h"
 
 namespace fieldtrue::exporters {
+namespace vtk_points {
 namespace {
 
 /// One point a vertex, which is what ParaView shows without a filter.
@@ -89,8 +90,10 @@ Result<Written> writePlaces(const ExportSubject& subject, const ExportOptions&, 
 }
 
 }  // namespace
+}  // namespace vtk_points
 
 Exporter vtkLandmarksExporter() {
+  using namespace vtk_points;
   return {.id = "vtk_landmarks",
           .label = "Landmarks of a thin-plate spline",
           .extension = ".landmarks.vtp",
@@ -102,6 +105,7 @@ Exporter vtkLandmarksExporter() {
 }
 
 Exporter vtkVtpExporter() {
+  using namespace vtk_points;
   return {.id = "vtk_vtp",
           .label = "Places with their errors",
           .extension = ".vtp",

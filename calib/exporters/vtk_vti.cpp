@@ -5,6 +5,7 @@
 #include "calib/exporters/vtk_xml.h"
 
 namespace fieldtrue::exporters {
+namespace vtk_vti {
 namespace {
 
 Result<void> writeVti(const LatticeField& field, const Facts& facts, const std::filesystem::path& path) {
@@ -82,8 +83,10 @@ Result<Written> exportVti(const ExportSubject& subject, const ExportOptions& opt
 }
 
 }  // namespace
+}  // namespace vtk_vti
 
 Exporter vtkVtiExporter() {
+  using namespace vtk_vti;
   return {.id = "vtk_vti",
           .label = "Displacement field, VTK image",
           .extension = ".vti",

@@ -93,7 +93,7 @@ std::string lowestHeldOut(const std::map<std::string, double>& held_out_mm, bool
 Outcome runRoom(const std::string& room, std::uint64_t seed, int stride) {
   const simulation::Scene scene = readRoom(FIELDTRUE_RESOURCES, room);
   const RoomRecording recording = recordRoom(scene, seed, 200, stride);
-  const calibration::Alignment alignment = orThrow(calibration::fitAlignment(recording.fit_nodes));
+  const calibration::Alignment alignment = orThrow(calibration::fitAlignment(recording.fit_nodes, std::nullopt));
   const correctors::FitData data = calibration::makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
   const auto folds = correctors::innerFolds(data);
   Outcome outcome;

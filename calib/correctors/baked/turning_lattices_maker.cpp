@@ -1,13 +1,13 @@
 #include "calib/correctors/baked/turning_lattices_maker.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "calib/correctors/baked/turning_lattices.h"
 #include "calib/correctors/base/method.h"
+#include "calib/correctors/numerics/dense_solver.h"
 #include "calib/correctors/radial/turn_correlation.h"
 #include "calib/geometry/geometry.h"
 
@@ -129,21 +129,26 @@ Result<std::unique_ptr<PositionModel>> makeTurningLattices(const PositionModel& 
   const Eigen::MatrixXd samples = sampled(part, of_rows, thinned(part.p_m, kPlacesLookedAt));
   const Eigen::MatrixXd turns = correlations(part, turnsLookedAt(part), basis.centers);
   const Eigen::MatrixXd values_m = samples * turns.transpose();
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(values_m, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const auto most = std::min<Eigen::Index>(svd.singularValues().size(), TurnBasis::kMostFunctions);
+  // Principal components: of the orientations looked at, orthonormal; of the places, in metres.
+  Eigen::MatrixXd of_turns = transposedTimes(values_m, values_m);
+  Eigen::VectorXd squares_m2;
+  if (!symmetricEigenInPlace(of_turns, squares_m2)) return tooMany("functions");
+  of_turns = of_turns.rowwise().reverse().eval();
+  const auto most = std::min<Eigen::Index>(of_turns.cols(), TurnBasis::kMostFunctions);
+  const Eigen::MatrixXd of_places_m = times(values_m, of_turns.leftCols(most));
   Eigen::Index rank = 1;
   Eigen::MatrixXd rest = values_m;
   for (;; ++rank) {
     const auto at = rank - 1;
-    rest.noalias() -= svd.singularValues()[at] * svd.matrixU().col(at) * svd.matrixV().col(at).transpose();
+    rest.noalias() -= of_places_m.col(at) * of_turns.col(at).transpose();
     if (leftAway_m(rest) <= kOfLeftAway * max_deviation_m) break;
     if (rank == most) return tooMany("functions");
   }
   // Functions of the orientation of about 1, those of position in metres.
   const double scale = std::sqrt(static_cast<double>(turns.rows()));
-  const Eigen::MatrixXd of_centers = turns.transpose() * svd.matrixV().leftCols(rank) / scale;
-  basis.weights = samples.transpose() * svd.matrixU().leftCols(rank) * scale *
-                  svd.singularValues().head(rank).cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd of_centers = turns.transpose() * of_turns.leftCols(rank) / scale;
+  const Eigen::RowVectorXd sizes_m2 = of_places_m.leftCols(rank).colwise().squaredNorm();
+  basis.weights = samples.transpose() * of_places_m.leftCols(rank) * scale * sizes_m2.cwiseInverse().asDiagonal();
   const std::vector<Eigen::Quaterniond> seen = distinctRotations(part.q, kSameOrientation_rad);
   basis.mean = (correlations(part, seen, basis.centers) * basis.weights).colwise().mean().transpose();
   const Eigen::RowVectorXd largest = (turns * basis.weights).cwiseAbs().colwise().maxCoeff();

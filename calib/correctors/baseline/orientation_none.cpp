@@ -16,7 +16,7 @@ class NoOrientationCorrection : public OrientationModel {
 };
 
 /// Needs no orientations: a table of positions alone gets this one.
-Result<std::unique_ptr<OrientationModel>> fitNone(const FitData&, const Settings&, const RunControl&) {
+Result<std::unique_ptr<OrientationModel>> fitNoOrientation(const FitData&, const Settings&, const RunControl&) {
   return std::make_unique<NoOrientationCorrection>();
 }
 
@@ -31,7 +31,7 @@ OrientationMethod noneOrientation() {
           .label = "No correction",
           .source = "The tracker as it is, after the alignment if one is fitted",
           .settings = {},
-          .fit = fitNone,
+          .fit = fitNoOrientation,
           .read = readNoneOrientation};
 }
 

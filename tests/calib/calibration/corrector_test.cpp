@@ -108,7 +108,7 @@ class CorrectorTest : public QObject {
   void findsTheAlignmentOfAPerfectTracker() {
     SyntheticOptions options;
     options.orientations = 3;
-    const auto alignment = fitAlignment(alignedTable(options).nodes);
+    const auto alignment = fitAlignment(alignedTable(options).nodes, std::nullopt);
     FT_VERIFY_OK(alignment);
     FT_VERIFY_MATCH(near(alignment->reference_from_tracker, kReferenceFromTracker, 1e-9, 1e-9));
     FT_VERIFY_MATCH(near(alignment->sensor_from_mount, kMounting, 1e-9));
@@ -122,12 +122,12 @@ class CorrectorTest : public QObject {
     const Eigen::Quaterniond q_error = rotationFromVector({0.05, -0.08, 0.04});
     for (Node& node : table.nodes)
       node.tracker_from_sensor.orientation = q_error * node.tracker_from_sensor.orientation;
-    const auto alignment = fitAlignment(table.nodes);
+    const auto alignment = fitAlignment(table.nodes, std::nullopt);
     FT_VERIFY_OK(alignment);
     FT_VERIFY_MATCH(near(alignment->sensor_from_mount, kMounting, 1e-9));
     // Held in one orientation nothing tells it from mounting, and it counts as such.
     std::erase_if(table.nodes, [](const Node& node) { return node.visit != 0; });
-    const auto single = fitAlignment(table.nodes);
+    const auto single = fitAlignment(table.nodes, std::nullopt);
     FT_VERIFY_OK(single);
     for (const Node& node : table.nodes)
       FT_VERIFY_MATCH(near(
@@ -138,7 +138,7 @@ class CorrectorTest : public QObject {
   void mountingIsUnityWithoutOrientations() {
     SyntheticOptions options;
     options.has_orientation = false;
-    const auto alignment = fitAlignment(alignedTable(options).nodes);
+    const auto alignment = fitAlignment(alignedTable(options).nodes, std::nullopt);
     FT_VERIFY_OK(alignment);
     FT_VERIFY_MATCH(near(alignment->sensor_from_mount, Eigen::Quaterniond::Identity(), 0.0));
   }
@@ -218,7 +218,7 @@ class CorrectorTest : public QObject {
     SyntheticOptions options;
     options.smooth_distortion_m = 0.02;
     const CalibrationTable table = alignedTable(options);
-    const Alignment alignment = fitAlignment(table.nodes).value();
+    const Alignment alignment = fitAlignment(table.nodes, std::nullopt).value();
     double squares_m2 = 0.0;
     double largest_m = 0.0;
     for (const Node& node : table.nodes) {

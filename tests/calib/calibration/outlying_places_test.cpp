@@ -94,8 +94,9 @@ class OutlyingPlacesTest : public QObject {
     for (unsigned seed = 1; seed <= 40; ++seed) {
       const std::vector<Node> nodes = Room(seed).places(120, 0.0);
       const Pose expected = leastSquares(nodes);
-      QVERIFY(outlyingRows(nodes, expected).empty() && alignmentWeights(nodes, expected).empty());
-      FT_VERIFY_MATCH(near(fitAlignment(nodes).value().reference_from_tracker, expected, 0.0, 0.0));
+      QVERIFY(outlyingRows(nodes, expected, std::nullopt).empty() &&
+              alignmentWeights(nodes, expected, std::nullopt).empty());
+      FT_VERIFY_MATCH(near(fitAlignment(nodes, std::nullopt).value().reference_from_tracker, expected, 0.0, 0.0));
     }
   }
 
@@ -109,7 +110,7 @@ class OutlyingPlacesTest : public QObject {
       Room room(seed);
       const std::vector<Node> nodes = room.places(120, 0.05);
       plain_m2 += squareAtCorners_m2(leastSquares(nodes));
-      eased_m2 += squareAtCorners_m2(fitAlignment(nodes).value().reference_from_tracker);
+      eased_m2 += squareAtCorners_m2(fitAlignment(nodes, std::nullopt).value().reference_from_tracker);
       told_m2 += squareAtCorners_m2(leastSquares(nodes, room.weights()));
     }
     const double of_plain = std::sqrt(eased_m2 / plain_m2), of_told = std::sqrt(eased_m2 / told_m2);
@@ -121,15 +122,15 @@ class OutlyingPlacesTest : public QObject {
     std::vector<Node> nodes = Room(7).places(60, 0.0);
     nodes[17].tracker_from_sensor.position_m.x() += 1.0;
     nodes[41].reference_from_sensor.position_m.z() += 0.03;
-    const Pose aligned = fitAlignment(nodes).value().reference_from_tracker;
+    const Pose aligned = fitAlignment(nodes, std::nullopt).value().reference_from_tracker;
     QVERIFY(std::sqrt(squareAtCorners_m2(aligned)) < 0.002);
     QVERIFY(std::sqrt(squareAtCorners_m2(leastSquares(nodes))) > 0.02);
-    const std::vector<OutlyingRow> outlying = outlyingRows(nodes, aligned);
+    const std::vector<OutlyingRow> outlying = outlyingRows(nodes, aligned, std::nullopt);
     QCOMPARE(outlying.size(), std::size_t{2});
     QCOMPARE(outlying[0].row, std::size_t{17});
     QCOMPARE(outlying[1].row, std::size_t{41});
     QVERIFY(std::abs(outlying[0].off_m - 1.0) < 0.01 && std::abs(outlying[1].off_m - 0.03) < 0.01);
-    const std::vector<double> weights = alignmentWeights(nodes, aligned);
+    const std::vector<double> weights = alignmentWeights(nodes, aligned, std::nullopt);
     QVERIFY(weights[17] < 1e-4 && weights[17] > 0.0 && weights[41] < 0.1);
     QVERIFY(*std::max_element(weights.begin(), weights.end()) == 1.0);
   }
@@ -159,12 +160,12 @@ class OutlyingPlacesTest : public QObject {
           (aligned * node.tracker_from_sensor.position_m - node.reference_from_sensor.position_m).squaredNorm());
     const double share = *std::max_element(square_m2.begin(), square_m2.end()) / (median(square_m2) / 2.366);
     QVERIFY2(share > 60.0, qPrintable(QString::number(share)));
-    QVERIFY(outlyingRows(nodes, aligned).empty());
+    QVERIFY(outlyingRows(nodes, aligned, std::nullopt).empty());
     nodes[8].reference_from_sensor.position_m.y() += 0.02;
-    const std::vector<OutlyingRow> outlying = outlyingRows(nodes, leastSquares(nodes));
+    const std::vector<OutlyingRow> outlying = outlyingRows(nodes, leastSquares(nodes), std::nullopt);
     QCOMPARE(outlying.size(), std::size_t{1});
     QCOMPARE(outlying[0].row, std::size_t{8});
-    const std::vector<double> weights = alignmentWeights(nodes, leastSquares(nodes));
+    const std::vector<double> weights = alignmentWeights(nodes, leastSquares(nodes), std::nullopt);
     QVERIFY(weights[8] < 0.05);
     QCOMPARE(std::count(weights.begin(), weights.end(), 1.0), std::ptrdiff_t{342});
   }
@@ -187,7 +188,7 @@ class OutlyingPlacesTest : public QObject {
   void oneInFiveIsNoSlip() {
     std::vector<Node> nodes = Room(9).places(100, 0.0);
     for (std::size_t i = 0; i < nodes.size(); i += 5) nodes[i].reference_from_sensor.position_m.x() += 0.1;
-    QVERIFY(outlyingRows(nodes, kScatterFromTracker).empty());
+    QVERIFY(outlyingRows(nodes, kScatterFromTracker, std::nullopt).empty());
   }
 
   void theFitNamesWhatLiesOff() {

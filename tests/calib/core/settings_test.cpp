@@ -206,9 +206,9 @@ class SettingsTest : public QObject {
   void refusesJson() {
     QFETCH(QByteArray, patch);
     QFETCH(QByteArray, says);
-    nlohmann::json json = toJson(*resolveSettings("m", declared(), {}));
-    json.merge_patch(nlohmann::json::parse(patch.toStdString()));
-    const auto settings = settingsFromJson("m", declared(), json);
+    nlohmann::json patched = toJson(*resolveSettings("m", declared(), {}));
+    patched.merge_patch(nlohmann::json::parse(patch.toStdString()));
+    const auto settings = settingsFromJson("m", declared(), patched);
     QVERIFY(!settings);
     FT_VERIFY_MATCH(holdsAll(settings.error().message, {says}));
   }

@@ -28,7 +28,7 @@ Fitted fitIn(const RoomRecording& recording, const std::string& method_text, con
   const MethodText text = parseMethodText(method_text).value();
   const correctors::PositionMethod& method = *correctors::findPositionMethod(text.id).value();
   const Settings settings = resolveSettings(text.id, method.settings, text.given).value();
-  const calibration::Alignment alignment = calibration::fitAlignment(recording.fit_nodes).value();
+  const calibration::Alignment alignment = calibration::fitAlignment(recording.fit_nodes, std::nullopt).value();
   const correctors::FitData data = calibration::makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
   return {alignment, method.fit(data, settings, control).value()};
 }

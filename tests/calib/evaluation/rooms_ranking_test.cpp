@@ -17,7 +17,7 @@ namespace {
 /// Errors against exact truth of table 2's techniques in one recording of a room [mm], by technique.
 std::map<std::string, double> errorsIn(const std::string& room, std::uint64_t seed) {
   const RoomRecording recording = recordRoom(readRoom(FIELDTRUE_RESOURCES, room), seed);
-  const calibration::Alignment alignment = calibration::fitAlignment(recording.fit_nodes).value();
+  const calibration::Alignment alignment = calibration::fitAlignment(recording.fit_nodes, std::nullopt).value();
   const correctors::FitData data = calibration::makeFitData(recording.fit_nodes, recording.table.metadata, alignment);
   std::map<std::string, double> error_mm;
   for (const Technique& technique : techniquesOfTable2()) {
