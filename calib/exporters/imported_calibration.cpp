@@ -185,11 +185,15 @@ Result<Corrector> importCalibration(const CalibrationFormat& format, const std::
                                           "takes measured ones to true: write it in that direction (in 3D Slicer " +
                                           "invert the transform; here export --direction measured-to-true)");
   LatticeVectors displacements = latticeOf(field.points), turns = displacements;
-  double squares_m2 = 0.0;
+  if (std::ranges::count(field.inside, 0) > 0) displacements.inside.assign(field.inside.begin(), field.inside.end());
+  double squares_m2 = 0.0, n_inside = 0.0;
   for (std::size_t i = 0; i < field.displacement_m.size(); ++i) {
     const Eigen::Vector3d moved_m =
         isWithinReach(field.displacement_m[i]) ? field.displacement_m[i] : Eigen::Vector3d(Eigen::Vector3d::Zero());
-    squares_m2 += moved_m.squaredNorm() / static_cast<double>(field.displacement_m.size());
+    if (isInside(field, i)) {
+      squares_m2 += moved_m.squaredNorm();
+      n_inside += 1.0;
+    }
     append(displacements.values, moved_m);
     if (field.rotation.empty()) continue;
     const bool is_turn = field.rotation[i].coeffs().allFinite();
@@ -198,7 +202,7 @@ Result<Corrector> importCalibration(const CalibrationFormat& format, const std::
   const std::string note =
       "Imported from " + name + " (" + format.label + "), numbers taken as " + format.unit +
       ", measured to true, orientations " + (field.rotation.empty() ? "as they are read" : "too") +
-      ", a sensor's mounting unknown; it moves positions by " + shortNumber(1000.0 * std::sqrt(squares_m2)) +
+      ", a sensor's mounting unknown; it moves positions by " + shortNumber(1000.0 * std::sqrt(squares_m2 / n_inside)) +
       " mm RMS. Its rows are points of its lattice, which nobody measured: its error is not known.";
   calibration::Evaluator::Parts parts;
   parts.position = correctors::makeImportedPosition(std::move(displacements), note);

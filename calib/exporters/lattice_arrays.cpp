@@ -52,6 +52,11 @@ Result<LatticeField> LatticeArrays::lattice() const {
   for (std::size_t i = 0; is_turned && i < q.size(); ++i)
     if (!(q[i].norm() > kLeastNorm) || !q[i].coeffs().allFinite())
       return fail(ErrorCode::kBadInput, "the turn of point " + std::to_string(i) + " is no quaternion");
+  if (!inside.empty() && inside.size() != corrected_m.size())
+    return fail(ErrorCode::kBadInput, "it tells of " + std::to_string(inside.size()) +
+                                          " points whether they lie inside, and has " +
+                                          std::to_string(corrected_m.size()));
+  field.inside.resize(inside.size());
   std::size_t next = 0;
   for (int i = 0; i < field.points.counts[0]; ++i)
     for (int j = 0; j < field.points.counts[1]; ++j)
@@ -59,6 +64,7 @@ Result<LatticeField> LatticeArrays::lattice() const {
         const std::size_t at = field.points.at(i, j, k);
         field.displacement_m[at] = corrected_m[next] - field.points.point_m(i, j, k);
         if (is_turned) field.rotation[at] = q[next].normalized();
+        if (!inside.empty()) field.inside[at] = inside[next];
         ++next;
       }
   return field;

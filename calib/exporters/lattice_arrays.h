@@ -17,8 +17,8 @@ struct LatticeArrays {
   std::vector<char> inside;
 
   static LatticeArrays of(const LatticeField& field);
-  /// From the levels, `corrected_m` and, where they are there, `q`. @error kBadInput where the levels are not evenly
-  /// spaced, or the sizes differ
+  /// From the levels, `corrected_m` and, where they are there, `q` and `inside`. @error kBadInput where the levels are
+  /// not evenly spaced, or the sizes differ
   Result<LatticeField> lattice() const;
 };
 

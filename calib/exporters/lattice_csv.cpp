@@ -58,7 +58,15 @@ Result<LatticeField> readCsv(const std::filesystem::path& path) {
     raw_m.emplace_back(numbers[0], numbers[1], numbers[2]);
     arrays.corrected_m.emplace_back(numbers[3], numbers[4], numbers[5]);
     arrays.q.emplace_back(numbers[6], numbers[7], numbers[8], numbers[9]);
-    at = std::min(content.find('\n', at), content.size() - 1) + 1;
+    const std::size_t end = std::min(content.find('\n', at), content.size());
+    const std::string_view rest =
+        std::string_view(content).substr(at, end - at);  // Uncertainty, which may be blank, and inside.
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    const std::string_view inside = rest.substr(std::min(comma + 1, rest.size()), 1);
+    if (inside != "0" && inside != "1")
+      return isNot("row " + std::to_string(raw_m.size()) + " says neither 0 nor 1 under inside");
+    arrays.inside.push_back(inside == "1" ? 1 : 0);
+    at = end + 1;
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::set<double> levels;

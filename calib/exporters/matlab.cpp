@@ -132,7 +132,8 @@ Result<LatticeField> readMat(const std::filesystem::path& path) {
   LatticeArrays arrays;
   for (std::size_t axis = 0; axis < 3; ++axis)
     arrays.axes_m[axis] = numbersOf(file.get(), (std::string(1, "xyz"[axis]) + "_m").c_str());
-  const std::vector<double> corrected = numbersOf(file.get(), "corrected_m"), turned = numbersOf(file.get(), "q_wxyz");
+  const std::vector<double> corrected = numbersOf(file.get(), "corrected_m"), turned = numbersOf(file.get(), "q_wxyz"),
+                            inside = numbersOf(file.get(), "inside");
   const std::size_t nx = arrays.axes_m[0].size(), ny = arrays.axes_m[1].size(), nz = arrays.axes_m[2].size();
   const std::size_t n = nx * ny * nz;
   if (n == 0 || corrected.size() != 3 * n)
@@ -144,6 +145,7 @@ Result<LatticeField> readMat(const std::filesystem::path& path) {
         arrays.corrected_m.emplace_back(corrected[at], corrected[n + at], corrected[2 * n + at]);
         if (turned.size() == 4 * n)
           arrays.q.emplace_back(turned[at], turned[n + at], turned[2 * n + at], turned[3 * n + at]);
+        if (inside.size() == n) arrays.inside.push_back(inside[at] != 0.0 ? 1 : 0);
       }
   auto field = arrays.lattice();
   if (!field) return isNot(field.error().message);

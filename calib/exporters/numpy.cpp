@@ -66,15 +66,20 @@ Result<void> writeNpz(const LatticeField& field, const Facts& facts, const std::
   return writeZip(path, membersOf(field, all));
 }
 
-/// The numbers of an array of doubles in C order; empty where it is something else.
-std::vector<double> numbersOf(const std::string& array) {
+/// The bytes of an array of a kind in C order; empty where it is something else.
+std::string dataOf(const std::string& array, const std::string& kind) {
   constexpr std::size_t kPrefix = 10;
   if (array.size() < kPrefix) return {};
   const std::size_t from = kPrefix + static_cast<unsigned char>(array[8]) + 256U * static_cast<unsigned char>(array[9]);
   const std::string head = array.substr(0, std::min(from, array.size()));
-  if (head.find("'<f8'") == std::string::npos || head.find("False") == std::string::npos) return {};
+  const bool is_such = head.find("'" + kind + "'") != std::string::npos && head.find("False") != std::string::npos;
+  return is_such ? array.substr(head.size()) : std::string();
+}
+
+std::vector<double> numbersOf(const std::string& array) {
+  const std::string data = dataOf(array, "<f8");
   std::vector<double> numbers;
-  for (std::size_t at = from; at + 8 <= array.size(); at += 8) numbers.push_back(doubleAt(array, at));
+  for (std::size_t at = 0; at + 8 <= data.size(); at += 8) numbers.push_back(doubleAt(data, at));
   return numbers;
 }
 
@@ -94,6 +99,7 @@ Result<LatticeField> readNpz(const std::filesystem::path& path) {
   const std::vector<double> turned = numbersOf((*members)["q_wxyz.npy"]);
   for (std::size_t at = 0; at + 4 <= turned.size(); at += 4)
     arrays.q.emplace_back(turned[at], turned[at + 1], turned[at + 2], turned[at + 3]);
+  for (const char one : dataOf((*members)["inside.npy"], "|b1")) arrays.inside.push_back(one != 0 ? 1 : 0);
   auto field = arrays.lattice();
   if (!field) return isNot(field.error().message);
   return field;

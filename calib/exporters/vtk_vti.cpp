@@ -36,11 +36,12 @@ Result<LatticeField> readVti(const std::filesystem::path& path) {
   const pugi::xml_node root = document.child("VTKFile"), image = root.child("ImageData");
   if (!image) return isNot("it holds no ImageData");
   const pugi::xml_node data = image.child("Piece").child("PointData");
-  pugi::xml_node array;
+  pugi::xml_node array, inside;
   const std::string named = data.attribute("Vectors").as_string();
   for (const pugi::xml_node& one : data.children("DataArray")) {
     const bool is_vector = one.attribute("NumberOfComponents").as_int(1) == 3;
     if (is_vector && (!array || named == one.attribute("Name").as_string())) array = one;
+    if (!is_vector && std::string_view(one.attribute("Name").as_string()) == "inside") inside = one;
   }
   if (!array) return isNot("it holds no array of three-vectors at its points");
   const auto extent = numbersIn(image.attribute("WholeExtent").as_string());
@@ -68,6 +69,13 @@ Result<LatticeField> readVti(const std::filesystem::path& path) {
       numbers->size() != 3 * field.points.size())
     return isNot("its extent does not match the " + std::to_string(numbers->size()) + " numbers it holds");
   for (std::size_t at = 0; at < numbers->size(); at += 3) field.displacement_m.emplace_back(&(*numbers)[at]);
+  if (!inside) return field;
+  const auto marks = vtkNumbers(root, inside);
+  if (!marks) return isNot(marks.error().message);
+  if (marks->size() != field.points.size())
+    return isNot("its array inside holds " + std::to_string(marks->size()) + " numbers for " +
+                 std::to_string(field.points.size()) + " points");
+  for (const double mark : *marks) field.inside.push_back(mark != 0.0 ? 1 : 0);
   return field;
 }
 

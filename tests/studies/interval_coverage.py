@@ -111,17 +111,17 @@ def drawn_table(rows, n_places, draw, misplacing, n_pool=POOL):
     return some
 
 
-def fresh_squares_m2(cli, table, method, fresh, folder):
+def fresh_errors_m(cli, table, method, fresh, folder):
     """[(what the correction that a fit to the whole table is leaves, whether it covers the place)]: against exact positions."""
     calibration, corrected = os.path.join(folder, "a.ftcal.json"), os.path.join(folder, "corrected.csv")
     run(cli, "fit", "--nodes", table, "--position", method, "--out", calibration)
     run(cli, "apply", "--calibration", calibration, "--in", fresh, "--out", corrected, "--force")
     columns = [f"{axis}_{kind}_m" for kind in ("corrected", "true") for axis in "xyz"] + ["covered"]
-    return [(math.dist(row[:3], row[3:6])**2, row[6] == 1) for row in columns_of(corrected, columns)]
+    return [([row[axis] - row[3 + axis] for axis in range(3)], row[6] == 1) for row in columns_of(corrected, columns)]
 
 
 def fresh_mean_square_m2(cli, table, method, fresh, folder):
-    square_m2 = [square for square, _ in fresh_squares_m2(cli, table, method, fresh, folder)]
+    square_m2 = [math.fsum(axis_m**2 for axis_m in error_m) for error_m, _ in fresh_errors_m(cli, table, method, fresh, folder)]
     return math.fsum(square_m2) / len(square_m2)
 
 

@@ -66,16 +66,7 @@ Eigen::Vector3d LatticeVectors::stepsTo(const Eigen::Vector3d& p_m) const {
   return (axes.transpose() * (p_m - origin_m)).cwiseQuotient(pitch_m);
 }
 
-bool LatticeVectors::covers(const Eigen::Vector3d& p_m) const {
-  const Eigen::Vector3d steps = stepsTo(p_m);
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(steps[axis] >= -kOnFace && steps[axis] <= counts[static_cast<std::size_t>(axis)] - 1 + kOnFace)) return false;
-  return true;
-}
-
-Eigen::Vector3d LatticeVectors::valueAt(const Eigen::Vector3d& p_m) const {
-  const Eigen::Vector3d steps = stepsTo(p_m);
-  if (!steps.allFinite()) return steps;
+std::array<LatticeVectors::Corner, 8> LatticeVectors::cornersAt(const Eigen::Vector3d& steps) const {
   std::array<std::size_t, 3> cell;
   std::array<double, 3> u;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -86,22 +77,42 @@ Eigen::Vector3d LatticeVectors::valueAt(const Eigen::Vector3d& p_m) const {
   }
   const std::size_t row = static_cast<std::size_t>(counts[0]);
   const std::size_t layer = row * static_cast<std::size_t>(counts[1]);
-  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  std::array<Corner, 8> corners;
   for (std::size_t corner = 0; corner < 8; ++corner) {
     const std::size_t a = corner & 1U, b = corner >> 1U & 1U, c = corner >> 2U;
-    const double weight = (a ? u[0] : 1.0 - u[0]) * (b ? u[1] : 1.0 - u[1]) * (c ? u[2] : 1.0 - u[2]);
-    const std::size_t point = cell[0] + a + row * (cell[1] + b) + layer * (cell[2] + c);
-    value += weight * Eigen::Vector3f::Map(&values[3 * point]).cast<double>();
+    corners[corner].point = cell[0] + a + row * (cell[1] + b) + layer * (cell[2] + c);
+    corners[corner].weight = (a ? u[0] : 1.0 - u[0]) * (b ? u[1] : 1.0 - u[1]) * (c ? u[2] : 1.0 - u[2]);
   }
+  return corners;
+}
+
+bool LatticeVectors::covers(const Eigen::Vector3d& p_m) const {
+  const Eigen::Vector3d steps = stepsTo(p_m);
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(steps[axis] >= -kOnFace && steps[axis] <= counts[static_cast<std::size_t>(axis)] - 1 + kOnFace)) return false;
+  const auto counts_there = [&](const Corner& corner) {
+    return inside.empty() || inside[corner.point] != 0 || corner.weight <= kOnFace;
+  };
+  return std::ranges::all_of(cornersAt(steps), counts_there);
+}
+
+Eigen::Vector3d LatticeVectors::valueAt(const Eigen::Vector3d& p_m) const {
+  const Eigen::Vector3d steps = stepsTo(p_m);
+  if (!steps.allFinite()) return steps;
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  for (const auto& [point, weight] : cornersAt(steps))
+    value += weight * Eigen::Vector3f::Map(&values[3 * point]).cast<double>();
   return value;
 }
 
 nlohmann::json LatticeVectors::toJson() const {
-  return {{"origin_m", jsonOf(origin_m)},
-          {"axes", jsonOf(Eigen::MatrixXd(axes))},
-          {"pitch_m", jsonOf(pitch_m)},
-          {"counts", counts},
-          {"values_base64", toBase64(littleEndianBytes(values))}};
+  nlohmann::json json = {{"origin_m", jsonOf(origin_m)},
+                         {"axes", jsonOf(Eigen::MatrixXd(axes))},
+                         {"pitch_m", jsonOf(pitch_m)},
+                         {"counts", counts},
+                         {"values_base64", toBase64(littleEndianBytes(values))}};
+  if (!inside.empty()) json["inside_base64"] = toBase64(inside);
+  return json;
 }
 
 LatticeVectors LatticeVectors::fromJson(const JsonReader& json) {
@@ -123,6 +134,11 @@ LatticeVectors LatticeVectors::fromJson(const JsonReader& json) {
   lattice.values = fromLittleEndianBytes(*bytes);
   if (!std::all_of(lattice.values.begin(), lattice.values.end(), [](float value) { return std::isfinite(value); }))
     json["values_base64"].refuse("finite numbers only");
+  if (const auto inside = json.find("inside_base64")) {
+    const auto read = fromBase64(inside->text());
+    if (!read || read->size() != pointCount(lattice.counts)) inside->refuse("base64 text of one byte a point");
+    lattice.inside = *read;
+  }
   return lattice;
 }
 

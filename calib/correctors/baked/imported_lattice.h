@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,7 +24,9 @@ struct LatticeVectors {
   Eigen::Vector3d pitch_m = Eigen::Vector3d::Ones();
   std::array<int, 3> counts = {2, 2, 2};  ///< At least 2 each.
   std::vector<float> values;              ///< Three a point.
+  std::vector<std::uint8_t> inside;  ///< 1 of a point that the correction holds at, else 0; empty where it does at all.
 
+  /// Whether every point that the value is made of is inside.
   bool covers(const Eigen::Vector3d& p_m) const;
   /// By trilinear interpolation; beside the lattice the value of its nearest edge.
   Eigen::Vector3d valueAt(const Eigen::Vector3d& p_m) const;
@@ -31,7 +34,14 @@ struct LatticeVectors {
   static LatticeVectors fromJson(const JsonReader& json);
 
  private:
+  /// A corner of the cell that a place lies in, and what it counts for.
+  struct Corner {
+    std::size_t point = 0;
+    double weight = 0.0;
+  };
   Eigen::Vector3d stepsTo(const Eigen::Vector3d& p_m) const;
+  /// @param steps finite; beside the lattice the cell of its nearest edge
+  std::array<Corner, 8> cornersAt(const Eigen::Vector3d& steps) const;
 };
 
 /// A position correction that another program made, as its lattice of displacements [m].

@@ -3,6 +3,7 @@
 #include <QTemporaryDir>
 #include <QTest>
 #include <fstream>
+#include <random>
 
 #include "calib/core/file_io.h"
 #include "calib/exporters/export_calibration.h"
@@ -33,6 +34,11 @@ const CalibrationFormat& formatOf(const std::string& id) {
   const CalibrationFormat* format = findCalibrationFormat(id);
   if (format == nullptr) qFatal("no format %s", id.c_str());
   return *format;
+}
+
+/// Formats with room for what is outside.
+bool hasMask(const QString& format) {
+  return format == QLatin1String("lattice") || format == QLatin1String("vtk_field");
 }
 
 void write(const std::filesystem::path& file, std::string_view bytes) {
@@ -116,6 +122,17 @@ class ImportedCalibrationTest : public QObject {
       worst_rad = std::max(worst_rad, angleBetween_rad(imported->correct(tracked).orientation, unmounted));
     }
     QVERIFY2(n_inside > 1000, std::to_string(n_inside).c_str());
+    // The region is convex: a cell whose corners all lie in it does too.
+    std::size_t n_outside = 0;
+    std::mt19937_64 generator(4);
+    std::uniform_real_distribution<double> along_m(-3.0, 3.0);
+    for (int draw = 0; hasMask(format) && draw < 50000; ++draw) {
+      const Eigen::Vector3d p_m(along_m(generator), along_m(generator), along_m(generator));
+      if (room.covers(p_m)) continue;
+      ++n_outside;
+      QVERIFY(!imported->covers(p_m));
+    }
+    QVERIFY(!hasMask(format) || n_outside > 1000);
     // What writing told, and that between points straight lines stand.
     QVERIFY2(worst_m < 1.2 * written->deviation->worst_m + 20e-6, std::to_string(1e6 * worst_m).c_str());
     QVERIFY(format != "lattice" || imported->choice().orientation_id == "imported");
@@ -153,6 +170,41 @@ class ImportedCalibrationTest : public QObject {
           << ",0,0,0,,1\n";
     out.close();
     FT_VERIFY_MATCH(holdsAll(importCalibration(formatOf("lattice"), file).error().message, {"point 5", "quaternion"}));
+  }
+
+  void pointsThatDoNotCountTakeTheirCellsOut() {
+    QTemporaryDir folder;
+    const std::string file = folder.path().toStdString() + "/field.lattice.csv";
+    std::ofstream out(file);
+    // Four points along x, all moved by 0.1 m up; the third of one edge moves by 9 m, and does not count.
+    out << "x_m,y_m,z_m,x_corrected_m,y_corrected_m,z_corrected_m,qw,qx,qy,qz,uncertainty_m,inside\n";
+    for (int x = 0; x < 4; ++x)
+      for (int y = 0; y < 2; ++y)
+        for (int z = 0; z < 2; ++z) {
+          const bool counts = !(x == 2 && y == 0 && z == 0);
+          out << x << ',' << y << ',' << z << ',' << x << ',' << y << ',' << z + (counts ? 0.1 : 9.0) << ",1,0,0,0,,"
+              << (counts ? 1 : 0) << '\n';
+        }
+    out.close();
+    const auto made = importCalibration(formatOf("lattice"), file);
+    FT_VERIFY_OK(made);
+    FT_VERIFY_MATCH(holdsAll(made->report().notes.front(), {"by 100 mm RMS"}));
+    const auto read = calibration::Corrector::fromText(made->toText(), "again");
+    FT_VERIFY_OK(read);
+    for (const calibration::Corrector* imported : {&*made, &*read}) {
+      QVERIFY(imported->covers({0.5, 0.5, 0.5}));
+      FT_VERIFY_MATCH(near(imported->correctPosition_m({0.5, 0.5, 0.5}), Eigen::Vector3d(0.5, 0.5, 0.6), 1e-7));
+      for (const double x : {1.5, 2.5}) {
+        QVERIFY(!imported->covers({x, 0.5, 0.5}));
+        FT_VERIFY_MATCH(near(imported->correctPosition_m({x, 0.5, 0.5}), Eigen::Vector3d(x, 0.5, 0.5), 1e-15));
+        QVERIFY(imported->covers({x, 1.0, 0.5}));  // On a face that it has no part of.
+      }
+    }
+    std::string damaged = made->toText();
+    const std::size_t at = damaged.find("inside_base64");
+    QVERIFY(at != std::string::npos);
+    damaged.erase(damaged.find(':', at) + 4, 4);
+    QVERIFY(!calibration::Corrector::fromText(damaged, "damaged"));
   }
 
   void aMatFileCutOffIsRefused() {
