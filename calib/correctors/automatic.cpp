@@ -112,9 +112,10 @@ std::string noteOf(const FitData& data, const std::vector<AutomaticCandidate>& c
   // Every other model says so itself.
   const std::string plane = chosen == 0 ? planeNote(data, "nothing is claimed off it") : "";
   std::string note = plane + (plane.empty() ? "" : " ") + "Chosen: ";
-  note += blend ? "a blend of " + partsOf(candidates, *blend) + ", held-out RMS " + inMm(blend->score.rms_m()) +
-                      " against " + inMm(scores[chosen].rms_m()) + " of " + labelOf(candidates[chosen]) + " alone"
-                : labelOf(candidates[chosen]) + ", held-out RMS " + inMm(scores[chosen].rms_m());
+  note += blend ? "a blend of " + partsOf(candidates, *blend) + ", held-out RMS over the region " +
+                      inMm(blend->score.rms_m()) + " against " + inMm(scores[chosen].rms_m()) + " of " +
+                      labelOf(candidates[chosen]) + " alone"
+                : labelOf(candidates[chosen]) + ", held-out RMS over the region " + inMm(scores[chosen].rms_m());
   if (blend)
     note += " and " + inMm(scores.front().rms_m()) + " without correction";
   else if (chosen == 0)

@@ -21,7 +21,7 @@ struct Proposal {
 
 std::string rounded(double value, int digits) {
   const double scale = std::pow(10.0, digits);
-  return formatNumber(std::round(value * scale) / scale);
+  return formatNumber(std::round(value * scale) / scale + 0.0);  // Never minus nothing.
 }
 
 /// Up to `count` rows spread evenly over the table.

@@ -60,6 +60,7 @@ PlacePanel::PlacePanel(QWidget* parent)
   layout->addWidget(note_);
   layout->addWidget(position_, 3);
   layout->addWidget(orientation_, 2);
+  connect(&placingUnitNotifier(), &PlacingUnitNotifier::placingUnitChanged, this, &PlacePanel::showRow);
   connect(places_, &QComboBox::activated, this, [this] { emit nodeChosen(places_->currentData().toInt()); });
   connect(visits_, &QComboBox::currentIndexChanged, this, &PlacePanel::showRow);
   setNode(std::nullopt);

@@ -137,7 +137,7 @@ QString ScoreModel::about(int row_number) const {
   if (row.method.empty())
     return row.stats || !comparison_ ? tr("The error as tracked, after the rigid alignment where that is refitted.")
                                      : tr("The table has no orientation.");
-  if (!row.score) return tr("Not compared yet: tick it and compare again.");
+  if (!row.score) return tr("Not compared yet: ticked, it takes part when the methods are compared again.");
   if (row.score->skipped) return tr("Cannot be used here: %1").arg(QString::fromStdString(*row.score->skipped));
   QStringList words;
   if (row.best) words << tr("The best here.");

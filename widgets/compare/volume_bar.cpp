@@ -15,6 +15,8 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kSliceSteps = 100;
+constexpr int kSliceWidth = 96;  // Least [px]: below it a knob is all that shows.
+constexpr int kHeldLetters = 12;
 constexpr double kLeastIso_mm = 0.01;
 constexpr double kMostIso_mm = 2000.0;
 
@@ -32,6 +34,7 @@ VolumeBar::VolumeBar(QWidget* parent)
       iso_(new NumberBox(this)),
       text_(new QLabel(this)) {
   setObjectName(QStringLiteral("volumeBar"));
+  connect(&placingUnitNotifier(), &PlacingUnitNotifier::placingUnitChanged, this, &VolumeBar::showState);
   setAttribute(Qt::WA_StyledBackground);
   quantity_->setObjectName(QStringLiteral("volumeQuantity"));
   quantity_->setAccessibleName(tr("What is drawn between the places"));
@@ -47,6 +50,8 @@ VolumeBar::VolumeBar(QWidget* parent)
   held_->setObjectName(QStringLiteral("volumeHeld"));
   held_->setAccessibleName(tr("How the sensor is held"));
   held_->setToolTip(tr("How the sensor is held, for corrections that take orientation: azimuth, elevation, roll"));
+  held_->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
+  held_->setMinimumContentsLength(kHeldLetters);
   held_->hide();
   connect(held_, &QComboBox::currentIndexChanged, this, &VolumeBar::quantityChanged);
   makeSlice();
@@ -83,6 +88,7 @@ void VolumeBar::makeSlice() {
   position_->setRange(0, kSliceSteps);
   position_->setValue(kSliceSteps / 2);
   position_->setPageStep(10);
+  position_->setMinimumWidth(kSliceWidth);
   position_text_->setMinimumWidth(72);
   const auto moved = [this] {
     showState();

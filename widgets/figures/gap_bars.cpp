@@ -62,7 +62,7 @@ GapBarChart binChart(const char* id, const std::string& title, const std::vector
 }  // namespace
 
 double GapBarChart::maximum() const {
-  double most = 0.0;
+  double most = is_of_shares ? 1.0 : 0.0;
   for (const GapBar& bar : bars) most = std::max({most, bar.value, bar.high90.value_or(0.0), bar.floor.value_or(0.0)});
   return most > 0.0 ? most : 1.0;
 }
@@ -100,7 +100,7 @@ GapBarChart waterfallChart(const gap::GapReport& report) {
 }
 
 GapBarChart probabilityChart(const gap::GapReport& report, std::size_t most) {
-  GapBarChart chart{"probability", "How probable each cause is", {}};
+  GapBarChart chart{"probability", "How probable each cause is", {}, true};
   for (const gap::GapCandidate& candidate : report.candidates) {
     if (chart.bars.size() == most) break;
     GapBar bar;
@@ -120,7 +120,8 @@ GapBarChart shrinkageChart(const gap::GapReport& report, std::size_t most) {
                     report.remaining.is_of_rotation
                         ? "How much of the gap of rotation it takes away (places the fit did not see)"
                         : "How much of the gap it takes away (places the fit did not see)",
-                    {}};
+                    {},
+                    true};
   const std::size_t shown = std::min(most, report.candidates.size());
   for (std::size_t i = 0; i < shown; ++i) {
     const gap::GapCandidate& candidate = report.candidates[i];
@@ -148,7 +149,7 @@ GapBarChart timeChart(const gap::GapReport& report) {
 }
 
 GapBarChart originChart(const gap::GapReport& report) {
-  GapBarChart chart{"origin", "Where the gap comes from", {}};
+  GapBarChart chart{"origin", "Where the gap comes from", {}, true};
   const auto add = [&chart](const char* name, double share) {
     GapBar bar;
     bar.name = name;

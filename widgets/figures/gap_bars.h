@@ -23,7 +23,8 @@ struct GapBarChart {
   std::string id;     ///< "waterfall", "probability", "shrinkage", "range", "layer", "time", "origin".
   std::string title;  ///< With its unit.
   std::vector<GapBar> bars;
-  double maximum() const;  ///< Of values and whiskers; 1 when all are 0.
+  bool is_of_shares = false;  ///< Then a whole bar is all of it.
+  double maximum() const;     ///< Of values and whiskers, and of shares no less than 1; 1 when all are 0.
 };
 
 /// "Metal plane" for `metal_plane`, from the effect registry; the id itself where the registry has no such row.

@@ -11,6 +11,7 @@
 #include <QStackedWidget>
 #include <QStyle>
 #include <QTableView>
+#include <QTimer>
 #include <QVBoxLayout>
 #include <algorithm>
 
@@ -65,7 +66,7 @@ SampleRing::State ringState(acquisition::TakeState take) {
 }
 
 QString bannerState(const acquisition::AcquisitionStatus& status) {
-  if (status.device == acquisition::DeviceState::kFailed) return QStringLiteral("danger");
+  if (status.device == acquisition::DeviceState::kFailed || status.not_stored) return QStringLiteral("danger");
   if (status.attention || status.take == acquisition::TakeState::kFailed) return QStringLiteral("attention");
   if (!status.current) return QStringLiteral("done");
   return status.take == acquisition::TakeState::kCollecting ? QStringLiteral("collecting") : QStringLiteral("next");
@@ -133,6 +134,8 @@ AcquirePage::AcquirePage(Workbench& workbench, QWidget* parent) : QWidget(parent
   connect(room_, &RoomView::placeClicked, list_, &QTableView::selectRow);
   connect(&workbench_, &Workbench::sessionChanged, this, &AcquirePage::onSession);
   connect(&workbench_, &Workbench::statusChanged, this, &AcquirePage::onStatus);
+  connect(&placingUnitNotifier(), &PlacingUnitNotifier::placingUnitChanged, this,
+          [this] { onStatus(workbench_.status()); });
   connect(&workbench_, &Workbench::tableChanged, this, [this] { model_->setTable(workbench_.recordedTable()); });
 }
 
@@ -317,7 +320,7 @@ void AcquirePage::onStatus(const acquisition::AcquisitionStatus& status) {
     room_->setStates(states_, current_);
     room_->setJig(current_ ? std::optional<Pose>(status.session->places[*current_].reference_from_sensor)
                            : std::nullopt);
-    if (current_) list_->scrollTo(model_->index(static_cast<int>(*current_), 0), QAbstractItemView::PositionAtCenter);
+    showCurrentRow();
   }
   model_->setMisfits(status.recorded->misfits);
   shown_reference_ =
@@ -329,6 +332,16 @@ void AcquirePage::onStatus(const acquisition::AcquisitionStatus& status) {
   showRing(status);
   showSensors(status);
   showButtons(status);
+}
+
+void AcquirePage::showCurrentRow() {
+  if (current_) list_->scrollTo(model_->index(static_cast<int>(*current_), 0), QAbstractItemView::PositionAtCenter);
+}
+
+void AcquirePage::showEvent(QShowEvent* event) {
+  QWidget::showEvent(event);
+  // What was scrolled while the page was hidden had no height.
+  QTimer::singleShot(0, this, &AcquirePage::showCurrentRow);
 }
 
 void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
@@ -348,6 +361,10 @@ void AcquirePage::showPlace(const acquisition::AcquisitionStatus& status) {
   if (status.take == acquisition::TakeState::kHeld) {
     detail = tr("at %1").arg(name);
     name = tr("Time is up - what now?");
+  }
+  if (status.not_stored) {
+    detail = tr("at %1").arg(name);
+    name = tr("Not stored");
   }
   place_->setText(name);
   position_->setText(detail);

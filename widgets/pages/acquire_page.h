@@ -28,6 +28,7 @@ class AcquirePage : public QWidget {
 
  protected:
   void resizeEvent(QResizeEvent* event) override;
+  void showEvent(QShowEvent* event) override;
   bool eventFilter(QObject* watched, QEvent* event) override;
 
  private:
@@ -42,6 +43,7 @@ class AcquirePage : public QWidget {
   void takeOrGoOn();
   void onSession();
   void onStatus(const acquisition::AcquisitionStatus& status);
+  void showCurrentRow();
   void showPlace(const acquisition::AcquisitionStatus& status);
   void showDistance(const acquisition::AcquisitionStatus& status);
   /// Makes a long place's name smaller until all of it is read.

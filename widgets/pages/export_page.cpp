@@ -303,10 +303,22 @@ void ExportPage::suggest(const QString& path) {
 void ExportPage::showBusy() {
   const bool busy = jobs_.busy();
   progress_->setVisible(busy);
-  stop_->setVisible(busy);
+  // A button that goes off under the keyboard hands it to the rail.
+  const auto passFocus = [this](QWidget* from, QWidget* to) {
+    if (window()->focusWidget() == from) to->setFocus();
+  };
+  if (busy) {
+    stop_->setVisible(true);
+    passFocus(write_, stop_);
+    write_->setEnabled(false);
+  } else {
+    write_->setEnabled(true);
+    passFocus(stop_, write_);
+    stop_->setVisible(false);
+  }
+  if (stopping_.stop_requested()) passFocus(stop_, path_);
   stop_->setEnabled(!stopping_.stop_requested());
   stop_->setText(stop_->isEnabled() ? tr("Stop") : tr("Stopping..."));
-  write_->setEnabled(!busy);
 }
 
 void ExportPage::browse() {

@@ -247,7 +247,6 @@ void PlanPage::onUnit() {
   for (const auto& boxes : {pitch_, origin_})
     for (LengthBox* box : boxes) box->setUnit(unit);
   pipe_foot_->setUnit(unit);
-  room_->setLengthUnit(unit);
   onChanged();
 }
 

@@ -150,7 +150,7 @@ std::string notComparedText(const evaluation::Comparison& comparison) {
   for (const correctors::PositionMethod& method : correctors::positionMethods()) {
     const auto is_method = [&](const evaluation::MethodScore& score) { return score.method == method.id; };
     if (std::any_of(comparison.position.begin(), comparison.position.end(), is_method)) continue;
-    names += (names.empty() ? "" : ", ") + std::string(method.label);
+    names += (names.empty() ? "" : "; ") + std::string(method.label);  // Some have a comma.
   }
   return names;
 }

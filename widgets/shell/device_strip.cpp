@@ -6,6 +6,7 @@
 #include <QPainter>
 #include <QPixmap>
 #include <QStyle>
+#include <algorithm>
 
 #include "widgets/style/theme.h"
 #include "widgets/style/unit_texts.h"
@@ -27,6 +28,12 @@ QPixmap lightPicture(acquisition::DeviceState device, bool recording, qreal rati
   if (recording || device == acquisition::DeviceState::kFailed) painter.setBrush(color);
   painter.drawEllipse(QRectF(3, 3, 10, 10));
   return picture;
+}
+
+/// A number that changes many times a second neither moves what stands beside it nor is cut before there is room.
+void setSteadyText(QLabel& label, const QString& text) {
+  label.setText(text);
+  label.setMinimumWidth(std::max(label.minimumWidth(), label.sizeHint().width()));
 }
 
 }  // namespace
@@ -69,10 +76,10 @@ void DeviceStrip::setStatus(const acquisition::AcquisitionStatus& status) {
   for (QLabel* label : {rate_, noise_, pose_}) label->setVisible(running && status.live.has_value());
   session_->setText(status.session->path.isEmpty() ? QString() : QFileInfo(status.session->path).fileName());
   if (!running || !status.live) return;
-  rate_->setText(tr("%1 Hz").arg(status.rate_hz, 0, 'f', 0));
-  noise_->setText(tr("SD now %1").arg(millimetreText(status.sd_m)));
+  setSteadyText(*rate_, tr("%1 Hz").arg(status.rate_hz, 0, 'f', 0));
+  setSteadyText(*noise_, tr("SD now %1").arg(millimetreText(status.sd_m)));
   const Eigen::Vector3d p_reference_m = status.reference_from_tracker * status.live->tracker_from_sensor.position_m;
-  pose_->setText(tr("rig: %1").arg(positionText(p_reference_m)));
+  setSteadyText(*pose_, tr("rig: %1").arg(positionText(p_reference_m)));
 }
 
 }  // namespace fieldtrue::widgets

@@ -22,7 +22,16 @@ LengthUnit placingUnit() {
   return static_cast<LengthUnit>(QSettings().value(kKey, static_cast<int>(LengthUnit::kMetre)).toInt());
 }
 
-void setPlacingUnit(LengthUnit unit) { QSettings().setValue(kKey, static_cast<int>(unit)); }
+void setPlacingUnit(LengthUnit unit) {
+  if (unit == placingUnit()) return;
+  QSettings().setValue(kKey, static_cast<int>(unit));
+  emit placingUnitNotifier().placingUnitChanged();
+}
+
+PlacingUnitNotifier& placingUnitNotifier() {
+  static PlacingUnitNotifier notifier;
+  return notifier;
+}
 
 QString coordinateText(double coordinate_m) {
   const LengthUnit unit = placingUnit();

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <QObject>
 #include <QString>
 
 #include "widgets/style/theme.h"
@@ -12,6 +13,14 @@ namespace fieldtrue::widgets {
 /// The unit places are named in, chosen by the person and remembered. Errors are always in mm.
 LengthUnit placingUnit();
 void setPlacingUnit(LengthUnit unit);
+
+/// Tells when another was chosen: what is shown by then is told in it too.
+class PlacingUnitNotifier : public QObject {
+  Q_OBJECT
+ signals:
+  void placingUnitChanged();
+};
+PlacingUnitNotifier& placingUnitNotifier();
 
 /// A coordinate to the nearest millimetre or so, so that a live number does not jump in length: "1.219 m", "4.00 ft".
 QString coordinateText(double coordinate_m);

@@ -61,6 +61,17 @@ class ExportPageTest : public WindowDriver {
     QTRY_VERIFY_WITH_TIMEOUT(find<QPushButton>("exportWrite")->isEnabled(), kWaitMs);
   }
 
+  void theKeyboardStaysWithTheButton() {
+    tick({"(.nodes.csv)"});
+    type("exportPath", folder_.filePath("by-key.nodes.csv"));
+    auto* write = find<QPushButton>("exportWrite");
+    write->setFocus();
+    QTest::keyClick(write, Qt::Key_Space);
+    QTRY_VERIFY_WITH_TIMEOUT(QFile::exists(folder_.filePath("by-key.nodes.csv")) && write->isEnabled(), kWaitMs);
+    // Of the window, which on a screen without a manager is never the active one.
+    QCOMPARE(window_->focusWidget(), write);
+  }
+
   void aPlaceThatIsNoFileIsSaid() {
     tick({});
     find<QLineEdit>("exportPath")->clear();

@@ -78,6 +78,23 @@ bool isWholeIn(const QLabel& label) {
 
 }  // namespace
 
+/// A disk without room, while it lives.
+class WithoutRoom {
+ public:
+  WithoutRoom() {
+    signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit full{100, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &full);
+  }
+  ~WithoutRoom() { setrlimit(RLIMIT_FSIZE, &before_); }
+  WithoutRoom(const WithoutRoom&) = delete;
+  WithoutRoom& operator=(const WithoutRoom&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
 class OperatorTest : public testing::WindowDriver {
   Q_OBJECT
 
@@ -95,6 +112,7 @@ class OperatorTest : public testing::WindowDriver {
   void theTrackerComesBack();
   void theLineIsSavedAndPlaysAgain();
   void aTakeLastsAsThePlanSays();
+  void whatIsNotStoredIsReadFromAfar();
 
  private:
   void picture(const char* name) {
@@ -431,15 +449,11 @@ void OperatorTest::theLineIsSavedAndPlaysAgain() {
   QCOMPARE(taken.rows.size(), std::size_t{60});
   for (const QString& file : files) QVERIFY2(isAmong(taken.rows, playedFrom(file)), qPrintable(file));
 
-  // A disk without room.
-  signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit full{100, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &full);
-  click("saveTrace");
-  const bool told = QTest::qWaitFor([&] { return message().contains(QStringLiteral("are not saved: ")); }, kWaitMs);
-  setrlimit(RLIMIT_FSIZE, &before);
+  const bool told = [&] {
+    const WithoutRoom full;
+    click("saveTrace");
+    return QTest::qWaitFor([&] { return message().contains(QStringLiteral("are not saved: ")); }, kWaitMs);
+  }();
   QVERIFY2(told, qPrintable(message()));
 }
 
@@ -464,6 +478,35 @@ void OperatorTest::aTakeLastsAsThePlanSays() {
   find<QComboBox>("takeUntil")->setCurrentIndex(0);
   find<QSpinBox>("samplesPerNode")->setValue(25);
   QTRY_COMPARE(window_->workbench().status().wanted, 25);
+}
+
+void OperatorTest::whatIsNotStoredIsReadFromAfar() {
+  plugIn(QStringLiteral("0"));
+  connectTo(emulator_->endpoint().address());
+  makePlan(2, 2, 2);
+  QVERIFY(takeRight());
+  const QString here = find<QLabel>("bannerPlace")->text();
+  const auto large = [&] { return find<QLabel>("bannerPlace")->text(); };
+  {
+    const WithoutRoom full;
+    QVERIFY(standAt(placeOf(*status().current).position_m));
+    QTest::keyClick(window_.get(), Qt::Key_Space);
+    QTRY_COMPARE(large(), QStringLiteral("Not stored"));
+    QCOMPARE(find<QWidget>("banner")->property("state").toString(), QStringLiteral("danger"));
+    QVERIFY(find<QLabel>("bannerPosition")->text().contains(here));
+    QVERIFY(find<QLabel>("bannerReason")->text().contains(QStringLiteral("not stored: ")));
+  }
+  picture("not-stored");
+  QVERIFY(takeRight());
+  QTRY_VERIFY(large() != QStringLiteral("Not stored") && large() != here);
+
+  // What is on the page is told in the unit that is chosen, at once.
+  const QString in_metres = find<QLabel>("bannerPosition")->text();
+  setPlacingUnit(LengthUnit::kFoot);
+  const QString in_feet = find<QLabel>("bannerPosition")->text();
+  setPlacingUnit(LengthUnit::kMetre);
+  QVERIFY2(in_metres.endsWith(QStringLiteral(" m")) && in_feet.endsWith(QStringLiteral(" ft")), qPrintable(in_feet));
+  QCOMPARE(find<QLabel>("bannerPosition")->text(), in_metres);
 }
 
 }  // namespace fieldtrue::widgets

@@ -10,6 +10,7 @@
 
 #include "acquisition/plan/place_state.h"
 #include "tests/widgets/views/view_test.h"
+#include "widgets/style/unit_texts.h"
 #include "widgets/views/charts/chart_views.h"
 #include "widgets/views/draw_picture.h"
 #include "widgets/views/field/field_view.h"
@@ -77,6 +78,27 @@ class ViewsDisplayTest : public QObject {
     view.setScaleMax_mm(1000.0);
     const QImage rescaled = shot(view);
     QVERIFY(countColor(rescaled, color, 2, scenePart(rescaled)) < 20);
+  }
+
+  void axesFollowTheUnitOfThePlaces() {
+    const LengthUnit before = placingUnit();
+    setPlacingUnit(LengthUnit::kMetre);
+    FieldView field;
+    field.setField(uniformField({0.0, 0.001, 0.0}));
+    RoomView room;
+    room.setPlaces(gridPlaces());
+    room.setTransmitter(Pose{});
+    for (VtkHost* view : {static_cast<VtkHost*>(&field), static_cast<VtkHost*>(&room)}) {
+      show(*view);
+      const QImage metres = shot(*view);
+      QCOMPARE(shot(*view), metres);
+      setPlacingUnit(LengthUnit::kFoot);
+      QVERIFY(shot(*view) != metres);
+      setPlacingUnit(LengthUnit::kMetre);
+      QCOMPARE(shot(*view), metres);
+      view->hide();
+    }
+    setPlacingUnit(before);
   }
 
   void legendShowsTheWholeScale() {

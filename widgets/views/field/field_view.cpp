@@ -1,6 +1,6 @@
 #include "widgets/views/field/field_view.h"
 
-#include "widgets/style/units.h"
+#include "widgets/style/unit_texts.h"
 #include "widgets/views/field/field_scene.h"
 
 namespace fieldtrue::widgets {
@@ -50,11 +50,6 @@ void FieldView::setSelected(std::optional<int> node) {
   requestRender();
 }
 
-void FieldView::setLengthUnit(LengthUnit unit) {
-  scene_->setUnit(unit);
-  requestRender();
-}
-
 void FieldView::setVolume(const VolumeField& volume) {
   scene_->setVolume(volume);
   requestRender();
@@ -90,7 +85,10 @@ void FieldView::setLegendShown(bool shown) {
   requestRender();
 }
 
-void FieldView::restyle(double pixel_ratio) { scene_->setStyle(theme(), pixel_ratio); }
+void FieldView::restyle(double pixel_ratio) {
+  scene_->setStyle(theme(), pixel_ratio);
+  scene_->setUnit(placingUnit());
+}
 
 void FieldView::prepareFrame() {
   scene_->update();

@@ -6,7 +6,6 @@
 
 #include "widgets/figures/error_field.h"
 #include "widgets/style/theme.h"
-#include "widgets/style/units.h"
 #include "widgets/views/field/volume_field.h"
 #include "widgets/views/host/orbit_view.h"
 
@@ -31,7 +30,6 @@ class FieldView : public OrbitView {
   /// Upper end of the orientation scale [deg]; until set, the largest error of the field.
   void setAngleScaleMax_deg(double scale_max_deg);
   void setSelected(std::optional<int> node);
-  void setLengthUnit(LengthUnit unit);
   /// A volume to cut and to draw a surface in; an empty one takes both away.
   void setVolume(const VolumeField& volume);
   /// Where the volume is cut; none draws no plane.

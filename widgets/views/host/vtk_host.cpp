@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "widgets/style/theme.h"
+#include "widgets/style/unit_texts.h"
 
 namespace fieldtrue::widgets {
 namespace {
@@ -57,10 +58,12 @@ VtkHost::VtkHost(QWidget* parent)
   observe(window_, vtkCommand::WindowMakeCurrentEvent, makeContextCurrent, static_cast<QOpenGLWidget*>(this));
   setMouseTracking(true);
   setFocusPolicy(Qt::StrongFocus);
-  connect(&themeNotifier(), &ThemeNotifier::themeChanged, this, [this] {
+  const auto restyleLater = [this] {
     styled_ratio_ = 0.0;
     requestRender();
-  });
+  };
+  connect(&themeNotifier(), &ThemeNotifier::themeChanged, this, restyleLater);
+  connect(&placingUnitNotifier(), &PlacingUnitNotifier::placingUnitChanged, this, restyleLater);
 }
 
 VtkHost::~VtkHost() {

@@ -3,7 +3,7 @@
 #include <QTimer>
 
 #include "acquisition/plan/place_state.h"
-#include "widgets/style/units.h"
+#include "widgets/style/unit_texts.h"
 #include "widgets/views/room/room_scene.h"
 
 namespace fieldtrue::widgets {
@@ -67,17 +67,15 @@ void RoomView::setSelected(std::optional<int> place) {
   requestRender();
 }
 
-void RoomView::setLengthUnit(LengthUnit unit) {
-  scene_->setUnit(unit);
-  requestRender();
-}
-
 void RoomView::setFloor(std::optional<double> floor_z_m) {
   scene_->setFloor(floor_z_m);
   setSpace(scene_->space());
 }
 
-void RoomView::restyle(double pixel_ratio) { scene_->setStyle(theme(), pixel_ratio); }
+void RoomView::restyle(double pixel_ratio) {
+  scene_->setStyle(theme(), pixel_ratio);
+  scene_->setUnit(placingUnit());
+}
 
 void RoomView::prepareFrame() {
   scene_->update();

@@ -7,7 +7,6 @@
 #include "acquisition/plan/place_state.h"
 #include "calib/core/calibration_table.h"
 #include "widgets/style/theme.h"
-#include "widgets/style/units.h"
 #include "widgets/views/host/orbit_view.h"
 
 class QTimer;
@@ -36,7 +35,6 @@ class RoomView : public OrbitView {
   /// @param reference_from_sensor where the jig should hold the sensor; base and pipe are drawn below it
   void setJig(const std::optional<Pose>& reference_from_sensor);
   void setSelected(std::optional<int> place);
-  void setLengthUnit(LengthUnit unit);
   /// @param floor_z_m height of the floor, reference frame [m]; none: one pitch below the lowest place
   void setFloor(std::optional<double> floor_z_m);
 
