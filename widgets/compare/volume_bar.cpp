@@ -15,8 +15,8 @@ namespace fieldtrue::widgets {
 namespace {
 
 constexpr int kSliceSteps = 100;
-constexpr int kSliceWidth = 96;  // Least [px]: below it a knob is all that shows.
-constexpr int kHeldLetters = 12;
+constexpr int kSliceWidth = 72;  // Least [px]: below it a knob is all that shows.
+constexpr int kLetters = 8;      // A list shows at least, so that the bar takes nothing from the words beside it.
 constexpr double kLeastIso_mm = 0.01;
 constexpr double kMostIso_mm = 2000.0;
 
@@ -50,15 +50,17 @@ VolumeBar::VolumeBar(QWidget* parent)
   held_->setObjectName(QStringLiteral("volumeHeld"));
   held_->setAccessibleName(tr("How the sensor is held"));
   held_->setToolTip(tr("How the sensor is held, for corrections that take orientation: azimuth, elevation, roll"));
-  held_->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
-  held_->setMinimumContentsLength(kHeldLetters);
   held_->hide();
   connect(held_, &QComboBox::currentIndexChanged, this, &VolumeBar::quantityChanged);
+  for (QComboBox* list : {quantity_, held_}) {
+    list->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
+    list->setMinimumContentsLength(kLetters);
+  }
   makeSlice();
   makeIso();
   auto* row = new QHBoxLayout;
-  row->addWidget(quantity_);
-  row->addWidget(held_);
+  row->addWidget(quantity_, 2);
+  row->addWidget(held_, 2);
   row->addWidget(show_slice_);
   row->addWidget(axis_);
   row->addWidget(position_, 1);

@@ -74,6 +74,8 @@ void MainWindow::openPage(const QString& id) {
   page_ = &pageRow(id);
   pages_->setCurrentIndex(static_cast<int>(page_ - pageRows().data()));
   rail_->setCurrent(*page_);
+  // Who chose a page goes on in it: Tab leads to its first control.
+  if (focusWidget() == nullptr || rail_->isAncestorOf(focusWidget())) pages_->currentWidget()->setFocus();
 }
 
 void MainWindow::showStates() {
