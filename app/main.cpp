@@ -1,4 +1,5 @@
 #include <QCommandLineParser>
+#include <QFileInfo>
 #include <QIcon>
 #include <QTimer>
 #include <algorithm>
@@ -24,7 +25,8 @@ void describe(QCommandLineParser& parser) {
   parser.addHelpOption();
   parser.addVersionOption();
   parser.addPositionalArgument(QStringLiteral("session"),
-                               QCoreApplication::tr("Session file (*.fieldtrue) to open where it was."),
+                               QCoreApplication::tr("Session file (*.fieldtrue) to open where it was, or a file of "
+                                                    "another program to import."),
                                QStringLiteral("[session]"));
   parser.addOptions({{kDemo, QCoreApplication::tr("Run the demonstration with the simulated tracker.")},
                      {kDark, QCoreApplication::tr("Dark colours, whatever the desktop uses.")},
@@ -71,7 +73,9 @@ int main(int argc, char** argv) {
     if (parser.isSet(kDemo)) {
       window.workbench().startDemonstration();
     } else if (!sessions.isEmpty()) {
-      window.workbench().openSession(sessions.first());
+      const QString& file = sessions.first();
+      const bool is_session = QFileInfo(file).suffix() == QLatin1String("fieldtrue");
+      is_session ? window.workbench().openSession(file) : window.workbench().importFile(file);
     }
   });
   return QApplication::exec();

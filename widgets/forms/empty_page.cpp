@@ -37,4 +37,9 @@ EmptyPage::EmptyPage(const QString& what_is_missing, const QString& what_to_do, 
   layout->addStretch();
 }
 
+EmptyPage* makeOpeningPage(QWidget* parent) {
+  return new EmptyPage(EmptyPage::tr("Opening the session..."), EmptyPage::tr("What was taken is being read."), {},
+                       parent);
+}
+
 }  // namespace fieldtrue::widgets

@@ -19,4 +19,7 @@ class EmptyPage : public QWidget {
             QWidget* parent = nullptr);
 };
 
+/// What a step shows while it is not known yet what an opened session holds.
+EmptyPage* makeOpeningPage(QWidget* parent);
+
 }  // namespace fieldtrue::widgets

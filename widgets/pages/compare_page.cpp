@@ -62,6 +62,7 @@ ComparePage::ComparePage(Workbench& workbench, QWidget* parent)
        {tr("Run the demonstration"), [this] { workbench_.startDemonstration(); }}},
       this));
   stack_->addWidget(content);
+  stack_->addWidget(makeOpeningPage(this));
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   layout->addWidget(stack_);
@@ -70,6 +71,7 @@ ComparePage::ComparePage(Workbench& workbench, QWidget* parent)
 }
 
 void ComparePage::connectParts() {
+  connect(&workbench_, &Workbench::sessionChanged, this, &ComparePage::onTable);
   connect(&workbench_, &Workbench::tableChanged, this, &ComparePage::onTable);
   connect(&workbench_, &Workbench::comparisonChanged, this, &ComparePage::onComparison);
   connect(&workbench_, &Workbench::correctorChanged, this, &ComparePage::showChoice);
@@ -206,7 +208,7 @@ void ComparePage::showEvent(QShowEvent* event) {
 void ComparePage::onTable() {
   std::size_t usable = 0;
   for (const Node& node : workbench_.table().nodes) usable += node.role != NodeRole::kSkipped;
-  stack_->setCurrentIndex(usable >= kFewestPlaces ? 1 : 0);
+  stack_->setCurrentIndex(usable >= kFewestPlaces ? 1 : workbench_.isOpening() ? 2 : 0);
   out_of_date_ = true;
   showPlaceData();
   if (stack_->currentIndex() == 1 && isVisible()) runComparison(true);

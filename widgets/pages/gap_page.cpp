@@ -73,6 +73,7 @@ GapPage::GapPage(Workbench& workbench, Diagnose diagnose, QWidget* parent)
        {tr("Run the demonstration"), [this] { workbench_.startDemonstration(); }}},
       this));
   stack_->addWidget(content);
+  stack_->addWidget(makeOpeningPage(this));
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   layout->addWidget(stack_);
@@ -184,7 +185,7 @@ void GapPage::setRecording(const CalibrationTable& table, std::function<SampleTa
   for (Earlier& earlier : earlier_) earlier.report.reset();
   const auto usable = std::count_if(table_.nodes.begin(), table_.nodes.end(),
                                     [](const Node& node) { return node.role != NodeRole::kSkipped; });
-  stack_->setCurrentIndex(static_cast<std::size_t>(usable) >= kFewestRows ? 1 : 0);
+  stack_->setCurrentIndex(static_cast<std::size_t>(usable) >= kFewestRows ? 1 : workbench_.isOpening() ? 2 : 0);
   showReport();
 }
 

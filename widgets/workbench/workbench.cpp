@@ -129,6 +129,7 @@ void Workbench::wireController() {
   });
   connect(controller_, &acquisition::AcquisitionController::failed, this, [this](const QString& message) {
     showMessage({message, Severity::kDanger, {}, {}, QStringLiteral("session/failed")});
+    if (std::exchange(is_opening_, false)) emit tableChanged();
   });
 }
 
@@ -150,8 +151,10 @@ void Workbench::onNodesStored(int place, const QString& suspicious) {
 
 void Workbench::onTakeFailed(const QString& reason, int place) {
   if (place >= 0) spoken_of_.insert(place);
-  showMessage(
-      {reason, Severity::kAttention, {}, {}, place < 0 ? QString() : QStringLiteral("session/take/%1").arg(place)});
+  const bool has_tracker = status_.device != acquisition::DeviceState::kClosed;
+  showMessage({reason, Severity::kAttention, has_tracker ? QString() : tr("Connect"),
+               [this] { goToPage(QStringLiteral("connect")); },
+               place < 0 ? QString() : QStringLiteral("session/take/%1").arg(place)});
 }
 
 void Workbench::onTakeRefused(int place, double off_m) {
@@ -220,6 +223,7 @@ void Workbench::onSessionOpened(const QString& path, const QString& page, const 
   stopComparing();
   stopFitting();
   session_path_ = path;
+  is_opening_ = true;
   table_ = {};
   table_is_stale_ = false;
   loose_samples_.clear();

@@ -61,6 +61,8 @@ class Workbench : public QObject {
   SampleTable samplesAt(int node) const;
   const acquisition::Plan& plan() const { return plan_; }
   bool sessionIsOpen() const { return !session_path_.isEmpty(); }
+  /// Whether a session is open of which it is not known yet what was taken.
+  bool isOpening() const { return is_opening_; }
   const QString& sessionPath() const { return session_path_; }
   const std::optional<evaluation::Comparison>& comparison() const { return comparison_; }
   const std::optional<calibration::Corrector>& corrector() const { return corrector_; }
@@ -200,6 +202,7 @@ class Workbench : public QObject {
   std::vector<SampleRow> loose_samples_;
   void refuse(const std::string& why, const QString& action_label, std::function<void()> action);
   std::optional<int> chosen_sensor_;
+  bool is_opening_ = false;
   bool uses_any_units_ = false;
   QString refusal_;
   mutable CalibrationTable table_;  ///< Made from places_ when it is asked for.

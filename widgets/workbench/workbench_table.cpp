@@ -34,6 +34,7 @@ void Workbench::onTables(const CalibrationTable& table, const SampleTable& sampl
     }
   }
   table_.metadata = table.metadata;
+  is_opening_ = false;
   changeTable();
 }
 

@@ -12,6 +12,7 @@
 #include <QLineEdit>
 #include <QPushButton>
 #include <QSettings>
+#include <QSignalSpy>
 #include <QSpinBox>
 #include <QTableView>
 #include <QTemporaryDir>
@@ -113,6 +114,7 @@ class OperatorTest : public testing::WindowDriver {
   void theLineIsSavedAndPlaysAgain();
   void aTakeLastsAsThePlanSays();
   void whatIsNotStoredIsReadFromAfar();
+  void withoutATrackerThePageToConnectIsOffered();
 
  private:
   void picture(const char* name) {
@@ -507,6 +509,23 @@ void OperatorTest::whatIsNotStoredIsReadFromAfar() {
   setPlacingUnit(LengthUnit::kMetre);
   QVERIFY2(in_metres.endsWith(QStringLiteral(" m")) && in_feet.endsWith(QStringLiteral(" ft")), qPrintable(in_feet));
   QCOMPARE(find<QLabel>("bannerPosition")->text(), in_metres);
+}
+
+void OperatorTest::withoutATrackerThePageToConnectIsOffered() {
+  plugIn(QStringLiteral("0"));
+  connectTo(emulator_->endpoint().address());
+  makePlan(2, 2, 2);
+  QVERIFY(takeRight());
+  window_->workbench().disconnectDevice();
+  QTRY_VERIFY(status().device == acquisition::DeviceState::kClosed);
+  QTest::keyClick(window_.get(), Qt::Key_Space);
+  QTRY_VERIFY2(message().contains(QStringLiteral("The tracker is not connected")), qPrintable(message()));
+  auto* connect = find<QWidget>("messageLine")->findChild<QPushButton*>();
+  QCOMPARE(connect->text(), QStringLiteral("Connect"));
+  QSignalSpy pages(&window_->workbench(), &Workbench::pageRequested);
+  QTest::mouseClick(connect, Qt::LeftButton);
+  QCOMPARE(pages.size(), 1);
+  QCOMPARE(pages[0][0].toString(), QStringLiteral("connect"));
 }
 
 }  // namespace fieldtrue::widgets
