@@ -22,8 +22,7 @@ constexpr double kAsStated = 2.0;         // Of the stated variance: readings ar
 constexpr double kFarOffInField = 300.0;  // A field that changes within the pitch takes a place so far from the others.
 constexpr double kLeast_m = 1e-5;         // Nobody sets down a jig more exactly.
 constexpr std::size_t kAbout = 8;
-constexpr double kAsNear =
-    1.002;  ///< Squares of distances: on a grid which of many are nearest is no rounding's choice.
+constexpr double kAsNear = 1.002;      // In squares: which of a grid's neighbours are nearest is no rounding's choice.
 constexpr double kOfMiddle = 0.2;      // Variance of the middle of so many, of one's.
 constexpr double kUneven = 3.0;        // So many scatter by so much more than all do in one case of five hundred.
 constexpr std::size_t kMostPart = 10;  // One row in so many may stand apart.

@@ -107,6 +107,13 @@ Result<void> checkElements(std::string_view bytes) {
   return {};
 }
 
+bool holds(mat_t* file, const char* name) {
+  matvar_t* variable = Mat_VarReadInfo(file, name);
+  const bool is_there = variable != nullptr;
+  Mat_VarFree(variable);
+  return is_there;
+}
+
 std::vector<double> numbersOf(mat_t* file, const char* name) {
   matvar_t* variable = Mat_VarRead(file, name);
   if (variable == nullptr) return {};
@@ -114,6 +121,9 @@ std::vector<double> numbersOf(mat_t* file, const char* name) {
   if (variable->class_type == MAT_C_DOUBLE && variable->data != nullptr) {
     const auto* data = static_cast<const double*>(variable->data);
     numbers.assign(data, data + variable->nbytes / sizeof(double));
+  } else if (variable->class_type == MAT_C_UINT8 && variable->data != nullptr) {  // Truth values among them.
+    const auto* data = static_cast<const std::uint8_t*>(variable->data);
+    numbers.assign(data, data + variable->nbytes);
   }
   Mat_VarFree(variable);
   return numbers;
@@ -138,6 +148,8 @@ Result<LatticeField> readMat(const std::filesystem::path& path) {
   const std::size_t n = nx * ny * nz;
   if (n == 0 || corrected.size() != 3 * n)
     return isNot("it holds no x_m, y_m, z_m and corrected_m that belong together");
+  if (inside.size() != n && holds(file.get(), "inside"))
+    return isNot("its array inside holds no number for each point");
   for (std::size_t i = 0; i < nx; ++i)
     for (std::size_t j = 0; j < ny; ++j)
       for (std::size_t k = 0; k < nz; ++k) {

@@ -99,7 +99,9 @@ Result<LatticeField> readNpz(const std::filesystem::path& path) {
   const std::vector<double> turned = numbersOf((*members)["q_wxyz.npy"]);
   for (std::size_t at = 0; at + 4 <= turned.size(); at += 4)
     arrays.q.emplace_back(turned[at], turned[at + 1], turned[at + 2], turned[at + 3]);
-  for (const char one : dataOf((*members)["inside.npy"], "|b1")) arrays.inside.push_back(one != 0 ? 1 : 0);
+  const std::string& inside = (*members)["inside.npy"];
+  for (const char one : dataOf(inside, "|b1")) arrays.inside.push_back(one != 0 ? 1 : 0);
+  if (!inside.empty() && arrays.inside.empty()) return isNot("its array inside holds no truth values");
   auto field = arrays.lattice();
   if (!field) return isNot(field.error().message);
   return field;

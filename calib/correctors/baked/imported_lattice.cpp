@@ -90,10 +90,8 @@ bool LatticeVectors::covers(const Eigen::Vector3d& p_m) const {
   const Eigen::Vector3d steps = stepsTo(p_m);
   for (int axis = 0; axis < 3; ++axis)
     if (!(steps[axis] >= -kOnFace && steps[axis] <= counts[static_cast<std::size_t>(axis)] - 1 + kOnFace)) return false;
-  const auto counts_there = [&](const Corner& corner) {
-    return inside.empty() || inside[corner.point] != 0 || corner.weight <= kOnFace;
-  };
-  return std::ranges::all_of(cornersAt(steps), counts_there);
+  const auto counts_there = [&](const Corner& corner) { return inside[corner.point] != 0 || corner.weight <= kOnFace; };
+  return inside.empty() || std::ranges::all_of(cornersAt(steps), counts_there);
 }
 
 Eigen::Vector3d LatticeVectors::valueAt(const Eigen::Vector3d& p_m) const {
