@@ -22,7 +22,6 @@ constexpr double kAsStated = 2.0;         // Of the stated variance: readings ar
 constexpr double kFarOffInField = 300.0;  // A field that changes within the pitch takes a place so far from the others.
 constexpr double kLeast_m = 1e-5;         // Nobody sets down a jig more exactly.
 constexpr std::size_t kAbout = 8;
-constexpr double kAsNear = 1.002;      // In squares: which of a grid's neighbours are nearest is no rounding's choice.
 constexpr double kOfMiddle = 0.2;      // Variance of the middle of so many, of one's.
 constexpr double kUneven = 3.0;        // So many scatter by so much more than all do in one case of five hundred.
 constexpr std::size_t kMostPart = 10;  // One row in so many may stand apart.
@@ -66,24 +65,23 @@ class OffByPlace {
 
   const std::vector<Eigen::Vector3d>& all_m() const { return off_m_; }
 
-  /// Of the nearest rows of other places and all that stand as near as the last of them, found outwards along one axis.
+  /// Of the nearest rows of other places, found outwards along one axis.
   std::vector<Eigen::Vector3d> about(std::size_t row) const {
     using Neighbour = std::pair<double, std::size_t>;
-    std::vector<double> nearest_m2;  // A heap, the farthest first.
-    std::vector<Neighbour> looked_at;
-    const auto isNear = [&](double square_m2) {
-      return nearest_m2.size() < kAbout || square_m2 <= kAsNear * nearest_m2.front();
+    std::vector<Neighbour> nearest;  // A heap, the farthest first.
+    const auto isWorthATry = [&](double away_x_m) {
+      return nearest.size() < kAbout || away_x_m * away_x_m <= nearest.front().first;
     };
-    const auto lookAt = [&](std::size_t other) {
+    const auto take = [&](std::size_t other) {
       if (nodes_[other].node == nodes_[row].node) return;
-      const double square_m2 = (place_m(other) - place_m(row)).squaredNorm();
-      if (!isNear(square_m2)) return;
-      looked_at.emplace_back(square_m2, other);
-      nearest_m2.push_back(square_m2);
-      std::push_heap(nearest_m2.begin(), nearest_m2.end());
-      if (nearest_m2.size() <= kAbout) return;
-      std::pop_heap(nearest_m2.begin(), nearest_m2.end());
-      nearest_m2.pop_back();
+      const Neighbour one{(place_m(other) - place_m(row)).squaredNorm(), other};
+      if (nearest.size() == kAbout) {
+        if (!(one < nearest.front())) return;
+        std::pop_heap(nearest.begin(), nearest.end());
+        nearest.pop_back();
+      }
+      nearest.push_back(one);
+      std::push_heap(nearest.begin(), nearest.end());
     };
     const double x_m = place_m(row).x();
     const auto here = std::lower_bound(along_x_.begin(), along_x_.end(), std::pair{x_m, row});
@@ -92,13 +90,11 @@ class OffByPlace {
     while (below != along_x_.rend() || above != along_x_.end()) {
       const bool goes_up =
           below == along_x_.rend() || (above != along_x_.end() && above->first - x_m < x_m - below->first);
-      const double away_m = goes_up ? above->first - x_m : x_m - below->first;
-      if (!isNear(away_m * away_m)) break;
-      lookAt(goes_up ? (above++)->second : (below++)->second);
+      if (!isWorthATry(goes_up ? above->first - x_m : x_m - below->first)) break;
+      take(goes_up ? (above++)->second : (below++)->second);
     }
     std::vector<Eigen::Vector3d> about_m;
-    for (const auto& [square_m2, other] : looked_at)
-      if (isNear(square_m2)) about_m.push_back(off_m_[other]);
+    for (const Neighbour& one : nearest) about_m.push_back(off_m_[one.second]);
     return about_m;
   }
 
@@ -157,8 +153,7 @@ Found findOutlying(const OffByPlace& off, std::optional<double> jig_tolerance_m)
   const std::vector<Eigen::Vector3d>& off_m = off.all_m();
   if (off_m.empty()) return {};
   Found found;
-  found.core_m2 = coreOf_m2(off_m);
-  const double core_m2 = found.core_m2;
+  const double core_m2 = found.core_m2 = coreOf_m2(off_m);
   const double far_off = farOff(off_m.size(), core_m2, jig_tolerance_m);
   std::vector<std::size_t> far;
   for (std::size_t row = 0; row < off_m.size(); ++row)

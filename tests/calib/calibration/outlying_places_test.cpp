@@ -5,7 +5,6 @@
 #include <cmath>
 #include <random>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "calib/calibration/corrector.h"
@@ -169,45 +168,6 @@ class OutlyingPlacesTest : public QObject {
     const std::vector<double> weights = alignmentWeights(nodes, leastSquares(nodes), std::nullopt);
     QVERIFY(weights[8] < 0.05);
     QCOMPARE(std::count(weights.begin(), weights.end(), 1.0), std::ptrdiff_t{342});
-  }
-
-  void onAGridNoRoundingChoosesTheNeighbours() {
-    // Six places stand one pitch away and twelve at the root of two: which eight are nearest must not hang on the order
-    // of the rows, nor on where the grid begins.
-    std::vector<Node> nodes;
-    std::mt19937_64 generator(5);
-    std::normal_distribution<double> placing(0.0, kJigPlacing_m);
-    for (int n = 0; n < 144; ++n) {
-      Node node;
-      node.node = n;
-      node.has_orientation = false;
-      node.reference_from_sensor.position_m = 0.3 * Eigen::Vector3i(n % 6, n / 6 % 6, n / 36).cast<double>();
-      const Eigen::Vector3d off_m(placing(generator), placing(generator), placing(generator));
-      node.tracker_from_sensor.position_m = node.reference_from_sensor.position_m + off_m;
-      if (n == 20 || n == 86 || n == 94) node.tracker_from_sensor.position_m.y() += 0.05;
-      nodes.push_back(node);
-    }
-    const auto found = [](std::span<const Node> rows, const Pose& reference_from_tracker) {
-      std::vector<std::pair<int, double>> outlying;
-      for (const OutlyingRow& one : outlyingRows(rows, reference_from_tracker, std::nullopt))
-        outlying.emplace_back(rows[one.row].node, one.off_m);
-      std::sort(outlying.begin(), outlying.end());
-      return outlying;
-    };
-    const auto expected = found(nodes, Pose{});
-    QCOMPARE(expected.size(), std::size_t{3});
-    for (const double shift_m : {0.0, 0.037, 0.137, 0.237, 0.337, 1.1}) {
-      const Eigen::Vector3d moved_m(shift_m, -shift_m, 0.7 * shift_m);
-      std::vector<Node> others = nodes;
-      for (Node& node : others) node.reference_from_sensor.position_m += moved_m;
-      std::shuffle(others.begin(), others.end(), generator);
-      const auto outlying = found(others, Pose{moved_m, Eigen::Quaterniond::Identity()});
-      QCOMPARE(outlying.size(), expected.size());
-      for (std::size_t i = 0; i < expected.size(); ++i) {
-        QCOMPARE(outlying[i].first, expected[i].first);
-        QVERIFY(std::abs(outlying[i].second - expected[i].second) < 1e-9);
-      }
-    }
   }
 
   void ofFewRowsWhatIsStatedTells() {
