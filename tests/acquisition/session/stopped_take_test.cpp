@@ -1,10 +1,8 @@
-#include <signal.h>
-#include <sys/resource.h>
-
 #include <QTest>
 
 #include "tests/acquisition/session/controller_bench.h"
 #include "tests/acquisition/session/session_folder.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/test_main.h"
 
 /// What ends a take before it is stored: undo, and a disk without room. Nothing else goes with it, and it is told.
@@ -15,22 +13,7 @@ using testing::Bench;
 
 namespace {
 
-/// No file of this program grows while it lives.
-class FullDisk {
- public:
-  FullDisk() {
-    signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit none{4096, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &none);
-  }
-  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-};
+constexpr int kSessionBytes = 4096;  ///< Fewer than any session has.
 
 }  // namespace
 
@@ -55,7 +38,7 @@ class StoppedTakeTest : public QObject {
     Bench bench(folder_.newPath());
     bench.takeHere();
     {
-      const FullDisk full;
+      const testing::FullDisk full(kSessionBytes);
       bench.takeHere();
     }
     QCOMPARE(bench.stored, std::vector<int>{0});
@@ -78,7 +61,7 @@ class StoppedTakeTest : public QObject {
     bench.takeHere();
     bench.controller.setAutomatic(true);
     {
-      const FullDisk full;
+      const testing::FullDisk full(kSessionBytes);
       bench.tracker->carryTo(bench.placePose(1));
       bench.tracker->stand(20.0);
     }

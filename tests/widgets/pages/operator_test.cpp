@@ -2,8 +2,6 @@
 // pulled, a place taken again. The tracker is an emulated Fastrak on a line of this machine, whose sensor the test
 // puts where it wants.
 
-#include <sys/resource.h>
-
 #include <QApplication>
 #include <QComboBox>
 #include <QDir>
@@ -17,13 +15,13 @@
 #include <QTableView>
 #include <QTemporaryDir>
 #include <QTest>
-#include <csignal>
 #include <memory>
 
 #include "acquisition/devices/registry.h"
 #include "acquisition/emulators/fastrak_emulator.h"
 #include "acquisition/emulators/pty_endpoint.h"
 #include "acquisition/plan/place_state.h"
+#include "tests/support/full_disk.h"
 #include "tests/widgets/pages/window_driver.h"
 #include "tests/widgets/session_fixture.h"
 #include "widgets/shell/main_window.h"
@@ -78,23 +76,6 @@ bool isWholeIn(const QLabel& label) {
 }
 
 }  // namespace
-
-/// A disk without room, while it lives.
-class WithoutRoom {
- public:
-  WithoutRoom() {
-    signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit full{100, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &full);
-  }
-  ~WithoutRoom() { setrlimit(RLIMIT_FSIZE, &before_); }
-  WithoutRoom(const WithoutRoom&) = delete;
-  WithoutRoom& operator=(const WithoutRoom&) = delete;
-
- private:
-  rlimit before_{};
-};
 
 class OperatorTest : public testing::WindowDriver {
   Q_OBJECT
@@ -452,7 +433,7 @@ void OperatorTest::theLineIsSavedAndPlaysAgain() {
   for (const QString& file : files) QVERIFY2(isAmong(taken.rows, playedFrom(file)), qPrintable(file));
 
   const bool told = [&] {
-    const WithoutRoom full;
+    const testing::FullDisk full(100);
     click("saveTrace");
     return QTest::qWaitFor([&] { return message().contains(QStringLiteral("are not saved: ")); }, kWaitMs);
   }();
@@ -490,7 +471,7 @@ void OperatorTest::whatIsNotStoredIsReadFromAfar() {
   const QString here = find<QLabel>("bannerPlace")->text();
   const auto large = [&] { return find<QLabel>("bannerPlace")->text(); };
   {
-    const WithoutRoom full;
+    const testing::FullDisk full(100);
     QVERIFY(standAt(placeOf(*status().current).position_m));
     QTest::keyClick(window_.get(), Qt::Key_Space);
     QTRY_COMPARE(large(), QStringLiteral("Not stored"));
