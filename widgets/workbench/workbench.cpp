@@ -151,10 +151,13 @@ void Workbench::onNodesStored(int place, const QString& suspicious) {
 
 void Workbench::onTakeFailed(const QString& reason, int place) {
   if (place >= 0) spoken_of_.insert(place);
-  const bool has_tracker = status_.device != acquisition::DeviceState::kClosed;
-  showMessage({reason, Severity::kAttention, has_tracker ? QString() : tr("Connect"),
-               [this] { goToPage(QStringLiteral("connect")); },
-               place < 0 ? QString() : QStringLiteral("session/take/%1").arg(place)});
+  Message message{
+      reason, Severity::kAttention, {}, {}, place < 0 ? QString() : QStringLiteral("session/take/%1").arg(place)};
+  if (status_.device == acquisition::DeviceState::kClosed) {
+    message.action_label = tr("Connect");
+    message.action = [this] { goToPage(QStringLiteral("connect")); };
+  }
+  showMessage(message);
 }
 
 void Workbench::onTakeRefused(int place, double off_m) {

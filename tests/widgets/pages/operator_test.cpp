@@ -480,6 +480,8 @@ void OperatorTest::whatIsNotStoredIsReadFromAfar() {
     QVERIFY(find<QLabel>("bannerReason")->text().contains(QStringLiteral("not stored: ")));
   }
   picture("not-stored");
+  for (const QPushButton* button : find<QWidget>("messageLine")->findChildren<QPushButton*>())
+    QVERIFY(!button->isVisible() || !button->text().isEmpty());
   QVERIFY(takeRight());
   QTRY_VERIFY(large() != QStringLiteral("Not stored") && large() != here);
 
